@@ -1,4 +1,4 @@
-"""What clpt is measured by, one module a question; `python -m bench` asks them all.
+"""Measurements of clpt, a module for each question; `python -m bench` runs them all.
 
 traversal: rays against Embree; builders: how fast trees are made; renders: pictures against
 Mitsuba's; starting: whole processes, cold and warm, and their memory; compiling: what light paths

@@ -1,7 +1,7 @@
 """Measure everything: `python -m bench [NAME ...]`, or `make bench`.
 
-`device` is `clpt bench`; the others compare with other renderers, or ask one question each. Every
-part runs in a process of its own; records go to bench/results/<date>-<machine>.jsonl, and the
+`device` is `clpt bench`; the others compare with other renderers, or answer a question each. Every
+part runs in a separate process; records go to bench/results/<date>-<machine>.jsonl, and the
 page beside them is made again. The first run renders references for the errors, a few minutes more.
 """
 
@@ -57,8 +57,8 @@ def main(parts: tuple[str, ...]) -> None:
     for part in parts or PARTS:
         with tempfile.TemporaryDirectory() as folder:
             records = Path(folder) / "records.jsonl"
-            what = ["clpt", "bench"] if part == "device" else [f"bench.{part}"]
-            command = [sys.executable, "-m", *what, *PARTS[part], "--json", str(records)]
+            words = ["clpt", "bench"] if part == "device" else [f"bench.{part}"]
+            command = [sys.executable, "-m", *words, *PARTS[part], "--json", str(records)]
             if subprocess.run(command, cwd=machine.ROOT).returncode:
                 failed.append(part)
             elif records.is_file():

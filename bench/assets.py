@@ -1,7 +1,7 @@
 """Every scene file of a folder: does it render, and if not, why? `make assets-report`.
 
-A file is read, lowered and rendered at 64x64 with one sample per pixel, in a process that is given
-up when a file takes too long. What others counted in it stands in the folder's expected.json. The
+A file is read, lowered and rendered at 64x64 with a sample per pixel, in a process that is killed
+when a file takes too long. The folder's expected.json has counts of other programs. The
 page goes to bench/results/assets.md, the records beside it.
 """
 
@@ -28,7 +28,7 @@ from bench.report import RESULTS
 SCENES = (".gltf", ".glb", ".pbrt", ".xml", ".obj", ".ply", ".stl", ".off")
 PATIENCE = 180.0  # seconds for a file, kernels compiled included
 SIZE = 64  # of the picture [pixels]
-BOUNDS = 1e-3  # share of the scene's size by which bounds may differ
+BOUNDS = 1e-3  # largest difference of bounds, over the scene's size
 
 Row = dict[str, Any]
 
@@ -76,21 +76,21 @@ def verdict(row: Row, expected: Row) -> Row:
     counted = expected.get("triangles", expected.get("mesh_triangles"))
     if "ply_triangles" in expected:
         counted = expected["ply_triangles"] + expected["inline_triangles"]
-    made: Row = {"expected": counted}
+    result: Row = {"expected": counted}
     theirs, ours = expected.get("bounds"), row.get("bounds")
     if theirs and ours:
         corners = np.array(theirs), np.array(ours)
-        made["bounds_differ"] = float(np.abs(corners[0] - corners[1]).max() / np.ptp(corners[0]))
-    return made
+        result["bounds_differ"] = float(np.abs(corners[0] - corners[1]).max() / np.ptp(corners[0]))
+    return result
 
 
 def run(folder: Path, names: tuple[str, ...], film: int = SIZE) -> list[Row]:
-    """Examine all files one after the other; a file that kills or stalls its process is told of."""
+    """Examine all files in turn; report a file that kills or stalls its process."""
     kinds = json.loads((folder / "expected.json").read_text("utf-8"))
     expected = {k: v for kind in kinds.values() if isinstance(kind, dict) for k, v in kind.items()}
     rows, pool = [], _pool()
-    found = [f for f in files(folder, expected) if not names or any(n in str(f) for n in names)]
-    for path in track(found, description="files"):
+    selected = [f for f in files(folder, expected) if not names or any(n in str(f) for n in names)]
+    for path in track(selected, description="files"):
         name = path.relative_to(folder).as_posix()
         try:
             row = pool.submit(examine, path, film).result(PATIENCE)

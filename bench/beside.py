@@ -1,9 +1,9 @@
 """Two checkouts of clpt beside each other: what a change costs, stage by stage.
 
 `python -m bench.beside CHECKOUT` renders the scenes of `bench.peer_scenes` with that checkout and
-with this one, in two processes on one core that take turns. A figure is the median of the ratios of
-neighbouring runs, this checkout's seconds over the other's: below 1 this one is faster. Kernels are
-timed by the device, so what else runs there counts in both.
+with this checkout, in two processes that take turns on a core. A figure is the median of the ratios
+of neighbouring runs, this checkout's seconds over the other's: below 1 this checkout is faster. The
+device times kernels, so other work on it counts in both.
 """
 
 from __future__ import annotations
@@ -102,10 +102,10 @@ def main(
     rounds: int,
     json_file: str | None,
 ) -> None:
-    if hasattr(os, "sched_setaffinity"):  # both on one core
+    if hasattr(os, "sched_setaffinity"):  # both on a single core
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     commit = ["git", "-C", str(checkout), "rev-parse", "--short", "HEAD"]
-    found = subprocess.run(commit, capture_output=True, text=True)
+    process = subprocess.run(commit, capture_output=True, text=True)
     table = Table("scene", "mode", "stage", "seconds, new / old")
     rows: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -115,7 +115,7 @@ def main(
                 ratios = compare(checkout.resolve(), Path(path), mode, spp, rounds)
                 stages = ", ".join(f"{n} {r:.3f}" for n, r in ratios.items() if n != "all")
                 about = {"scene": name, "mode": mode, "spp": spp, "rounds": rounds}
-                about |= {"other": found.stdout.strip()}
+                about |= {"other": process.stdout.strip()}
                 rows.append({**about, "ratio": ratios["all"], "stages": stages})
                 for stage, ratio in ratios.items():
                     table.add_row(name, mode, stage, f"{ratio:.3f}")

@@ -1,15 +1,15 @@
-"""clpt beside Cycles, with path guiding (OpenPGL) and without, at equal processor time on one core.
+"""clpt beside Cycles, with path guiding (OpenPGL) and without, at equal processor time on a core.
 
     python -m bench.beside_cycles --blender PYTHON
 
 PYTHON is an interpreter that has Blender's `bpy` of PyPI. Both render the same triangles with the
 same materials: diffuse, glass, lamps. `cornell_glass` is a Cornell box with a glass ball, `door` is
-that of `bench.hard_light`, and `ajar` (with `--assets`) the geometry of veach-ajar with diffuse
-surfaces for what is metal, coated or textured. The error is the variance of pictures of different
-seeds, relative to the mean of all, without the worst .1 % of the pixels. That is the whole error
-where there is no bias: so the two renderers have to agree in the mean, and in blocks of pixels.
-What a process takes until its first sample is taken out; what clpt's guide learns before that
-counts. The renderers take turns.
+the scene of `bench.hard_light`, and `ajar` (with `--assets`) the geometry of veach-ajar with
+diffuse surfaces in place of metal, coats and textures. The error is the variance of pictures of
+different seeds, relative to the mean of all, without the worst .1 % of the pixels. It is the whole
+error without bias: so the two renderers must agree in the mean, and in blocks of pixels. The time
+before a process's first sample is subtracted; the learning of clpt's guide counts. The renderers
+take turns.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ from clpt.scene import materials
 CYCLES = Path(__file__).with_name("in_blender.py")
 WHOLE = (-1, -1, -1), (1, 1, 1)
 AJAR = "mitsuba/veach-ajar/scene.xml"
-PILOT = 16  # samples that say how long one takes
+PILOT = 16  # samples of the pilot, for the time of a sample
 BLOCK = 16  # pixels of a side
 
 Image = NDArray[np.float32]
@@ -198,7 +198,7 @@ def measure(contenders: list[Contender], seconds: float, seeds: int) -> list[Row
 def agreement(ours: Image, theirs: Image) -> Row:
     """Return the means of two pictures, and the median relative difference of their blocks.
 
-    Raises RuntimeError if they are too far apart to be pictures of one scene.
+    Raises RuntimeError if they differ too much to be pictures of the same scene.
     """
     means = [float(image.mean()) for image in (ours, theirs)]
     h, w = (n // BLOCK for n in ours.shape[:2])
@@ -230,7 +230,7 @@ def has_cycles(python: str) -> bool:
 @click.option("--seeds", default=2, show_default=True)
 @click.option("--json", "json_file", type=click.Path(), help="append the figures as JSON lines")
 def main(
-    blender: str, assets: Path | None, scenes: tuple[str, ...], side: int, **given: Any
+    blender: str, assets: Path | None, scenes: tuple[str, ...], side: int, **options: Any
 ) -> None:
     if not has_cycles(blender):
         print(f"left out: {blender} has no bpy (pip install bpy==4.2.0 --extra-index-url ...)")
@@ -241,14 +241,14 @@ def main(
             try:
                 write(MADE[name](assets), Path(folder), side)
                 sides_ = (Path(folder), side)
-                ours = [Contender(way, *sides_, None) for way in given["ways"]]
+                ours = [Contender(way, *sides_, None) for way in options["ways"]]
                 theirs = [Contender(way, *sides_, blender) for way in ("path", "guiding")]
-                found = measure(ours + theirs, given["seconds"], given["seeds"])
+                found = measure(ours + theirs, options["seconds"], options["seeds"])
             except (RuntimeError, OSError) as error:
                 print(f"{name}: {error}", file=sys.stderr)
                 continue
         rows = [{"scene": name, "mode": "rgb", "size": [side, side], **row} for row in found]
-        machine.append(given["json_file"], "beside_cycles", rows)
+        machine.append(options["json_file"], "beside_cycles", rows)
         for row in rows:
             names = ("scene", "renderer", "spp", "cpu", "relmse", "efficiency", "over_cycles")
             table.add_row(*(str(row[name]) for name in names))

@@ -1,8 +1,8 @@
 """`python -m bench.board FILES... -o board.html` makes a page of many results of `clpt bench`.
 
 FILES: JSON lines of `clpt bench --json`, or reports of `clpt bench --first-light`, of any devices
-and machines. The page is one file of HTML without scripts: the devices by their points, what each
-is good at, and what was wrong. Of equal figures of a device, driver and clpt the newest counts.
+and machines. The page is an HTML file without scripts: devices by their points, their strengths,
+and wrong figures. Of equal figures of a device, driver and clpt the newest counts.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from clpt.errors import SceneError
 from clpt.files import output_files
 
 Row = dict[str, Any]
-WHO = ("device", "driver", "processor", "clpt", "commit")  # whose figures stand in one line
+WHO = ("device", "driver", "processor", "clpt", "commit")  # equal in all figures of a row
 FENCED = re.compile(r"^```json\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # Of each column: the part, the scene, what the figure's name must match, and what it says.
 SUBSCORES = {
@@ -81,7 +81,7 @@ class Entry:
         return max(found, key=lambda row: row.get("benchmark_version", 0), default=None)
 
     def score(self, size: str) -> float:
-        """Return the geometric mean of the pictures' points; 0 if one is wrong or missing."""
+        """Return the geometric mean of the pictures' points; 0 if a picture is wrong or missing."""
         each = [points(self.picture(name, size)) for name in PICTURES]
         return math.prod(each) ** (1 / len(each))
 
@@ -127,7 +127,7 @@ def entries(rows: Iterable[Row]) -> list[Entry]:
     return list(found.values())
 
 
-def page(given: Sequence[Entry]) -> str:
+def page(listed: Sequence[Entry]) -> str:
     """Return the page."""
     parts = [
         "<!doctype html>",
@@ -139,20 +139,20 @@ def page(given: Sequence[Entry]) -> str:
         "More is better. A wrong picture has no points.</p>",
     ]
     for size in SIZES:
-        own = [one for one in given if any(one.picture(name, size) for name in PICTURES)]
+        own = [one for one in listed if any(one.picture(name, size) for name in PICTURES)]
         if own:
             parts += _ranking(sorted(own, key=lambda one: -one.score(size)), size)
-    return "\n".join([*parts, *_subscores(given), *_faults(given), "</html>\n"])
+    return "\n".join([*parts, *_subscores(listed), *_faults(listed), "</html>\n"])
 
 
-def _ranking(given: Sequence[Entry], size: str) -> Iterator[str]:
-    """Yield the table of points of one size, the best device first."""
+def _ranking(listed: Sequence[Entry], size: str) -> Iterator[str]:
+    """Yield the table of points of a size, the best device first."""
     side, samples = SIZES[size].side, SIZES[size].samples
     yield f"<h2>Points, {size}: {side} x {side} pixels, {samples} samples</h2>"
     yield '<div class="wide"><table><tr><th>device</th><th>all</th>'
     yield "".join(f"<th>{name}</th>" for name in PICTURES) + "</tr>"
-    most = {name: max(points(one.picture(name, size)) for one in given) for name in PICTURES}
-    for one in given:
+    most = {name: max(points(one.picture(name, size)) for one in listed) for name in PICTURES}
+    for one in listed:
         score = one.score(size)
         wrong = any((row := one.picture(n, size)) and row["value"] is None for n in PICTURES)
         none = '<span class="wrong">no score</span>' if wrong else ""
@@ -174,14 +174,14 @@ def _bar(entry: Entry, name: str, size: str, most: float) -> str:
     return f'{own:,.0f}<div class="bar" style="width:{width:.0f}%"></div>'
 
 
-def _subscores(given: Sequence[Entry]) -> Iterator[str]:
-    """Yield the table of what each device is good at."""
+def _subscores(listed: Sequence[Entry]) -> Iterator[str]:
+    """Yield the table of each device's strengths."""
     yield "<h2>What each is good at</h2>"
     yield '<div class="wide"><table><tr><th>device</th>'
     for name, (*_, meaning) in SUBSCORES.items():
         yield f'<th title="{escape(meaning)}">{name}</th>'
     yield "</tr>"
-    for one in given:
+    for one in listed:
         cells = []
         for *which, _ in SUBSCORES.values():
             row = one.best(*which)
@@ -200,9 +200,9 @@ def _short(value: float) -> str:
     return f"{value:.3g}" if value < 1000 else f"{value:,.0f}"
 
 
-def _faults(given: Sequence[Entry]) -> Iterator[str]:
-    """Yield the table of what was refused."""
-    rows = [(one, row) for one in given for row in one.figures.values() if row.get("refused")]
+def _faults(listed: Sequence[Entry]) -> Iterator[str]:
+    """Yield the table of refused figures."""
+    rows = [(one, row) for one in listed for row in one.figures.values() if row.get("refused")]
     yield "<h2>What was wrong</h2>"
     if not rows:
         yield "<p>Nothing.</p>"
@@ -218,23 +218,23 @@ def _faults(given: Sequence[Entry]) -> Iterator[str]:
 
 
 def _who(entry: Entry) -> str:
-    """Return a device's name, with the rest of what made the figures in small."""
+    """Return a device's name, with driver, processor and version in small print."""
     who = entry.who
     more = [f"driver {who['driver']}", who["processor"], f"clpt {who['clpt']} {who['commit']}"]
     more.append(str(who["date"])[:10])
     busy = who["load"] is not None and who["cores"] and who["load"] > 1.5 * who["cores"]
-    told = escape(", ".join(str(one).strip() for one in more))
-    told += ', <span class="wrong">the machine did other work too</span>' if busy else ""
-    return f'{escape(str(who["device"]))}<div class="faint">{told}</div>'
+    text = escape(", ".join(str(one).strip() for one in more))
+    text += ', <span class="wrong">the machine did other work too</span>' if busy else ""
+    return f'{escape(str(who["device"]))}<div class="faint">{text}</div>'
 
 
 @click.command(help=__doc__)
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path, exists=True))
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="the page")
 def main(files: Sequence[Path], output: Path) -> None:
-    given = entries(row for path in files for row in read(path))
-    output_files.write_text(output, page(given))
-    click.echo(f"{output}  {len(given)} devices and drivers")
+    listed = entries(row for path in files for row in read(path))
+    output_files.write_text(output, page(listed))
+    click.echo(f"{output}  {len(listed)} devices and drivers")
 
 
 if __name__ == "__main__":

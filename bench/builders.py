@@ -4,12 +4,11 @@
 
 Million triangles a second, of processor time and by the clock, from vertices and faces on the host
 to buffers ready for traversal; `binary` is the binned SAH tree alone, `wide8` has the collapse too,
-`fast` is that over leaves of a space-filling curve.
+`fast` is the tree over leaves of a space-filling curve.
 Embree is timed around rtcCommitScene at medium quality.
 
-`refit` is the same of a tree that follows vertices on the device, beside `rebuild`, which makes it
-anew of them; `slower` tells for how much of what bends the scene rays take how many times as long
-in the tree that was refitted.
+`refit` is the speed of a refit to moved vertices on the device, beside `rebuild`, another build of
+them; `slower` is the ratio of rays' times in the refitted tree, by the amount of bending.
 """
 
 from __future__ import annotations

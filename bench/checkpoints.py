@@ -1,12 +1,12 @@
-"""What checkpoints cost: processor time of a render with them beside one without, in turns.
+"""What checkpoints cost: processor time of a render with and without them, in turns.
 
-The same samples in passes of some seconds, in one process; with checkpoints each pass is followed
+The same samples in passes of some seconds, in a process; with checkpoints each pass is followed
 by a copy of the film on the device, and every `period` seconds a file is written by a thread. The
 parts are measured by themselves too, and tell the share at the default period. Processor time
 includes the threads of the driver and of the writer.
 
 With --workers the same of a cluster on this machine: the client holds its film with each progress,
-and writes it. Processor time is that of the client, the scheduler in it, and the workers.
+and writes it. Processor time is of the client with its scheduler, and of the workers.
 """
 
 from __future__ import annotations
@@ -41,17 +41,19 @@ def spent(work: Callable[[], object]) -> float:
 
 
 def parts(renderer: clpt.Renderer, path: Path, times: int) -> dict[str, float]:
-    """Medians of what a copy on the device, one to the host, and a file take [s], after a pass."""
+    """Return median times [s] of a copy on the device, a copy to the host, and a file, after a
+    pass.
+    """
 
     def hold() -> None:
         renderer._hold()
         renderer._wavefront.stream.wait()
 
     hold()
-    saved = renderer._saved_film(held=True)
+    saved = renderer.saved_film(held=True)
     works = {
         "copy": hold,
-        "to_host": lambda: renderer._saved_film(held=True),
+        "to_host": lambda: renderer.saved_film(held=True),
         "file": lambda: film_file.write(path, saved),
     }
     times_of: dict[str, list[float]] = {name: [] for name in works}
@@ -93,7 +95,7 @@ def figures(size: tuple[int, int], where: str, period: float, shares: list[float
 
 
 def compare(size: tuple[int, int], period: float, rounds: int, folder: Path) -> Record:
-    """A record of one device."""
+    """Return the record of a device."""
     target = folder / "a.png"
     with clpt.Renderer(resized(size)) as renderer:
         renderer.run(1)

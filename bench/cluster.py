@@ -2,16 +2,15 @@
 
     python -m bench.cluster [SCENE] [--seconds 20] [--rounds 3] [--noise .02]
 
-Workers render one long block each, at the same time, which is what they can do; then a
-`ClusterRenderer` renders as much with them, of the same scene, which is open there. The two
-alternate. efficiency: the rate of the
-cluster over the sum of both workers' rates; first: from `run` to the first film that is added, of
-workers that are warm: the scene is new to them, their kernels are not. cpu: processor time of a
-sample by the workers alone, over that by the cluster, client and scheduler included: other work on
-the machine hardly moves it, but it does not see workers that wait. One JSON line.
+First each worker renders a long block, at the same time; then a `ClusterRenderer` renders as much
+of the same scene with them. The two alternate. efficiency: the rate of the cluster over the sum of
+both workers' rates; first: from `run` to the first added film, with warm workers: the scene is new
+to them, their kernels are not. cpu: processor time of a sample by the workers alone, over that by
+the cluster, client and scheduler included: other work on the machine hardly moves it, but it does
+not see waiting workers. The output is a JSON line.
 
-With --noise the same scene is rendered by one process till the noise is as low, and by the workers:
-noise_cpu is the processor time of the one over that of the others, and both films must be equal.
+With --noise a process and the workers render the same scene to the same noise: noise_cpu is the
+processor time of the process over the workers', and both films must be equal.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ MOST = 4096  # samples of a pixel, with noise
 
 
 def alone(client: Any, digest: str, samples: int, names: Any) -> float:
-    """The rate of all workers, each with one block of its own [samples/s]."""
+    """Return the rate of all workers with a block each [samples/s]."""
     blocks = [
         client.submit(
             tasks.render_block, digest, 0, samples, workers=[address], key=f"alone-{next(names)}"
@@ -62,7 +61,7 @@ def together(scene: Any, client: Any, samples: int) -> tuple[float, float]:
 
 
 def noisy(scene: Any, client: Any, started: Any, noise: float) -> float:
-    """Processor time of one process over that of a cluster, which render to the same noise."""
+    """Return processor time of a process over a cluster's, at the same noise."""
     with clpt.Renderer(scene, threads=WORKERS) as one, ClusterRenderer(scene, client) as several:
         for renderer in (one, several):
             renderer.run(1)
@@ -78,7 +77,7 @@ def noisy(scene: Any, client: Any, started: Any, noise: float) -> float:
 
 
 def processor_time(processes: Any) -> float:
-    """Of these processes and this one, so far [s]."""
+    """Return the processor time of these processes and this process so far [s]."""
     times = [psutil.Process(one.pid).cpu_times() for one in processes]
     return time.process_time() + sum(t.user + t.system for t in times)
 

@@ -1,7 +1,7 @@
 """Compiling: processor time of a scene's kernels, with `path`, with light paths, with photons.
 
-`python -m bench.compiling [SCENE ...]`. Each figure is that of a process with empty caches, which
-compiles all kernels and renders one sample of a small picture, less that of one with full caches.
+`python -m bench.compiling [SCENE ...]`. A figure is the time of a process with empty caches, which
+compiles all kernels and renders a sample of a small picture, less the time with full caches.
 Aimed at: light paths take 1.6 times what `path` alone takes, photons 1.2 times what these take.
 """
 

@@ -2,7 +2,7 @@
 
 Error is the mean of (picture - reference)^2 / (light^2 + dark^2), where light is the mean of the
 reference's channels in a pixel and dark a tenth of the picture's. A gain is the noisy picture's
-error over that of the denoised one. Bands are compared by the same error, by their rms relative to
+error over the denoised picture's. Bands are compared by the same error, by their rms relative to
 the reference's, and by the mean CIEDE2000 of the colours that they make (white: 4 times the mean).
 Noisy pictures and references are of different seeds; references have noise too, which makes gains
 smaller than they are.
@@ -67,7 +67,7 @@ def colour_difference(bands: np.ndarray, truth: np.ndarray, centres: np.ndarray)
 
 
 def compare(name: str, samples: int, truth: dict[str, np.ndarray]) -> list[dict[str, object]]:
-    """Records of a scene: one for each denoiser."""
+    """Return the records of a scene, for each denoiser."""
     with clpt.Renderer(prepared(name, SEED), denoise="statistical") as renderer:
         renderer.run(samples)
         noisy, bands = renderer.colours(), renderer.image()
@@ -83,9 +83,9 @@ def compare(name: str, samples: int, truth: dict[str, np.ndarray]) -> list[dict[
         rows: list[dict[str, object]] = []
         for method in ("oidn", "statistical"):
             start = time.process_time()
-            made = clpt.DenoisedPicture(renderer, method)
+            denoised = clpt.DenoisedPicture(renderer, method)
             seconds = time.process_time() - start
-            after, after_bands = error(made.colours(), truth["rgb"]), of_bands(made.image())
+            after, after_bands = error(denoised.colours(), truth["rgb"]), of_bands(denoised.image())
             rows.append({
                 "scene": name, "figure": f"{method}, {samples} spp",
                 "noisy": before, "error": after, "gain": before / after,

@@ -1,6 +1,6 @@
-"""What an effect of wavelengths costs: a ball with it, beside the same ball without.
+"""Costs of effects of wavelengths: a ball with an effect, beside the same ball without.
 
-The same scene but for one material, light or film, in the same process, taking turns: seconds as a
+The scenes differ in a material, light or film, and take turns in a process: seconds as a
 ratio, and, at equal samples, the ratio of the variances of the two pictures, each relative to its
 own squared brightness. The ball stands on a table under a lamp and a sky.
 """
@@ -155,7 +155,7 @@ def compare(name: str, spp: int, rounds: int) -> dict[str, object]:
             start = time.perf_counter()
             renderer.run(spp)
             image = renderer.image()
-            if number > 0:  # the first one warms up
+            if number > 0:  # the first warms up
                 taken.append(image)
                 spent.append(time.perf_counter() - start)
     with_it, without = (noise(np.array(taken)) for taken in images)

@@ -3,17 +3,17 @@
 `python -m bench.efficiency [SCENE ...]`: names of `bench.renders`, or Mitsuba files; by default all
 of both, the files of the folder `--assets` among them. Both renderers are whole processes, which
 take turns. A figure is processor time of all their threads, which neighbours on the machine disturb
-less than the clock; what a process takes until its first sample is taken out, and told by itself.
-Efficiency is 1 / (relative MSE x seconds); the reference is the mean of two long renders, one of
-each renderer, with other seeds, whose own error, a quarter of what they differ by, is taken off;
-the worst .1 % of the pixels are left out.
+less than the clock; the time before a process's first sample is subtracted, and reported apart.
+Efficiency is 1 / (relative MSE x seconds); the reference is the mean of a long render by each
+renderer, with other seeds. Its error, a quarter of their difference, is subtracted; the worst .1 %
+of the pixels are left out.
 
 clpt renders in each of the ways of `--way`: `path` without light paths, `file` as `clpt render`
 does where nothing is asked for, `auto` by that integrator, `guiding`, whose learning counts.
-Mitsuba has the file's sampler and its best one (multijitter); clpt reads either as Sobol. Both have
-a box filter; with `--as-file` the filter is the file's own. In spectral mode a metal's `eta` and
-`k` by RGB are taken as values at 610, 550 and 460 nm: Mitsuba would cut them at 1, as if they were
-reflectances. Images of numbers are `raw` there, because Mitsuba takes no others for numbers.
+Mitsuba has the file's sampler and its best sampler (multijitter); clpt reads either as Sobol. Both
+have a box filter; with `--as-file` the filter is the file's own. In spectral mode a metal's `eta`
+and `k` by RGB are taken as values at 610, 550 and 460 nm: Mitsuba would cut them at 1, as if they
+were reflectances. Images of numbers are `raw` there, because Mitsuba accepts no others for numbers.
 """
 
 from __future__ import annotations
@@ -58,13 +58,13 @@ while done < spp:
     total, done = total + numpy.array(image)[..., :3] * some, done + some
 numpy.save(out, total / spp)
 """
-NUMBERS = (  # parameters that are no spectra, of which a file may give an image
+NUMBERS = (  # numbers that may be images in a file
     "alpha", "alpha_u", "alpha_v", "anisotropic", "clearcoat", "clearcoat_gloss", "flatness",
     "metallic", "opacity", "roughness", "sheen", "sheen_tint", "spec_tint", "spec_trans", "weight",
 )  # fmt: skip
 METAL = (610, 550, 460)  # wavelengths for the red, green and blue of a metal's index [nm]
 TRIM = 0.001
-APART = 0.03  # of the means of what the two render: beyond, there is no common reference
+APART = 0.03  # of the two renderers' means: beyond, there is no common reference
 SEEDS = (3, 4, 5)
 SAMPLERS = {"file": None, "best": "multijitter"}  # of Mitsuba
 PLAIN = ("--integrator", "path", "--light-paths", "0")
@@ -91,7 +91,7 @@ class Taken:
 
 @dataclass(frozen=True)
 class Contender:
-    """A renderer of one file in one mode, held to some cores; its processes keep their caches.
+    """A renderer of a file in a mode, on some cores; its processes keep their caches.
 
     options: of `clpt render`; None for Mitsuba.
     """
@@ -144,8 +144,8 @@ def watched(command: Sequence[str], cores: Sequence[int], caches: Path) -> tuple
 
 
 def relative_mse(image: NDArray[np.floating], reference: NDArray[np.floating]) -> float:
-    """Return the mean over all but the worst pixels of the squared error over the squared picture,
-    to which a hundredth of the mean's square is added."""
+    """Return the mean of squared error over squared picture plus a hundredth of the mean's square,
+    without the worst pixels."""
     error = (image - reference) ** 2 / (reference**2 + 1e-2 * reference.mean() ** 2)
     error = np.sort(error.mean(-1).ravel())
     return float(error[: int(error.size * (1 - TRIM))].mean())
@@ -231,7 +231,7 @@ def compare(scene: Path, settings: Settings) -> list[Row]:
 
 
 def in_mode(scene: Path, mode: str, settings: Settings) -> list[Row]:
-    """Return the rows of one mode."""
+    """Return the rows of a mode."""
     every = sorted(os.sched_getaffinity(0))
     rows: list[Row] = []
     copies: dict[str, Path] = {}
@@ -271,7 +271,8 @@ def long_renders(
     """
     pair = contenders[settings.ways[0]], contenders["mitsuba best"]
     both = [
-        one.render(settings.long, seed).image for one, seed in zip(pair, (77, 7777), strict=True)
+        contender.render(settings.long, seed).image
+        for contender, seed in zip(pair, (77, 7777), strict=True)
     ]
     means = [float(image.mean()) for image in both]
     if abs(means[0] - means[1]) > APART * means[1]:
@@ -285,8 +286,8 @@ def figures(
     """Return what each took; the first sample of each pixel is not counted: its time is the
     start's. The start of guiding is that of `path`, because it learns before its first sample.
     busy: cores in the render that had most of them, with its start."""
-    for one in contenders.values():  # compiles
-        one.render(1, 1)
+    for contender in contenders.values():  # compiles
+        contender.render(1, 1)
     machine.settle(next(iter(contenders.values())).caches)
     warm, full = (
         [{n: c.render(samples, seed) for n, c in contenders.items()} for seed in SEEDS]

@@ -48,8 +48,8 @@ def scene() -> Scene:
 def calls(renderer: clpt.Renderer) -> dict[str, Callable[[int], cl.Event]]:
     """What is timed, given how often it was called before."""
     now, queue = renderer.scene, renderer._wavefront.stream.queue
-    rest = now.shapes[0].vertices
-    points = [cl_array.to_device(queue, rest * np.float32(s)) for s in (1.0, 0.9)]
+    still = now.shapes[0].vertices
+    points = [cl_array.to_device(queue, still * np.float32(s)) for s in (1.0, 0.9)]
 
     def turned(i: int) -> Perspective:
         return dataclasses.replace(now.camera, fov=40.0 + i % 10)

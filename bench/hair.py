@@ -1,11 +1,11 @@
-"""Curves as rays meet them beside the same curves as tubes of triangles: time and memory.
+"""Exact curves beside the same curves as tubes of triangles: time and memory.
 
     python -m bench.hair
 
-Fur on a ball (short strands, each one cubic), a lock of long curled hair, a lawn of straight
+Fur on a ball (short strands of a cubic each), a lock of long curled hair, a lawn of straight
 blades. Both forms of a scene take turns with the same samples; the time is the processor's for a
-sample of all pixels, the memory that of trees and of the tables of geometry. `work` is time times
-variance: what an equal picture takes.
+sample of all pixels, the memory is of trees and tables of geometry. `work` is time times variance,
+the cost of an equal picture.
 """
 
 from __future__ import annotations
@@ -92,9 +92,9 @@ def scene(curves: Curves) -> Scene:
 
 
 def compare(name: str, curves: Curves) -> dict[str, Any]:
-    """Figures of one scene in both forms, and what they are of tubes'."""
+    """Return figures of a scene in both forms, and their ratios to tubes."""
     forms = {"exact": curves, "tubes": as_tubes(curves)}
-    renderers = {form: clpt.Renderer(scene(one)) for form, one in forms.items()}
+    renderers = {form: clpt.Renderer(scene(strands)) for form, strands in forms.items()}
     seconds: dict[str, list[float]] = {form: [] for form in forms}
     sums = {form: [np.zeros((SIZE, SIZE, 3)) for _ in range(2)] for form in forms}
     for round_ in range(ROUNDS + 1):
@@ -103,12 +103,12 @@ def compare(name: str, curves: Curves) -> dict[str, Any]:
             began = time.process_time()
             renderer.run(SPP)
             spent = time.process_time() - began
-            own = renderer.image().astype(np.float64) * (round_ + 1) - before
-            sums[form][0] += own
-            sums[form][1] += own**2
+            sample = renderer.image().astype(np.float64) * (round_ + 1) - before
+            sums[form][0] += sample
+            sums[form][1] += sample**2
             if round_:
                 seconds[form].append(spent / SPP)
-    found: dict[str, Any] = {"scene": name}
+    record: dict[str, Any] = {"scene": name}
     work = {}
     for form, renderer in renderers.items():
         total, squares = (s / (ROUNDS + 1) for s in sums[form])
@@ -116,12 +116,12 @@ def compare(name: str, curves: Curves) -> dict[str, Any]:
         variance = float((squares - total**2).clip(0.0).mean())
         memory = sum(stats.trees.values()) + sum(stats.tables.get(t, 0) for t in TABLES)
         work[form] = spent * variance
-        found |= {f"{form} s": round(spent, 4), f"{form} MB": round(memory / 1e6, 1)}
-        found[f"{form} mean"] = round(float(total.mean()), 4)
-    found["time"] = round(found["exact s"] / found["tubes s"], 3)
-    found["work"] = round(work["exact"] / work["tubes"], 3)
-    found["memory"] = round(found["exact MB"] / found["tubes MB"], 3)
-    return found
+        record |= {f"{form} s": round(spent, 4), f"{form} MB": round(memory / 1e6, 1)}
+        record[f"{form} mean"] = round(float(total.mean()), 4)
+    record["time"] = round(record["exact s"] / record["tubes s"], 3)
+    record["work"] = round(work["exact"] / work["tubes"], 3)
+    record["memory"] = round(record["exact MB"] / record["tubes MB"], 3)
+    return record
 
 
 @click.command(help=__doc__)
@@ -129,10 +129,10 @@ def compare(name: str, curves: Curves) -> dict[str, Any]:
 @click.option("--share", default=1.0, help="Of the strands.")
 @click.option("--only", default="", help="Part of a scene's name.")
 def main(path: str | None, share: float, only: str) -> None:
-    made = {"fur": (fur, 50_000), "lock": (lock, 6_000), "lawn": (lawn, 40_000)}
+    kinds = {"fur": (fur, 50_000), "lock": (lock, 6_000), "lawn": (lawn, 40_000)}
     rows = [
         compare(name, make(int(count * share)))
-        for name, (make, count) in made.items()
+        for name, (make, count) in kinds.items()
         if only in name
     ]
     machine.append(path, "hair", [{**machine.circumstances(), **row} for row in rows])

@@ -27,7 +27,7 @@ LINES, LONG = 40, 60  # of a function: what it may have, and what it must not
 PARAMETERS = 8
 CORNELL = "scenes/cornell_box"
 SIZES = ("lines of Python", "lines of OpenCL")
-SPARE = 100  # lines by which a small correction may pass
+SPARE = 100  # lines that a small correction may add
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def sizes(root: Path) -> Iterator[Figure]:
 
 
 def circles(root: Path) -> Iterator[Figure]:
-    """Rooms that cannot be read one after the other; see bench.imports.rooms."""
+    """Yield rooms in circles of imports; see bench.imports.rooms."""
     found = [
         (len(circle), ", ".join(circle))
         for links in imports.rooms(root).values()

@@ -17,7 +17,7 @@ Graph = dict[str, set[str]]
 
 
 def imports(path: Path, root: Path = ROOT) -> dict[str, int]:
-    """The full names of all that a file imports, and takes from what it imports; with lines."""
+    """Return the full names of imports of a file, and of their attributes, with lines."""
     return {
         name: found.line
         for found in read(path, root).imports
@@ -100,7 +100,7 @@ def circles(links: Mapping[str, set[str]]) -> list[list[str]]:
 
 
 def _reached(links: Mapping[str, set[str]], start: str) -> set[str]:
-    """The nodes to which a way of one link or more leads from `start`."""
+    """Return the nodes that links reach from `start`."""
     seen: set[str] = set()
     open_ = [*links[start]]
     while open_:

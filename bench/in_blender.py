@@ -3,7 +3,8 @@
     python -I in_blender.py SCENE.json SPP SEED GUIDING OUT.exr
 
 SCENE.json: width, height, depth, fov [degrees], camera (4 rows of 4), and shapes: files of meshes
-(`vertices`, `faces` in .npz), each with a kind of surface and its numbers. One thread; box filter.
+(`vertices`, `faces` in .npz), each with a kind of surface and its numbers. A single thread; box
+filter.
 """
 
 import json
@@ -20,8 +21,8 @@ def main(file, spp, seed, guiding, out):
     described = json.loads(Path(file).read_text())
     scene = bpy.context.scene
     scene.world = None
-    for thing in list(bpy.data.objects):  # of the scene that Blender begins with
-        bpy.data.objects.remove(thing)
+    for item in list(bpy.data.objects):  # of the scene that Blender begins with
+        bpy.data.objects.remove(item)
     for number, shape in enumerate(described["shapes"]):
         arrays = np.load(shape["file"])
         mesh = bpy.data.meshes.new(f"{number}")
@@ -41,10 +42,10 @@ def main(file, spp, seed, guiding, out):
 
 
 def surface(name, shape):
-    """A material of one node, whose front alone shines if it is a lamp."""
-    made = bpy.data.materials.new(name)
-    made.use_nodes = True
-    nodes, link = made.node_tree.nodes, made.node_tree.links.new
+    """Return a material with a single node; a lamp emits from its front."""
+    shader = bpy.data.materials.new(name)
+    shader.use_nodes = True
+    nodes, link = shader.node_tree.nodes, shader.node_tree.links.new
     nodes.clear()
     out = nodes.new("ShaderNodeOutputMaterial")
     kind = {"Lamp": "Emission", "Glass": "BsdfGlass", "Diffuse": "BsdfDiffuse"}[shape["kind"]]
@@ -65,12 +66,12 @@ def surface(name, shape):
         link(nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"], front.inputs[1])
         link(front.outputs[0], times.inputs[1])
         link(times.outputs[0], node.inputs["Strength"])
-        made.cycles.emission_sampling = "FRONT"
-    return made
+        shader.cycles.emission_sampling = "FRONT"
+    return shader
 
 
 def film(render, width, height, out):
-    """A linear picture in single precision, rendered by one thread."""
+    """Set a linear picture in single precision, rendered by a thread."""
     render.engine = "CYCLES"
     render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
     render.filepath = out

@@ -76,12 +76,12 @@ def meadow(deep: float, count: int = 10000) -> tuple[list[np.ndarray], float]:
     ], side
 
 
-def scene(things: list[Shape], side: float = 50.0) -> Scene:
+def scene(shapes: list[Shape], side: float = 50.0) -> Scene:
     """The things under an even sky, seen from above; `side` [m] of them fill the picture."""
     view = tf.look_at([0, 0.8 * side, 1.2 * side], [0, 0, 0], [0, 1, 0])
     return Scene(
         camera=Perspective(to_world=view, fov=40),
-        shapes=things,
+        shapes=shapes,
         lights=[Constant(radiance=1.0)],
         film=Film(width=160, height=120, mode="rgb"),
         integrator=Path(max_depth=4),
@@ -101,9 +101,9 @@ def placed(group: Group, matrices: list[np.ndarray]) -> list[Shape]:
     return [Instance(group=group, to_world=matrix) for matrix in matrices]
 
 
-def measure(name: str, things: list[Shape], side: float = 50.0) -> dict[str, object]:
+def measure(name: str, shapes: list[Shape], side: float = 50.0) -> dict[str, object]:
     """Render twice; rays are counted the second time."""
-    renderer = clpt.Renderer(scene(things, side))
+    renderer = clpt.Renderer(scene(shapes, side))
     renderer.run(SPP)
     before = renderer._wavefront.counts.rays
     start = time.process_time()
@@ -134,8 +134,8 @@ def main(json_file: str | None) -> None:
         matrices, side = meadow(deep)
         cases[f"10000 tufts, {name}"] = placed(grass, matrices), side
     rows = []
-    for name, (things, side) in cases.items():
-        rows.append(measure(name, things, side))
+    for name, (shapes, side) in cases.items():
+        rows.append(measure(name, shapes, side))
         machine.append(json_file, "instancing", rows[-1:])
     table = Table(*rows[0], title=machine.processor())
     for row in rows:

@@ -26,9 +26,9 @@ def conditions(text: str) -> int:
 
 
 def functions(path: Path) -> list[KernelFunction]:
-    """The functions of a file: from the line with the name to the one with the last bracket."""
+    """Return the functions of a file, from the line of the name to the last bracket."""
     text = re.sub(r"/\*.*?\*/|//[^\n]*", _blank, path.read_text(encoding="utf-8"), flags=re.DOTALL)
-    found: list[KernelFunction] = []
+    functions_: list[KernelFunction] = []
     depth, start, name = 0, 0, ""
     lines = text.split("\n")
     for number, line in enumerate(lines, 1):
@@ -39,9 +39,9 @@ def functions(path: Path) -> list[KernelFunction]:
         depth += line.count("{") - line.count("}")
         if depth == 0 and name and "}" in line:
             inside = conditions("\n".join(lines[start - 1 : number]))
-            found.append(KernelFunction(name, start, number - start + 1, inside))
+            functions_.append(KernelFunction(name, start, number - start + 1, inside))
             name = ""
-    return found
+    return functions_
 
 
 def _blank(comment: re.Match[str]) -> str:

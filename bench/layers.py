@@ -1,8 +1,8 @@
-"""What layers beside the picture cost: processor time of a render with them beside one without.
+"""Costs of layers beside the picture: processor time of a render with and without them.
 
-Two renderers of a scene in one process take the same samples in turns, each from the first one on;
-the share is the median over rounds of pairs. `--layers` says which sets, `--spp` how many samples:
-layers are of the first 64, so that those cost the most.
+Two renderers of a scene in a process take the same samples in turns, from the first sample on; the
+share is the median over pairs. `--layers` selects sets, `--spp` the number of samples: layers use
+the first 64, which cost the most.
 """
 
 from __future__ import annotations
@@ -41,17 +41,17 @@ def compare(
 
         def renderer(layers: tuple[str, ...]) -> clpt.Renderer:
             plan = dataclasses.replace(scene, film=dataclasses.replace(film, layers=layers))
-            made = stack.enter_context(clpt.Renderer(plan))
-            made.run(1)
-            return made
+            opened = stack.enter_context(clpt.Renderer(plan))
+            opened.run(1)
+            return opened
 
         plain = renderer(())
         with_them = {names: renderer(tuple(names.split(","))) for names in sets}
         shares: dict[str, list[float]] = {names: [] for names in sets}
         for _ in range(rounds):
-            for names, one in with_them.items():
-                before, own, after = (spent(r, samples) for r in (plain, one, plain))
-                shares[names].append(2.0 * own / (before + after) - 1.0)
+            for names, with_layers in with_them.items():
+                before, layered, after = (spent(r, samples) for r in (plain, with_layers, plain))
+                shares[names].append(2.0 * layered / (before + after) - 1.0)
     return [
         {
             "scene": name,
@@ -86,12 +86,12 @@ def main(
     for name in scenes:
         for mode in modes:
             try:
-                found = compare(name, sets, size, spp, rounds, mode)
+                medians = compare(name, sets, size, spp, rounds, mode)
             except ClptError as error:
                 machine.console().print(f"{name}: {error}")
                 continue
-            rows += found
-            machine.append(path, "layers", [{**machine.circumstances(), **row} for row in found])
+            rows += medians
+            machine.append(path, "layers", [{**machine.circumstances(), **row} for row in medians])
     table = Table("scene", "mode", "layers", "share", "rounds")
     for row in rows:
         table.add_row(*(str(row[key]) for key in ("scene", "mode", "figure", "share", "shares")))

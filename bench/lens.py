@@ -19,8 +19,7 @@ import pyopencl as cl
 from bench import machine
 from clpt import device
 from clpt.records import SETTINGS, TABLES
-from clpt.render.camera.encode import lower_camera
-from clpt.render.camera.lens import glasses
+from clpt.render.camera.encode import encode_camera
 from clpt.render.flow import stages
 from clpt.render.flow.signatures import scene_text
 from clpt.render.records import CameraFeatures
@@ -52,8 +51,8 @@ kernel void trace(SCENE_ARGS, global const float *given, global float *made, uin
 
 def rate(on: device.Device, lens: Lens, lanes: int) -> float:
     """Rays in a second of processor time."""
-    rows = glasses(lens)
-    _, words = lower_camera(lens, 90, 60, range(len(rows)))
+    rows = lens.dispersive_glasses
+    words = encode_camera(lens, 90, 60, range(len(rows)))
     camera = CameraFeatures("lens", disperses=True, losses=lens.reflects)
     files = {
         "generated/scene.cl": scene_text(),
@@ -70,17 +69,17 @@ def rate(on: device.Device, lens: Lens, lanes: int) -> float:
     program = device.build(on, device.assemble("bench", files, defines))
     settings = np.zeros(1, SETTINGS.dtype)
     settings["lambda_min"] = 360.0
-    given = np.random.default_rng(1).random((5, RAYS), np.float32)
-    given[4] = 400.0 + 300.0 * given[4]
+    numbers = np.random.default_rng(1).random((5, RAYS), np.float32)
+    numbers[4] = 400.0 + 300.0 * numbers[4]
     tables = {name: np.zeros(1, np.float32) for name in TABLES}
-    tables["camera"], tables["settings"], tables["given"] = words, settings, given
+    tables["camera"], tables["settings"], tables["given"] = words, settings, numbers
     tables["spectra"] = np.concatenate([g.sample(GRID) for g in rows]).astype(np.float32)
     flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
     bound = {
         n: cl.Buffer(on.context, flags, hostbuf=np.ascontiguousarray(v)) for n, v in tables.items()
     }
-    made = cl.Buffer(on.context, cl.mem_flags.WRITE_ONLY, 4 * RAYS)
-    kernel = program.kernel("trace").bind(**bound, made=made, n=RAYS)
+    output = cl.Buffer(on.context, cl.mem_flags.WRITE_ONLY, 4 * RAYS)
+    kernel = program.kernel("trace").bind(**bound, made=output, n=RAYS)
     taken = []
     for _ in range(ROUNDS):
         on.queue.finish()
@@ -97,11 +96,11 @@ def main(path: Path | None) -> None:
     on, rows = device.choose(), []
     for name, lens in CASES.items():
         for lanes in (8, 16):
-            found = rate(on, lens, lanes)
+            speed = rate(on, lens, lanes)
             rows.append(
-                {**machine.circumstances(), "what": name, "lanes": lanes, "mrays": found / 1e6}
+                {**machine.circumstances(), "what": name, "lanes": lanes, "mrays": speed / 1e6}
             )
-            machine.console().print(f"{name}, {lanes} lanes: {found / 1e6:.1f} Mrays/s a core")
+            machine.console().print(f"{name}, {lanes} lanes: {speed / 1e6:.1f} Mrays/s a core")
     machine.append(path, "lens", rows)
 
 

@@ -1,7 +1,7 @@
 """A tree over lights beside choosing them by their power, in rooms full of small lamps.
 
 Rooms stand in a row, each with its share of triangles that shine under its ceiling; the camera
-looks at one of them. The two take turns in one process: samples a second, and noise, which is the
+looks at a single room. The two take turns in a process: samples a second, and noise, which is the
 variance relative to the squared brightness, at equal samples and at equal time.
 """
 
@@ -51,8 +51,8 @@ def rooms(count: int) -> Scene:
     middle = (length - WIDTH) / 2
 
     def wall(place: list[float], turn: tuple[list[float], float], size: list[float]) -> Rectangle:
-        made = tf.translate(place) @ tf.rotate(*turn) @ tf.scale([*size, 1.0])
-        return Rectangle(to_world=made, material=grey)
+        matrix = tf.translate(place) @ tf.rotate(*turn) @ tf.scale([*size, 1.0])
+        return Rectangle(to_world=matrix, material=grey)
 
     shapes: list = [
         wall([middle, 0, 0], ([1, 0, 0], -90), [length / 2, 2]),
@@ -94,12 +94,12 @@ def compare(count: int, spp: int, rounds: int) -> dict[str, object]:
     images: list[list[np.ndarray]] = [[], []]
     seconds: list[list[float]] = [[], []]
     for number in range(rounds + 1):
-        for one, taken, spent in zip(both, images, seconds, strict=True):
-            one._wavefront.clear()
+        for way, taken, spent in zip(both, images, seconds, strict=True):
+            way._wavefront.clear()
             start = time.perf_counter()
-            one.run(spp)
-            image = one.image()
-            if number > 0:  # the first one warms up
+            way.run(spp)
+            image = way.image()
+            if number > 0:  # the first warms up
                 taken.append(image)
                 spent.append(time.perf_counter() - start)
     noises = [noise(np.array(taken)) for taken in images]

@@ -26,7 +26,7 @@ __all__ = [
 
 
 def kind() -> str:
-    """A name for machines like this one that can be part of a file's name."""
+    """Return a name of this kind of machine, for file names."""
     name = f"{processor()} {vectors()} {os.cpu_count()}cores"
     return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
 

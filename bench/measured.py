@@ -1,9 +1,9 @@
-"""What measured materials cost: a picture of one beside that of the metal that it was measured of.
+"""Costs of measured materials: a picture beside a picture of the metal that was measured.
 
 Both are rough metals of the same roughness, on a ball that fills the picture, in even light and by
-a lamp. The measurement is as large as those of Dupuy and Jakob's laboratory: 8 viewers, 195
+a lamp. The measurement has the size of Dupuy and Jakob's: 8 viewers, 195
 wavelengths, 32 x 32 directions; where it is anisotropic, 16 azimuths of each viewer, and 24
-wavelengths. A table of MERL has 90 x 90 x 180. Two renderers in one process take the same samples
+wavelengths. A table of MERL has 90 x 90 x 180. Two renderers in a process take the same samples
 in turns; the share is the median over rounds of pairs.
 """
 
@@ -86,16 +86,16 @@ def compare(side: int, samples: int, rounds: int, mode: str) -> list[dict[str, o
         k = 2.0 * np.sqrt(0.8 / 0.2)
         plain = materials.RoughConductor(eta=1.0, k=k, alpha_u=ROUGH, alpha_v=across)
         with ExitStack() as stack:
-            one, other = (
+            yardstick, other = (
                 stack.enter_context(clpt.Renderer(scene(m, side, mode))) for m in (plain, material)
             )
             ratios = []
-            for renderer in (one, other):
+            for renderer in (yardstick, other):
                 renderer.run(1)
             for _ in range(rounds):
-                before, own, after = (spent(r, samples) for r in (one, other, one))
-                ratios.append(2.0 * own / (before + after))
-            means = [float(renderer.image().mean()) for renderer in (one, other)]
+                before, seconds, after = (spent(r, samples) for r in (yardstick, other, yardstick))
+                ratios.append(2.0 * seconds / (before + after))
+            means = [float(renderer.image().mean()) for renderer in (yardstick, other)]
         rows.append({
             "scene": "ball", "mode": mode, "figure": name, "spp": samples,
             "times": round(statistics.median(ratios), 3),

@@ -1,4 +1,4 @@
-"""Meshes made finer, and as files, written by numpy: trimesh would take minutes for large ones."""
+"""Finer meshes, and mesh files written by numpy: trimesh takes minutes for large meshes."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ from clpt.spectra.spaces import between
 
 MODES = ("rgb", "spectral")
 SPP = 32_000  # of the references
-EXPOSURES = 16  # independent pictures, from which clpt's noise is known
+EXPOSURES = 16  # independent pictures, for clpt's noise
 BLOCKS = 12  # along each side of a picture
 SIGNIFICANCE = 1e-4
 ALLOWED = 2e-3  # relative
@@ -43,7 +43,7 @@ Row = dict[str, Any]
 
 @dataclasses.dataclass(frozen=True)
 class Estimate:
-    """A picture in XYZ, (h, w, 3), and the variance of one sample of each pixel.
+    """A picture in XYZ, (h, w, 3), and the variance of a sample of each pixel.
 
     noise: the variance of the means of blocks.
     """
@@ -91,7 +91,7 @@ def ours(path: Path, mode: str, samples: int) -> tuple[Estimate, int, list[str]]
 
 
 def reference(path: Path, mode: str) -> Estimate | None:
-    """The references beside a scene; None where one is missing."""
+    """Return the references beside a scene; None if a file is missing."""
     stem = path.parent / "refs" / f"{path.stem.rsplit('_', 1)[0]}_ref_{mode}"
     files = [Path(f"{stem}{end}.exr") for end in ("", "_var")]
     if not all(file.is_file() for file in files):

@@ -3,10 +3,9 @@
     python -m bench.motion
 
 1,000 copies of a ball with bumps (20,000 triangles) that turn by 30 degrees while the shutter is
-open, the same that move by half their size, and a camera that moves before copies that do not.
-Then one such ball of half a million triangles beside the same that swells to 1.5 of its size and
-twists, by two keys.
-Rays are counted by processor time; pictures of the two kinds take turns.
+open, the same that move by half their size, and a camera that moves before copies that do not. Then
+a ball of half a million triangles beside the same that swells to 1.5 of its size and twists, by two
+keys. Rays are counted by processor time; pictures of the two kinds take turns.
 """
 
 from __future__ import annotations
@@ -35,16 +34,16 @@ def copies(motion: Keys | None) -> Scene:
     """Balls at random places, each with a motion of its own about its middle."""
     rng = np.random.default_rng(5)
     group = Group((bumpy(100),))
-    things: list[Any] = []
+    shapes: list[Any] = []
     for _ in range(COUNT):
         place = tf.translate(rng.uniform([-20, 0, -20], [20, 6, 20]))
         keys = None
         if motion is not None:
             keys = Keys(motion.times, [place @ matrix for matrix in motion.transforms])
-        things.append(Instance(group=group, to_world=np.eye(4) if keys else place, motion=keys))
-    made = scene(things)
+        shapes.append(Instance(group=group, to_world=np.eye(4) if keys else place, motion=keys))
+    plan = scene(shapes)
     return dataclasses.replace(
-        made, camera=dataclasses.replace(made.camera, shutter=Shutter(0.0, 1.0))
+        plan, camera=dataclasses.replace(plan.camera, shutter=Shutter(0.0, 1.0))
     )
 
 
@@ -59,26 +58,26 @@ def one_ball(deforms: bool) -> Scene:
         twisted.append(c * points[:, 2] - s * points[:, 0])
         last = 1.5 * np.stack(twisted, axis=1)
         ball = dataclasses.replace(ball, deformation=Deformation([0.0, 1.0], [points, last]))
-    else:  # as large as the other one is on average
+    else:  # the other ball's mean size
         ball = dataclasses.replace(ball, to_world=tf.scale(1.25))
-    made = scene([ball], side=3.0)
+    plan = scene([ball], side=3.0)
     return dataclasses.replace(
-        made, camera=dataclasses.replace(made.camera, shutter=Shutter(0.0, 1.0))
+        plan, camera=dataclasses.replace(plan.camera, shutter=Shutter(0.0, 1.0))
     )
 
 
 def rates(scenes: list[Scene]) -> list[float]:
     """Rays for each second of processor time, the median of rounds in turn."""
-    renderers = [clpt.Renderer(one) for one in scenes]
-    found: list[list[float]] = [[] for _ in scenes]
+    renderers = [clpt.Renderer(plan) for plan in scenes]
+    speeds: list[list[float]] = [[] for _ in scenes]
     for round_ in range(ROUNDS + 1):
-        for renderer, own in zip(renderers, found, strict=True):
+        for renderer, values in zip(renderers, speeds, strict=True):
             before, began = renderer._wavefront.counts.rays, time.process_time()
             renderer.run(SPP)
             rate = (renderer._wavefront.counts.rays - before) / (time.process_time() - began)
             if round_:
-                own.append(rate)
-    return [statistics.median(own) for own in found]
+                values.append(rate)
+    return [statistics.median(values) for values in speeds]
 
 
 @click.command(help=__doc__)
@@ -99,10 +98,10 @@ def main(path: str | None) -> None:
     balls = {"one ball": one_ball(False), "deforming": one_ball(True)}
     rows: list[dict[str, object]] = []
     for some in (scenes, balls):
-        found = rates(list(some.values()))
+        speeds = rates(list(some.values()))
         rows += [
-            {"scene": name, "Mrays/s": round(rate / 1e6, 2), "of still": round(rate / found[0], 3)}
-            for name, rate in zip(some, found, strict=True)
+            {"scene": name, "Mrays/s": round(rate / 1e6, 2), "of still": round(rate / speeds[0], 3)}
+            for name, rate in zip(some, speeds, strict=True)
         ]
     machine.append(path, "motion", [{**machine.circumstances(), **row} for row in rows])
     table = Table("scene", "Mrays/s", "of still")

@@ -1,10 +1,9 @@
 """Adaptive sampling beside as many samples everywhere: what error a second of rendering leaves.
 
-The three scenes of `bench.peer_scenes` in RGB, the two taking turns in one process: squares of
-16x16 pixels get samples until their noise is below a limit, then every pixel the mean number of
-those. From the variance of pictures of several seeds: the relative mean squared error of the
-picture, and that of its noisiest squares (the 99th percentile). Efficiency is 1 over error and
-time, as a ratio.
+The three scenes of `bench.peer_scenes` in RGB, both in turns in a process: squares of 16x16 pixels
+get samples until their noise is below a limit, then every pixel gets their mean number. The
+variance over several seeds gives the relative mean squared error of the picture, and of its
+noisiest squares (the 99th percentile). Efficiency is 1 over error and time, as a ratio.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ WORST = 99  # percentile of the squares
 
 
 def scene(name: str, size: int, folder: Path) -> Scene:
-    """One of the scenes, in RGB."""
+    """Return a scene in RGB."""
     loaded = load(SCENES[name](folder), res=size)
     return dataclasses.replace(loaded, film=dataclasses.replace(loaded.film, mode="rgb"))
 
@@ -51,22 +50,22 @@ def errors(pictures: list[np.ndarray]) -> tuple[float, float]:
 def compare(name: str, size: int, most: int, limit: float, seeds: int) -> dict[str, object]:
     """A record: both ways' time, and errors at as many samples in the mean."""
     with tempfile.TemporaryDirectory() as folder:
-        given = scene(name, size, Path(folder))
-        renderer = clpt.Renderer(given)
+        plan = scene(name, size, Path(folder))
+        renderer = clpt.Renderer(plan)
     pictures: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
     seconds: tuple[list[float], list[float]] = ([], [])
     drawn: list[float] = []
     for seed in range(seeds + 1):
         spp = 16
         for way in (0, 1):
-            renderer.update(scene=dataclasses.replace(given, seed=seed))
+            renderer.update(scene=dataclasses.replace(plan, seed=seed))
             start = time.process_time()
             renderer.run(most if way == 0 else spp, noise=limit if way == 0 else None)
             image = renderer.image()
             spent = time.process_time() - start
             if way == 0:
                 spp = max(1, round(renderer._wavefront.counts.samples / size**2))
-            if seed > 0:  # the first one warms up
+            if seed > 0:  # the first warms up
                 pictures[way].append(image)
                 seconds[way].append(spent)
                 drawn.append(spp)

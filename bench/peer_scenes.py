@@ -62,7 +62,7 @@ def light(radiance: float) -> str:
 
 
 def joined(meshes: list[Mesh]) -> Mesh:
-    """One mesh of many."""
+    """Return many meshes as a single mesh."""
     first = np.cumsum([0] + [len(v) for v, _ in meshes[:-1]])
     faces = [f + n for (_, f), n in zip(meshes, first, strict=True)]
     return np.concatenate([v for v, _ in meshes]), np.concatenate(faces)
@@ -89,7 +89,7 @@ def box(low: Point, high: Point, angle: float = 0.0, at: Point = (0, 0, 0)) -> M
 
 
 def grid(points: np.ndarray, around_u: bool = False, around_v: bool = False) -> Mesh:
-    """Two triangles for each cell of points (nu, nv, 3); a side may join the one across from it."""
+    """Two triangles for each cell of points (nu, nv, 3); a side may join the opposite side."""
     nu, nv = points.shape[:2]
     index = np.arange(nu * nv).reshape(nu, nv)
     index = np.pad(index, ((0, int(around_u)), (0, int(around_v))), mode="wrap")
@@ -147,23 +147,23 @@ def arch(x: float, y: float, z: float) -> Mesh:
 
 def court() -> Mesh:
     """The atrium's stone: on each side a wall, two galleries, two storeys of columns and arches."""
-    made = []
+    parts = []
     for side in (-1, 1):
         wall, row = 4 * side, 2.2 * side
         near, far = sorted((1.9 * side, wall))
-        made.append(box((-12, 0, min(wall, 4.2 * side)), (12, 8.3, max(wall, 4.2 * side))))
-        made += [box((-12, y, near), (12, y + 0.3, far)) for y in (4, 8)]
-        made.append(box((12 * side - 0.1, 0, -4), (12 * side + 0.1, 8.3, 4)))
+        parts.append(box((-12, 0, min(wall, 4.2 * side)), (12, 8.3, max(wall, 4.2 * side))))
+        parts += [box((-12, y, near), (12, y + 0.3, far)) for y in (4, 8)]
+        parts.append(box((12 * side - 0.1, 0, -4), (12 * side + 0.1, 8.3, 4)))
         for floor, height, top in ((0.0, 3.0, 4.0), (4.3, 2.9, 8.0)):
             places = -10.5 + 3.5 * np.arange(7)
             for x in places:
-                made += column(x, floor, row, height, top)
-            made += [arch(x + 1.75, floor + height - 0.6, row) for x in places[:-1]]
-    return joined(made)
+                parts += column(x, floor, row, height, top)
+            parts += [arch(x + 1.75, floor + height - 0.6, row) for x in places[:-1]]
+    return joined(parts)
 
 
 def write_cornell(folder: Path) -> Path:
-    """42 triangles, one light in the ceiling."""
+    """42 triangles, and a light in the ceiling."""
     h = 0.25
     around = ((-1, 1, -1, -h), (-1, 1, h, 1), (-1, -h, -h, h), (h, 1, -h, h))
     ceiling = [quad((a, 1, c), (b, 1, c), (b, 1, d), (a, 1, d)) for a, b, c, d in around]
@@ -233,7 +233,7 @@ SCENES: dict[str, Callable[[Path], Path]] = {
 def write_scene(
     folder: Path, scene: str, parts: dict[str, tuple[Mesh, str]], view: dict, more: str = ""
 ) -> Path:
-    """Write meshes, each with what stands inside its shape, and a scene of them and of more."""
+    """Write meshes with their shapes' content, and a scene of them with further elements."""
     text = HEAD.format(**view) + more
     for part, ((vertices, faces), inside) in parts.items():
         name = f"{scene}_{part}"

@@ -5,7 +5,7 @@
 
 renders each scene of `scenes` and `tests/scenes` small, with few samples, in both modes; Cornell's
 box also with every integrator, sampler, layout and way of queueing. Equal hashes are equal floats.
-The hashes differ between processors, drivers and compilers: compare on one machine only.
+The hashes differ between processors, drivers and compilers: compare on the same machine only.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ OPTIONS: tuple[dict[str, Any], ...] = (
 
 def files() -> list[Path]:
     """Every scene file of the repository."""
-    found = [*ROOT.glob("scenes/*/scene*.json")]
-    found += [path for path in ROOT.glob("tests/scenes/**/*") if path.suffix in (".xml", ".pbrt")]
-    return sorted(found)
+    paths = [*ROOT.glob("scenes/*/scene*.json")]
+    paths += [path for path in ROOT.glob("tests/scenes/**/*") if path.suffix in (".xml", ".pbrt")]
+    return sorted(paths)
 
 
 def small(scene: Scene, mode: str, **changes: Any) -> Scene:
@@ -85,14 +85,16 @@ def picture(scene: Scene, options: dict[str, Any]) -> str:
 @click.option("--compare", type=click.Path(exists=True, path_type=Path), help="Former hashes.")
 @click.option("--only", default="", help="Part of the names of the pictures to make.")
 def main(compare: Path | None, only: str) -> None:
-    """Print the hashes as JSON, or what differs from former ones."""
-    made = {n: picture(scene, options) for n, scene, options in cases(only) if only in n}
+    """Print the hashes as JSON, or their differences from former hashes."""
+    hashes = {n: picture(scene, options) for n, scene, options in cases(only) if only in n}
     if compare is None:
-        click.echo(json.dumps(made, indent=1))
+        click.echo(json.dumps(hashes, indent=1))
         return
     former = json.loads(compare.read_text("utf-8"))
-    differ = [name for name, value in made.items() if former.get(name) != value]
-    click.echo("\n".join([*differ, f"{len(made) - len(differ)} of {len(made)} pictures are equal"]))
+    differ = [name for name, value in hashes.items() if former.get(name) != value]
+    click.echo(
+        "\n".join([*differ, f"{len(hashes) - len(differ)} of {len(hashes)} pictures are equal"])
+    )
     raise SystemExit(bool(differ))
 
 

@@ -44,7 +44,7 @@ class Import:
 
 @dataclass(frozen=True)
 class PythonFile:
-    """What the rules ask of a file; loaded: patterns of what `import_module` imports."""
+    """A file's properties for the rules; loaded: patterns of names for `import_module`."""
 
     text: str
     functions: tuple[Function, ...]
@@ -115,9 +115,9 @@ def _statements(tree: ast.Module) -> Iterator[ast.stmt]:
 
 
 def _function(node: ast.FunctionDef | ast.AsyncFunctionDef) -> Function:
-    given = [*node.args.posonlyargs, *node.args.args]
-    bound = bool(given) and given[0].arg in ("self", "cls")
-    count = len(given) + len(node.args.kwonlyargs) - bound
+    arguments = [*node.args.posonlyargs, *node.args.args]
+    bound = bool(arguments) and arguments[0].arg in ("self", "cls")
+    count = len(arguments) + len(node.args.kwonlyargs) - bound
     lines = (node.end_lineno or node.lineno) - node.lineno + 1
     return Function(node.name, node.lineno, lines, count)
 
@@ -130,7 +130,7 @@ def _docstring(
 
 
 def _calls(tree: ast.Module) -> Iterator[tuple[str, ast.Call]]:
-    """All calls of a module, with the last part of the name of what is called."""
+    """Yield all calls of a module, with the last part of the function's name."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Call):
             if isinstance(node.func, ast.Name):
@@ -140,7 +140,7 @@ def _calls(tree: ast.Module) -> Iterator[tuple[str, ast.Call]]:
 
 
 def _pattern(name: ast.expr, package: str) -> str:
-    r"""The pattern of the names that an expression may give: \w+ for what is not known."""
+    r"""Return a pattern of names that an expression may give, with \w+ for unknown parts."""
     if isinstance(name, ast.Constant):
         return re.escape(str(name.value))
     if isinstance(name, ast.JoinedStr):

@@ -1,13 +1,13 @@
-"""What ray queries of an application cost: beside the bare kernel, beside embreex, and in Python.
+"""Costs of an application's ray queries: beside the bare kernel, beside embreex, and in Python.
 
     python -m bench.queries [--json FILE]
 
 The rays of bench.traversal in the atrium, four times 512 x 512 of each kind, so 1 M a batch.
-`overhead` is the time of a query over that of a kernel that does nothing but trace, whose rays and
-hits are packed for it: `device` with arrays on the device, `host` with numpy's. embreex is asked
-through its own binding, as trimesh does, with the same ends of rays. All of it is processor time,
-which a busy machine disturbs least: medians over rounds in which all take turns, and Mrays/s a
-core. `python_us`: microseconds by the clock of a call with few rays, without the wait.
+`overhead` is the time of a query over the time of a kernel that only traces, with packed rays and
+hits: `device` with arrays on the device, `host` with numpy's. embreex is asked through its own
+binding, as trimesh does, with the same ends of rays. All of it is processor time, which a busy
+machine disturbs least: medians over rounds in turns, and Mrays/s a core. `python_us`: microseconds
+by the clock of a call with few rays, without the wait.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def turns(runs: dict[str, Callable[[], object]], rounds: int) -> dict[str, np.nd
 
 
 def compare(accel, embree, name: str, rays: np.ndarray, rounds: int) -> list[dict]:
-    """Rows of closest and any hit of one kind of rays."""
+    """Return rows of closest and any hits of a kind of rays."""
     from pyopencl.array import to_device
 
     o, d = (np.ascontiguousarray(rays[:, part]) for part in (slice(0, 3), slice(4, 7)))

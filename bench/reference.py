@@ -16,13 +16,13 @@ import platformdirs
 
 from bench.workers import Worker
 
-BATCH = 64  # samples per pixel that Mitsuba renders in one piece
+BATCH = 64  # samples per pixel of a render by Mitsuba
 FIRST = 1000  # batches are numbered from here on, so that no measured picture shares its samples
 
 
 @dataclass(frozen=True)
 class Reference:
-    """mean, variance: (h, w, 3) float64, of the pixels and of what is left of their noise."""
+    """mean, variance: (h, w, 3) float64, of pixels, and of the mean's noise."""
 
     mean: np.ndarray
     variance: np.ndarray
@@ -61,9 +61,9 @@ def reference(scene: Path, mode: str, spp: int, cores: Sequence[int]) -> Referen
     folder = Path(platformdirs.user_cache_dir("clpt", appauthor=False)) / "bench"
     path = folder / f"{scene.stem}-{mode}-{spp}-{digest}.npz"
     if not path.is_file():
-        found = _render(scene, mode, max(spp // BATCH, 2), cores)
+        images = _render(scene, mode, max(spp // BATCH, 2), cores)
         folder.mkdir(parents=True, exist_ok=True)
-        np.savez_compressed(path, mean=found.mean, variance=found.variance)
+        np.savez_compressed(path, mean=images.mean, variance=images.variance)
     with np.load(path) as kept:
         return Reference(kept["mean"], kept["variance"])
 

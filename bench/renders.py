@@ -33,7 +33,7 @@ CONTENDERS = (
     ("clpt", "independent"),
     ("mitsuba", "independent"),
 )
-RIVAL = {"sobol": "multijitter", "independent": "independent"}  # each one's best, and the same
+RIVAL = {"sobol": "multijitter", "independent": "independent"}  # each renderer's best, and the same
 TRIM = 0.01
 
 
@@ -86,7 +86,7 @@ def compare(
     for number in range(rounds + 1):
         for worker, taken in zip(workers, shots, strict=True):
             shot = worker.render(spp, number)
-            if number > 0:  # the first one compiles
+            if number > 0:  # the first compiles
                 taken.append(shot)
     rows = [figures(w, taken, spp, against) for w, taken in zip(workers, shots, strict=True)]
     for row, ours in zip(rows, shots, strict=True):

@@ -27,7 +27,7 @@ Row = dict[str, object]
 
 
 def newest(records: Iterable[Row]) -> list[Row]:
-    """The last record of each figure, in the order in which they first came."""
+    """Return the last record of each figure, in the order of first records."""
     kept = {
         json.dumps([r["bench"], r.get("device"), *(r.get(name) for name in WHICH)]): r
         for r in records
@@ -161,7 +161,7 @@ def efficiency(rows: Sequence[Row]) -> str:
 
 
 def sampler_of(row: Row) -> str:
-    """Whether Mitsuba had the file's sampler or its best one; in rows that do not say so, too."""
+    """Return whether Mitsuba had the file's sampler or its best sampler, for all rows."""
     return str(row.get("sampler", "file" if row["as_file"] else "best"))
 
 
@@ -240,7 +240,9 @@ def geometric_means(rows: Sequence[Row]) -> str:
 
 
 def sizes(rows: Sequence[Row]) -> str:
-    """Hilly ground of ever more triangles, one picture; a ray's time is plotted in `sizes.png`."""
+    """Hilly ground with growing numbers of triangles, the same picture; a ray's time is plotted in
+    `sizes.png`.
+    """
 
     def cells(row: Row) -> list[str]:
         count = int(str(row["triangles"]))

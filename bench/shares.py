@@ -49,16 +49,16 @@ class Bare:
             name: program.kernel(name).bind(**shared, hits=give.allocate("hits", size * room))
             for name, size in (("closest", HIT.itemsize), ("occluded", 4))
         }
-        for name in self.kernels:  # PoCL compiles at the first launch, and not at one of no items
+        for name in self.kernels:  # PoCL compiles at the first launch that has items
             self.trace(name, np.zeros((room, 8), np.float32))
 
-    def trace(self, name: str, found: NDArray[np.float32]) -> float:
+    def trace(self, name: str, traced: NDArray[np.float32]) -> float:
         """Trace rays (n, 8); return the seconds of processor time that it took."""
-        self.rays[: len(found)] = found
-        self.rays[len(found) :, 7] = -1.0  # those that fill the last group meet nothing
+        self.rays[: len(traced)] = traced
+        self.rays[len(traced) :, 7] = -1.0  # those that fill the last group meet nothing
         cl.enqueue_copy(self.queue, self.buffer, self.rays)
         start = time.process_time()
-        self.kernels[name].enqueue(self.queue, (-(-len(found) // 64) * 64,), (64,))
+        self.kernels[name].enqueue(self.queue, (-(-len(traced) // 64) * 64,), (64,))
         self.queue.finish()
         return time.process_time() - start
 
@@ -90,11 +90,11 @@ def measure(path: Path, mode: str, bounces: int = BOUNCES) -> dict[str, Any]:
     def note(step: Any, enqueue: Callable[[], Any]) -> None:
         kernel = step.bound.kernel.name
         if kernel in counts:
-            found = rays(flight, kernel)
-            counts[kernel] += len(found)
-            if bare and len(found):
+            traced = rays(flight, kernel)
+            counts[kernel] += len(traced)
+            if bare and len(traced):
                 name = {"intersect": "closest", "shadow": "occluded"}[kernel]
-                seconds[f"bare {name}"] += bare.trace(name, found)
+                seconds[f"bare {name}"] += bare.trace(name, traced)
         on.queue.finish()
         start = time.process_time()
         enqueue()
@@ -137,9 +137,9 @@ def main(scenes: tuple[str, ...], modes: tuple[str, ...], json_file: str | None)
     for row in rows:
         for stage, milliseconds in row["ms"].items():
             table.add_row(row["scene"], row["mode"], stage, f"{milliseconds:.1f}")
-        for what in ("traced", "beyond"):
-            if what in row:
-                table.add_row(row["scene"], row["mode"], what, f"{row[what]:.0%}")
+        for part in ("traced", "beyond"):
+            if part in row:
+                table.add_row(row["scene"], row["mode"], part, f"{row[part]:.0%}")
     machine.console().print(table)
 
 

@@ -1,6 +1,6 @@
-"""What a scene's size costs: hilly ground of 10 thousand to 10 million triangles, one picture.
+"""Costs of a scene's size: hilly ground of 10 thousand to 10 million triangles.
 
-Every size in a process of its own: processor time and peak memory to load the file, then to lower
+Every size has a separate process: processor time and peak memory to load the file, then to lower
 it and build its tree; bytes that stay on the device; processor time of a sample and of a ray. A
 ray's time is fitted by a + b log2(triangles); the plot is written where `--plot` says.
 """
@@ -55,7 +55,7 @@ class Watch:
         self.peaks: dict[str, int] = {}
         self.seconds: dict[str, float] = {}
 
-    def __call__(self, name: str, what: Callable[[], Made]) -> Made:
+    def __call__(self, name: str, action: Callable[[], Made]) -> Made:
         """Do it; keep its processor time and the peak."""
         over, top = threading.Event(), [_resident()]
 
@@ -66,12 +66,12 @@ class Watch:
         looking = threading.Thread(target=look)
         looking.start()
         start = time.process_time()
-        made = what()
+        result = action()
         self.seconds[name] = time.process_time() - start
         over.set()
         looking.join()
         self.peaks[name] = max(top[0], _resident())
-        return made
+        return result
 
 
 def _resident() -> int:

@@ -1,6 +1,6 @@
 """Does a renderer that is changed for hours keep its memory, its speed and its picture?
 
-`python -m bench.soak MINUTES` changes one renderer without a pause: shapes move and are deformed,
+`python -m bench.soak MINUTES` changes a renderer without a pause: shapes move and are deformed,
 colours and cameras change, the scene is lowered again, runs are cancelled and resumed, with and
 without a limit of noise. Every round ends with the first scene again, whose picture must have the
 bits of the first. Sixty records tell what the process takes: resident memory and device memory
@@ -85,10 +85,10 @@ def run_until_noise_is_low(renderer: clpt.Renderer, i: int) -> None:
 
 def lower_again(renderer: clpt.Renderer, i: int) -> None:
     """Take away a shape, and change a light."""
-    given = scene()
-    given.shapes = given.shapes[: 2 + i % 2]
-    given.lights = [Constant(radiance=0.1 * (1 + i % 9))]
-    renderer.update(scene=given)
+    plan = scene()
+    plan.shapes = plan.shapes[: 2 + i % 2]
+    plan.lights = [Constant(radiance=0.1 * (1 + i % 9))]
+    renderer.update(scene=plan)
 
 
 CHANGES: dict[str, Callable[[clpt.Renderer, int], Any]] = {
@@ -117,10 +117,10 @@ def resident() -> float:
 class Soak:
     """A renderer, how often it was changed, and how often its picture was another than at first."""
 
-    def __init__(self, own: device.Device):
-        self.device = own
+    def __init__(self, chosen: device.Device):
+        self.device = chosen
         self.first = scene()
-        self.renderer = clpt.Renderer(self.first, own)
+        self.renderer = clpt.Renderer(self.first, chosen)
         self.picture = self._picture()
         self.rounds = self.unequal = 0
         for _ in range(2):  # which build all programs; what they leave is the start

@@ -37,15 +37,15 @@ def compare(
     for number in range(rounds + 1):
         for mode, worker in workers.items():
             shot = worker.render(spp, number)
-            if number > 0:  # the first one compiles
+            if number > 0:  # the first compiles
                 shots[mode].append(shot)
-    found = {mode: figures(workers[mode], shots[mode], spp, against[mode]) for mode in MODES}
+    results = {mode: figures(workers[mode], shots[mode], spp, against[mode]) for mode in MODES}
     for worker in workers.values():
         worker.close()
     row: dict[str, object] = {"scene": scene.stem, "spp": spp, "threads": len(cores)}
-    row |= {f"{name}_{mode}": found[mode][name] for mode in MODES for name in KEPT}
+    row |= {f"{name}_{mode}": results[mode][name] for mode in MODES for name in KEPT}
     for name in ("relmse", "relmse_trimmed"):
-        row[f"{name}_ratio"] = found["spectral"][name] / found["rgb"][name]
+        row[f"{name}_ratio"] = results["spectral"][name] / results["rgb"][name]
     pairs = list(zip(shots["spectral"], shots["rgb"], strict=True))
     row["time_ratio"] = statistics.median(a.seconds / b.seconds for a, b in pairs)
     row["cpu_ratio"] = statistics.median(a.cpu / b.cpu for a, b in pairs)

@@ -1,16 +1,16 @@
-"""Whole processes: what a first picture takes with empty caches, with those of other scenes, again.
+"""Starts of processes: a first picture with empty caches, with other scenes' caches, and again.
 
     python -m bench.starting [SCENE ...] [--json FILE]
 
 Each start is `clpt render SCENE --size 64x64 --spp 1`. Cold: all caches are empty folders. Another:
 the caches hold the scenes before it in the list, so the first scene has none. Warm: they hold the
-scene. Beside it stands Mitsuba, cold and warm, where the scene is an XML file: `llvm_ad_rgb`, or
-`scalar_rgb`, which compiles nothing, where this LLVM does not know this processor.
+scene. Mitsuba is measured too, cold and warm, if the scene is an XML file: `llvm_ad_rgb`, or
+`scalar_rgb`, which compiles nothing, if this LLVM does not support this processor.
 
-Seconds are of the processor, of the whole tree of processes with those that go on after the
-command's end; in brackets by the clock, until the command's end. Instructions are of user mode,
-where perf counts them. Memory is the largest resident set of one process, when it compiles and when
-it does not. Python's bytecode is there before the first start.
+Seconds are processor time of the whole tree of processes, even after the command's end; in brackets
+by the clock, until the command's end. Instructions are of user mode, where perf counts them. Memory
+is the largest resident set of a process, with and without compiling. Python's bytecode exists
+before the first start.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ image = mitsuba.render(mitsuba.load_file(scene, res=size, spp="1"), spp=1)
 mitsuba.Bitmap(image).write(out)
 """
 VARIANTS = ("llvm_ad_rgb", "scalar_rgb")
-# A small process that starts another one: processes count memory of whoever started them. It gets
-# the children of that one too (PR_SET_CHILD_SUBREAPER), and waits for all.
+# A small process that starts another: a process counts its starter's memory. It gets
+# the other's children too (PR_SET_CHILD_SUBREAPER), and waits for all.
 WATCH = """
 import ctypes, json, os, resource, sys, time
 try:
@@ -124,7 +124,7 @@ def _counted(file: Path) -> int | None:
 def measure(
     command: Sequence[str], folder: Path, rounds: int, checkout: Path = machine.ROOT
 ) -> dict[str, Any]:
-    """The figures of a cold start, and the least of some warm ones."""
+    """Return the figures of a cold start, and the least of some warm starts."""
     caches = folder / "caches"
     shutil.rmtree(caches, ignore_errors=True)
     cold = run(command, caches, checkout)
@@ -133,12 +133,12 @@ def measure(
     return {**_figures("cold", cold), **_figures("warm", least)}
 
 
-def _figures(what: str, start: Start) -> dict[str, Any]:
+def _figures(kind: str, start: Start) -> dict[str, Any]:
     return {
-        what: start.processor,
-        f"{what}_clock": start.clock,
-        f"{what}_memory": start.memory,
-        f"{what}_instructions": start.instructions,
+        kind: start.processor,
+        f"{kind}_clock": start.clock,
+        f"{kind}_memory": start.memory,
+        f"{kind}_instructions": start.instructions,
     }
 
 
@@ -175,18 +175,18 @@ def rows_of(
         command = ours(scene, size, out)
         row = which | {"renderer": "clpt"} | measure(command, folder, rounds, checkout)
         yield row | _figures("another", run(command, folder / "others", checkout))
-        found = theirs(scene, size, out, folder) if scene.suffix == ".xml" else None
-        if found is not None:
-            beside = which | {"renderer": f"mitsuba {found[0]}"}
-            yield beside | measure(found[1], folder, rounds)
+        peer = theirs(scene, size, out, folder) if scene.suffix == ".xml" else None
+        if peer is not None:
+            beside = which | {"renderer": f"mitsuba {peer[0]}"}
+            yield beside | measure(peer[1], folder, rounds)
 
 
-def _scenes(given: Sequence[Path], folder: Path) -> dict[str, Path]:
+def _scenes(paths: Sequence[Path], folder: Path) -> dict[str, Path]:
     """The scenes by their names: those that are given, else SCENES and OWN."""
-    if given:
-        return {machine.scene_name(path): path.resolve() for path in given}
-    made = [write_cornell(folder), write_glass(folder), write_atrium(folder)]
-    of_peers = dict(zip(SCENES, made, strict=True))
+    if paths:
+        return {machine.scene_name(path): path.resolve() for path in paths}
+    written = [write_cornell(folder), write_glass(folder), write_atrium(folder)]
+    of_peers = dict(zip(SCENES, written, strict=True))
     return of_peers | {name: machine.ROOT / "scenes" / name for name in OWN}
 
 

@@ -43,7 +43,7 @@ def cases(only: str) -> Iterator[tuple[str, Scene]]:
 
 def texts(lowered: Lowered) -> str:
     """The hash of all programs that a scene can ask for."""
-    found = hashlib.sha256()
+    hashed = hashlib.sha256()
     for layout in LAYOUTS:
         made = {}
         for number, own in enumerate(lowered.features.passes):
@@ -57,26 +57,26 @@ def texts(lowered: Lowered) -> str:
         for make in (programs.film_sources, programs.noise_sources):
             made |= make(lowered.features, layout)
         for name, source in sorted(made.items()):
-            found.update(f"{layout} {name}\n{source.text}\n".encode())
-    return found.hexdigest()
+            hashed.update(f"{layout} {name}\n{source.text}\n".encode())
+    return hashed.hexdigest()
 
 
 def tables(lowered: Lowered) -> str:
-    """The hash of all arrays of a scene, and of what it is told."""
-    found = hashlib.sha256()
+    """Return the hash of all arrays of a scene, and of its warnings."""
+    hashed = hashlib.sha256()
     named = dict(lowered.tables)
     for name in ("vertices", "faces", "tags", "boxes", "settings"):
         named[name] = getattr(lowered, name)
     named |= {"rows": lowered.instances.rows, "instance boxes": lowered.instances.boxes}
     for name, array in sorted(named.items()):
-        found.update(f"{name} {array.dtype} {array.shape}\n".encode())
-        found.update(array.tobytes())
-    found.update(repr((lowered.warnings, lowered.reason, lowered.glass_rows)).encode())
-    return found.hexdigest()
+        hashed.update(f"{name} {array.dtype} {array.shape}\n".encode())
+        hashed.update(array.tobytes())
+    hashed.update(repr((lowered.warnings, lowered.reason, lowered.glass_rows)).encode())
+    return hashed.hexdigest()
 
 
 def hashes(scene: Scene) -> tuple[str, str]:
-    """The hashes of a scene's texts and tables; of one that is refused, the error."""
+    """Return the hashes of a scene's texts and tables, or a refused scene's error."""
     try:
         lowered = lower(scene)
     except clpt.ClptError as error:
@@ -88,7 +88,7 @@ def hashes(scene: Scene) -> tuple[str, str]:
 @click.option("--compare", type=click.Path(exists=True, path_type=Path), help="Former hashes.")
 @click.option("--only", default="", help="Part of the names of the scenes to lower.")
 def main(compare: Path | None, only: str) -> None:
-    """Print the hashes as JSON, or what differs from former ones."""
+    """Print the hashes as JSON, or their differences from former hashes."""
     made: dict[str, str] = {}
     for name, scene in cases(only):
         if only in name:

@@ -1,11 +1,11 @@
-"""How fast rays find triangles, against Embree's one-ray functions in the same minutes.
+"""How fast rays find triangles, against Embree's single-ray functions in the same minutes.
 
     python -m bench.traversal [--json FILE]
 
-One thread each, in seconds of processor time. The rays: `primary`, a camera's in tiles of 4 x 4;
-`diffuse`, cosine-distributed bounces from what those hit; `shadow`, from there to points of the
-open roof. A result whose hits differ from Embree's is refused. `Accel` is clpt's own queries, which
-have several rays in flight where a tree outgrows the caches; `--finer 2`: 16 triangles of each.
+A thread each, in seconds of processor time. The rays: `primary`, of a camera in tiles of 4 x 4;
+`diffuse`, cosine-distributed bounces from their hits; `shadow`, from the hits to points of the open
+roof. A result whose hits differ from Embree's is refused. `Accel` is clpt's query class, with
+several rays in flight if a tree outgrows the caches; `--finer 2`: 16 triangles of each.
 """
 
 from __future__ import annotations
@@ -140,21 +140,21 @@ class Asked:
         for _ in range(repeats):
             start = time.process_time()
             if kernel == "closest":
-                found = self.accel.intersect(*parts)
+                answers = self.accel.intersect(*parts)
             else:
                 result = self.accel.occluded(*parts)
             seconds.append(time.process_time() - start)
         if kernel == "closest":
             result = np.zeros(len(rays), HIT)
-            result["t"], result["prim"] = found.t, found.primitive.view(np.uint32)
+            result["t"], result["prim"] = answers.t, answers.primitive.view(np.uint32)
         return result, min(seconds)
 
 
 def agreement(hits: np.ndarray, t: np.ndarray, prim: np.ndarray, rays: np.ndarray) -> float:
-    """The share of rays for which both have no hit, or hits at the same distance.
+    """Return the share of rays without a hit in both, or with hits at the same distance.
 
-    The same: within 1e-4 of it, or within 1e-5, a few roundings of the scene's coordinates; that is
-    more where a ray begins on a surface and leaves it at a grazing angle.
+    Distances agree within 1e-4 of them, or within 1e-5, a few roundings of the scene's coordinates;
+    the latter is more for rays that leave their surface at a grazing angle.
     """
     met, other = hits["prim"] != MISS, prim != MISS
     with np.errstate(invalid="ignore"):

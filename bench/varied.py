@@ -51,12 +51,12 @@ def sky(radiance: float) -> str:
 
 
 def some_material(number: int, rng: np.random.Generator) -> str:
-    """A material unlike all others, of one of seven kinds."""
+    """Return a unique material of seven kinds in turn."""
     colour, alpha = rgb("diffuse_reflectance", rng.uniform(0.1, 0.9, 3)), rng.uniform(0.05, 0.5)
     ior = real("int_ior", rng.uniform(1.3, 1.8))
     tint = rgb("specular_reflectance", rng.uniform(0.7, 1, 3))
     passed = rgb("specular_transmittance", rng.uniform(0.7, 1, 3))
-    made: tuple[Callable[[], str], ...] = (
+    kinds: tuple[Callable[[], str], ...] = (
         lambda: diffuse(tuple(rng.uniform(0.1, 0.9, 3).round(4).tolist())),
         lambda: two_sided("roughplastic", colour, ior, real("alpha", alpha)),
         lambda: two_sided("roughconductor", METAL, tint, real("alpha", alpha)),
@@ -65,7 +65,7 @@ def some_material(number: int, rng: np.random.Generator) -> str:
         lambda: f'<bsdf type="dielectric">{ior}{passed}</bsdf>',
         lambda: f'<bsdf type="roughdielectric">{ior}{passed}{real("alpha", alpha)}</bsdf>',
     )
-    return made[number % len(made)]()
+    return kinds[number % len(kinds)]()
 
 
 def write_materials(folder: Path, side: int = 20) -> Path:

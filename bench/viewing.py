@@ -1,13 +1,12 @@
 """How soon the page of `clpt view` has a picture, how soon it follows a drag, and what it costs.
 
-The command in a process of its own, with programs cached, and a client of its socket without a
+The command runs in a separate process, with cached programs; a client of its socket replaces the
 browser. `first`: from the start of the process to the first picture; `render`: to the first samples
-of `clpt render` of the same scene. `cold`: with empty caches, to the first picture, which is in
-plain colours where kernels are compiled, and to the first one of the scene's own kernels. `drag`:
-from a message to the first picture of it, while the whole picture is being rendered; `own`: the
-part of that in which the device does not render (the same drag, less the seconds that the header of
-the picture tells). `per_second`: pictures in a drag of 2 s. `cost`: processor time of a sample with
-a viewer, above that of a sample without. Medians.
+of `clpt render` of the same scene. `cold`: with empty caches, to the first picture, in plain
+colours while kernels compile, and to the first picture by the scene's kernels. `drag`: from a
+message to its first picture, while the whole picture is being rendered; `own`: the part without
+rendering (the same drag, less the seconds in the picture's header). `per_second`: pictures in a
+drag of 2 s. `cost`: processor time of a sample with a viewer, above a sample's without. Medians.
 """
 
 from __future__ import annotations
@@ -141,7 +140,7 @@ class Client:
 
 
 def first_pictures(client: Client) -> tuple[float, float]:
-    """Seconds from the start to the first picture, and to the first one without plain colours."""
+    """Return seconds from the start to the first picture, and to the first in full colours."""
     first: float | None = None
     while True:
         is_solid, after = client.frame()["solid"], time.monotonic() - client.start
@@ -163,7 +162,7 @@ def cold(scene: Path, size: str) -> dict[str, float]:
 
 
 def drags(client: Client, rounds: int) -> dict[str, float]:
-    """Seconds from drags to their pictures, with pauses in which the whole picture goes on."""
+    """Return seconds from drags to their pictures; the whole picture continues between drags."""
     while client.frame()["divider"] > 1:
         pass
     taken, own = [], []
@@ -241,7 +240,7 @@ def main(
         row: dict[str, Any] = {"scene": machine.scene_name(file), "size": size, **cold(file, size)}
         first: list[float] = []
         render: list[float] = []
-        for i in range(rounds + 1):  # the first one fills caches
+        for i in range(rounds + 1):  # the first fills caches
             with tempfile.TemporaryDirectory() as folder:
                 render.append(first_of_render(file, size, Path(folder) / "out.png"))
             client = Client(file, size)

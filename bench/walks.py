@@ -1,8 +1,8 @@
-"""The ways that a value takes through the package: which functions see it, one after the other.
+"""A value's ways through the package: the functions that see it, in order.
 
-A stay is a function that is given a scene, or takes it out of what was found in it (`index.scene`);
-a room is a file. A way leads from a function to those that it names, and to methods of its own
-class; methods of other objects are not followed.
+A stay is a function with a scene as a parameter, or that reads `index.scene`; a room is a file. A
+way leads from a function to functions that it names, and to methods of its class; methods of other
+objects are not followed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from bench.imports import modules
 
 START = "clpt.render.one_call.render"
 SCENE = re.compile(r"\bScene\b")
-FOUND = "index"  # the name of what was found in a scene
+FOUND = "index"  # the name of a scene's index
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,11 @@ class _Function:
     @property
     def stays(self) -> bool:
         """Whether it sees the scene."""
-        given = self.code.args
-        types = [one.annotation for one in (*given.posonlyargs, *given.args, *given.kwonlyargs)]
+        signature = self.code.args
+        types = [
+            one.annotation
+            for one in (*signature.posonlyargs, *signature.args, *signature.kwonlyargs)
+        ]
         if any(one is not None and SCENE.search(ast.unparse(one)) for one in types):
             return True
         return any(
@@ -91,7 +94,7 @@ def _functions(known: dict[str, Path]) -> tuple[dict[str, _Function], dict[str, 
 
 
 def _called(one: _Function) -> list[str]:
-    """The full names of what a function names, and so may call."""
+    """Return the full names of functions that a function names."""
     types = {
         id(part)
         for node in ast.walk(one.code)
@@ -101,7 +104,7 @@ def _called(one: _Function) -> list[str]:
     found = []
     for node in ast.walk(one.code):
         if isinstance(node, (ast.Name, ast.Attribute)) and id(node) not in types:
-            first, *rest = ast.unparse(node).split(".")
-            name = ".".join([one.names.get(first, first), *rest])
-            found += [name, f"{one.owner}.{'.'.join(rest)}"]
+            first, *attributes = ast.unparse(node).split(".")
+            name = ".".join([one.names.get(first, first), *attributes])
+            found += [name, f"{one.owner}.{'.'.join(attributes)}"]
     return found

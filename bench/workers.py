@@ -24,7 +24,7 @@ _open: Any = None  # what this process renders
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture: (h, w, 3) float32, and the seconds from the call to the picture on the host.
+    """A picture: (h, w, 3) float32, and the seconds from the call to the picture on the host.
 
     cpu: processor time of the process meanwhile, which other work on the machine hardly moves.
     """
@@ -102,7 +102,7 @@ class Clpt:
 
 
 class Mitsuba:
-    """Renders with one of Mitsuba's LLVM variants."""
+    """Renders with a variant of Mitsuba's for LLVM."""
 
     def __init__(self, scene: Path, mode: str, sampler: str):
         find_llvm()
@@ -126,7 +126,7 @@ def find_llvm() -> None:
     It takes the library of that name without a version by itself. LLVM 14 fails; so does LLVM 15 on
     a processor with AVX-512 ("Cannot select: fminimum"), and the process aborts.
     """
-    found = [
+    libraries = [
         path
         for folder in ("/usr/lib/*-linux-gnu", "/usr/lib/llvm-*/lib", "/usr/local/lib")
         for path in glob.glob(f"{folder}/libLLVM*.so*")
@@ -135,8 +135,8 @@ def find_llvm() -> None:
     def version(path: str) -> tuple[int, ...]:
         return tuple(int(n) for n in re.findall(r"\d+", Path(path).name))
 
-    if found and "DRJIT_LIBLLVM_PATH" not in os.environ:
-        newest = max(found, key=version)
+    if libraries and "DRJIT_LIBLLVM_PATH" not in os.environ:
+        newest = max(libraries, key=version)
         os.environ["DRJIT_LIBLLVM_PATH"] = newest
         if version(newest) < (16,):
             print(f"{newest}: Mitsuba may abort; install LLVM 16 or newer, such as libllvm19")

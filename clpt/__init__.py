@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if sys.argv[:1] == ["-m"] and "clpt" in sys.orig_argv:  # python -m clpt: Python has put the current
-    # folder first, from which nothing is imported unless clpt itself is there
+    # folder first; it stays only if clpt lies there
     _home = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     sys.path[:1] = [path for path in sys.path[:1] if path == _home]
 
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
         UnusedParameterError,
     )
     from clpt.files.budget import Budget
-    from clpt.formats import load, save
+    from clpt.formats import load, load_dict, save
+    from clpt.formats.mitsuba.transform4f import ScalarTransform4f
     from clpt.images import read as read_image
     from clpt.images import write as write_image
     from clpt.images.colour.view import View
@@ -65,6 +66,8 @@ _HOMES = {  # the module of each name, and what it is called there
     "UnknownKindError": ("errors", "UnknownKindError"),
     "UnusedParameterError": ("errors", "UnusedParameterError"),
     "load": ("formats", "load"),
+    "load_dict": ("formats", "load_dict"),
+    "ScalarTransform4f": ("formats.mitsuba.transform4f", "ScalarTransform4f"),
     "save": ("formats", "save"),
     "read_image": ("images", "read"),
     "write_image": ("images", "write"),
@@ -88,7 +91,7 @@ _HOMES = {  # the module of each name, and what it is called there
     "__version__": ("version", "VERSION"),
 }
 _SHOWN = ("MultiRenderer", "Renderer")  # renderers, whose pictures a notebook shows
-_MAKE_SCENES = ("Scene", "load")
+_MAKE_SCENES = ("Scene", "load", "load_dict")
 
 
 class _Front(ModuleType):
@@ -167,6 +170,7 @@ __all__ = [
     "Progress",
     "RenderOptions",
     "Renderer",
+    "ScalarTransform4f",
     "Scene",
     "SceneError",
     "SpectralImage",
@@ -176,6 +180,7 @@ __all__ = [
     "__version__",
     "kernel_source",
     "load",
+    "load_dict",
     "read_image",
     "read_spectral",
     "render",

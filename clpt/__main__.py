@@ -1,4 +1,4 @@
-"""The entry point: whatever happens, the user gets one clear line and an exit status."""
+"""The entry point: whatever happens, the user gets a single clear line and an exit status."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def main() -> None:
         stopping.raise_at_signals()
         stopping.end_at_second()
         status = run(sys.argv[1:])
-    except KeyboardInterrupt as error:  # before `run` heeds it, or a second one after it did
+    except KeyboardInterrupt as error:  # before `run` handles it, or a second Ctrl-C
         status = stopping.ended_by(error)
     sys.exit(status)
 

@@ -27,7 +27,7 @@ Balls = NDArray[np.float32]  # (n, 4): centre and radius
 
 
 def on_host(values: object) -> Any:
-    """Return values in host memory; of an array on a device a copy, for which it waits.
+    """Return values in host memory; wait for the copy of an array on a device.
 
     Raises SceneError for a masked array, and for an array on a device whose rows it cannot follow.
     """
@@ -67,16 +67,16 @@ def check_unmasked(values: object, where: str | None = None) -> None:
 def in_memory(value: object) -> Any:
     """Return an argument of a scene's part with copies of the arrays that are maps of files.
 
-    A file that changes would change the scene, and one that is cut would end the process. Looks
+    A file that changes would change the scene; a file that is cut would end the process. Looks
     into mappings and sequences; whatever else holds arrays asks by itself.
     """
     if isinstance(value, np.ndarray):
         return np.array(value, order="K", subok=False) if _is_map(value) else value
     if isinstance(value, dict):
-        kept = {name: in_memory(one) for name, one in value.items()}
-        return kept if any(kept[name] is not one for name, one in value.items()) else value
-    if isinstance(value, (list, tuple)) and any(isinstance(one, np.ndarray) for one in value):
-        parts = [in_memory(one) for one in value]
+        copies = {name: in_memory(part) for name, part in value.items()}
+        return copies if any(copies[name] is not part for name, part in value.items()) else value
+    if isinstance(value, (list, tuple)) and any(isinstance(part, np.ndarray) for part in value):
+        parts = [in_memory(part) for part in value]
         return tuple(parts) if isinstance(value, tuple) else parts
     return value
 

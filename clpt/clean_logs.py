@@ -11,7 +11,7 @@ from clpt.errors import LONGEST_WARNING, lines, one_line
 class Cleaning(logging.NullHandler):
     """Cleans each message before the handlers of the program get it; prints nothing.
 
-    It is a handler of the logger "clpt": Python calls those of a logger before those above it.
+    It is a handler of the logger "clpt". Python calls the handlers of parent loggers later.
     """
 
     def handle(self, record: logging.LogRecord) -> bool:
@@ -20,9 +20,9 @@ class Cleaning(logging.NullHandler):
 
 
 def clean(record: logging.LogRecord) -> None:
-    """Put one line of at most LONGEST_WARNING characters in place of a message.
+    """Reduce a message to a line of at most LONGEST_WARNING characters.
 
-    Messages for those who look for faults keep their lines, such as those of a compiler.
+    Messages for debugging keep their lines, such as the log of a compiler.
     """
     try:
         text = record.getMessage()
@@ -36,8 +36,8 @@ def clean(record: logging.LogRecord) -> None:
 
 
 def traceback_of(error: BaseException) -> str:
-    """Return the traceback of an error; what the error says is one line."""
+    """Return the traceback of an error, with the error's message on a single line."""
     parts = traceback.format_exception(error)
-    own = (" ", "\n", "Traceback")  # begin what Python says; else it is the error's text
-    rows = [lines(part) if part.startswith(own) else one_line(part) + "\n" for part in parts]
+    of_python = (" ", "\n", "Traceback")  # other parts are the error's message
+    rows = [lines(part) if part.startswith(of_python) else one_line(part) + "\n" for part in parts]
     return "".join(rows).rstrip("\n")

@@ -2,9 +2,9 @@
 
 ClptError
 ├── SceneError              a ValueError: a scene, mesh or image file, or a scene built in Python
-│   ├── UnknownKindError    a name that no kind has; tells the nearest ones
+│   ├── UnknownKindError    a name that no kind has; gives the nearest names
 │   └── UnusedParameterError  a parameter that the kind does not have
-├── DeviceError             a RuntimeError: no OpenCL device, or one that cannot do what is asked
+├── DeviceError             a RuntimeError: no OpenCL device, or it cannot do what is asked
 │   └── MemoryBudgetError   a MemoryError too: asked, available, what to lower
 ├── KernelBuildError        a RuntimeError: a kernel did not compile: stage, file, line, log
 └── ClusterError            a RuntimeError: workers that cannot go on, or that disagree
@@ -23,7 +23,7 @@ from typing import Any
 class ClptError(Exception):
     """Base of everything that clpt raises on purpose.
 
-    Its text is one line of at most LONGEST characters, without control characters.
+    Its text is a line of at most LONGEST characters, without control characters.
     """
 
     def __str__(self) -> str:
@@ -50,7 +50,7 @@ LONGEST_KEPT = 1 << 14  # characters of a message that an error keeps
 
 
 def one_line(text: str, longest: int = LONGEST) -> str:
-    """Return a text on one line without control characters, its middle left out if it is long."""
+    """Return a text as a single line without control characters; a long text loses its middle."""
     if len(text) > 8 * longest:  # the rest is never shown, and may be megabytes
         text = f"{text[: 4 * longest]} {text[-4 * longest :]}"
     if not text.isprintable():
@@ -89,7 +89,7 @@ class SceneError(ClptError, ValueError):
         self.place_at(where)
 
     def place_at(self, where: str | None) -> None:
-        """Say where it is, in place of what was said: the element or the parameter."""
+        """Replace the element or the parameter that the message names."""
         self.where = None if where is None else one_line(where, LONGEST_KEPT)
         place = one_line(str(self.file), LONGEST_PLACE) if self.file is not None else ""
         if self.line is not None:
@@ -137,7 +137,7 @@ class UnusedParameterError(SceneError):
 
 
 class DeviceError(ClptError, RuntimeError):
-    """No device, or one that cannot do what is asked."""
+    """No device, or the device cannot do what is asked."""
 
 
 def _size(nbytes: int) -> str:
@@ -151,11 +151,11 @@ class MemoryBudgetError(DeviceError, MemoryError):
     asked, available: bytes; None where the driver does not tell.
     """
 
-    def __init__(self, what: str, asked: int | None, available: int | None, advice: str):
+    def __init__(self, subject: str, asked: int | None, available: int | None, advice: str):
         self.asked, self.available = asked, available
         needs = "more memory" if asked is None else _size(asked)
         has = "no more" if available is None else _size(available)
-        super().__init__(f"{what} needs {needs}, the device has {has}: {advice}")
+        super().__init__(f"{subject} needs {needs}, the device has {has}: {advice}")
 
 
 class KernelBuildError(ClptError, RuntimeError):

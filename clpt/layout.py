@@ -1,4 +1,4 @@
-"""Records: one declaration, from which the numpy dtype and the OpenCL text follow.
+"""Records: a declaration gives the numpy dtype and the OpenCL text.
 
 Every member consists of 4-byte words, so that no compiler pads anything; a test compares offsets
 with the device. Four forms of text are made of a record:
@@ -83,7 +83,7 @@ class Constants(Generic[Number]):
 
 
 def _literal(value: int | float) -> str:
-    """Return a number as OpenCL has it: one that is not whole by type is a float."""
+    """Return a number as OpenCL writes it: a float has the suffix f."""
     if isinstance(value, float):
         return f"{value!r}f"
     return f"{value:#x}" if value >= 1 << 12 else str(value)
@@ -97,9 +97,9 @@ def bits(prefix: str, doc: str, first: int = 1, **docs: str) -> Constants[int]:
 
 @dataclass(frozen=True)
 class Member:
-    """One member of a record: its type, why it is there, where its first word stands.
+    """A member of a record: its type, its purpose, the place of its first word.
 
-    nothing: its value, as OpenCL, in what `name_nothing()` of `select_text` returns; "": 0.
+    nothing: its value in `name_nothing()` of `select_text`, as OpenCL; "": 0.
     """
 
     name: str
@@ -250,8 +250,8 @@ class Record:
     def slab_text(self, unused: Container[str] = ()) -> str:
         """Return `load_name_member(slab, at)` and `store_name_member(slab, at, m, v)`, for each.
 
-        unused: members that a scene does not use, by name: to load one gives `Member.nothing`, to
-        store one does nothing. So kernels need not ask whether a scene has them.
+        unused: names of members that a scene does not use. Loading them gives `Member.nothing`,
+        storing them does nothing. So kernels need not ask whether a scene has them.
         """
         used = [self._accessors(m) for m in self.members if m.name not in unused]
         absent = [self._without(m) for m in self.members if m.name in unused]
@@ -284,7 +284,7 @@ def row_words(table: str, at: str, count: int, many: bool = False) -> tuple[list
     """Return statements that read `count` words from `at` on, per lane, and each word's name.
 
     Four at a time, see kernels/core/rows.cl; the last four may be some of those before. many: lanes
-    mostly read different rows, so that asking whether they read the same one costs more than it
+    mostly read different rows, so that asking whether they read the same row costs more than it
     saves.
     """
     read = "gather_w4" if many else "row4"

@@ -1,9 +1,9 @@
 """Every record that the host shares with the device. Read this first.
 
-Three slabs hold the state of all paths, one slot a path: `Path`, `Hit` and `Shadow`. The scene lies
-in tables of 4-byte words: `TABLES` lists them once, and the kernels' `Scene` struct and arguments
-follow from it. A member's text is what it means, with its unit. `CONSTANTS` are the bits and other
-numbers that both sides know, each a file `generated/<name>.cl` of kernels.
+Three slabs hold the state of all paths: `Path`, `Hit` and `Shadow`, with a slot for each path. The
+scene lies in tables of 4-byte words: `TABLES` lists them once, and the kernels' `Scene` struct and
+arguments follow from it. A member's text is what it means, with its unit. `CONSTANTS` are the bits
+and other numbers that both sides know, each a file `generated/<name>.cl` of kernels.
 """
 
 from __future__ import annotations
@@ -44,12 +44,15 @@ PATH = Record(
     medium=("integer", "medium of the ray, see kernels/media/medium.cl; 0: none"),
     around=("integer", "medium from which the ray went into a body that absorbs; 0: none"),
     bodies=("integer", "bodies around the ray, see kernels/media/bodies.cl"),
-    lead=("real", "how far before o the ray's medium begins: o lies off the surface [m]"),
-    rival=(
+    ray_offset=("real", "how far before o the ray's medium begins: o lies off the surface [m]"),
+    mis_ratio=(
         "real",
-        "density of what the other side does over the path's own, see kernels/transport/rivals.cl",
+        "the other side's density over the path's (dVCM), see kernels/transport/mis_ratio.cl",
     ),
-    pending=("real", "what joins it if the next surface is sharp, see kernels/transport/rivals.cl"),
+    merge_ratio=(
+        "real",
+        "added to it if the next surface is specular (dVM), see kernels/transport/mis_ratio.cl",
+    ),
     expected=("real", "light that a guide knows where the path met it first, times throughput"),
     escape=("real", "density of rays out of a sealed medium, over that of d; below 0: it is left"),
     escape_axis=("vec3", "of the cone into which they are sent, see kernels/media/escape.cl"),
@@ -150,7 +153,7 @@ SETTINGS = Record(
     guide_side=("real", "of the cells of a guide, see kernels/transport/guiding/guide.cl [m]"),
     guide_paths=("integer", "light paths from which it learns"),
     wavelength_groups=("integer", "groups of paths that have the same wavelengths, in a pass"),
-    rival_area=("real", "unit of areas in kernels/transport/rivals.cl, a power of two [m^2]"),
+    mis_area_unit=("real", "unit of areas in kernels/transport/mis_ratio.cl, a power of two [m^2]"),
     aims=(
         "integer",
         "first float in `distributions` of the spheres at which light paths aim",
@@ -257,7 +260,10 @@ PHOTON = Record(
     ratio=("spectrum", "density of the path at each wavelength, over the mean of the four"),
     to_light=("natural", "direction to where it came from, see kernels/core/octahedral.cl"),
     normal=("natural", "geometric normal, likewise; in a medium its name"),
-    rival=("real", "of its light path, over the cosine there, see kernels/transport/rivals.cl"),
+    mis_ratio=(
+        "real",
+        "of its light path, over the cosine there, see kernels/transport/mis_ratio.cl",
+    ),
     depth=("integer", "surfaces that the light path has met; its group from bit 16 up"),
 )
 
@@ -271,7 +277,7 @@ TABLES: dict[str, tuple[str, str]] = {
     "faces": ("uint", "three vertices per triangle"),
     "attributes": (
         "uint",
-        "values of meshes per vertex or face, see clpt.render.geometry.encode_attributes",
+        "values of meshes per vertex or face, see clpt.render.geometry.encode",
     ),
     "shapes": ("uint", "ShapeRow per shape"),
     "instances": ("uint", "InstanceRow per instance"),

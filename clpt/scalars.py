@@ -1,6 +1,6 @@
 """Numbers, whole numbers and flags as callers have them: of Python, of NumPy, arrays without axes.
 
-Every check that a caller's value is one of them stands here, so that all parts of clpt take the
+All checks of callers' values stand here, so that all parts of clpt take the
 same values: what is equal in Python and in NumPy is equal here too.
 """
 
@@ -53,12 +53,12 @@ def number(value: object, where: str | None = None, words: str = "a number") -> 
 
     words: what messages call it.
     """
-    found = real(value, where, words)
-    if not math.isfinite(found):
-        raise SceneError(f"must be finite, not {found}", where=where)
-    if abs(found) > LARGEST:
-        raise SceneError(f"{found:g} is beyond {LARGEST:g}, where float32 ends", where=where)
-    return found
+    number = real(value, where, words)
+    if not math.isfinite(number):
+        raise SceneError(f"must be finite, not {number}", where=where)
+    if abs(number) > LARGEST:
+        raise SceneError(f"{number:g} is beyond {LARGEST:g}, where float32 ends", where=where)
+    return number
 
 
 def real(value: object, where: str | None = None, words: str = "a number") -> float:
@@ -79,23 +79,25 @@ def whole(
 ) -> int:
     """Return a whole number within limits, as Python's. Raises SceneError."""
     if is_whole(value):
-        found = int(value)
-        if (least is None or found >= least) and (most is None or found <= most):
-            return found
+        number = int(value)
+        if (least is None or number >= least) and (most is None or number <= most):
+            return number
     limits = "" if least is None else " above zero" if least == 1 else f" from {least}"
     limits = limits if most is None else f" from {least} to {most}"
     raise SceneError(f"must be a whole number{limits}, not {value!r}", where=where)
 
 
 def flag(value: object, where: str | None = None) -> bool:
-    """Return true or false, as Python's. Raises SceneError for what is neither."""
+    """Return a flag as Python's bool. Raises SceneError for any other value."""
     if not is_flag(value):
         raise SceneError(f"must be true or false, not {value!r}", where=where)
     return bool(value)
 
 
 def wholes(values: object, count: int) -> tuple[int, ...] | None:
-    """Return so many whole numbers as Python's, None for what is no list or array of them."""
+    """Return `count` whole numbers as Python's; None for anything but a list or array of them."""
     listed = isinstance(values, (list, tuple)) or (isinstance(values, np.ndarray) and values.ndim)
-    given = tuple(values) if listed else ()  # type: ignore[arg-type]
-    return tuple(map(int, given)) if len(given) == count and all(map(is_whole, given)) else None
+    numbers = tuple(values) if listed else ()  # type: ignore[arg-type]
+    return (
+        tuple(map(int, numbers)) if len(numbers) == count and all(map(is_whole, numbers)) else None
+    )

@@ -23,14 +23,14 @@ SINGULAR_BELOW = 1e-12
 
 
 def translate(*offset: ArrayLike) -> Matrix:
-    """Move by three numbers, or by one `offset` (3,)."""
+    """Move by three numbers, or by an `offset` (3,)."""
     matrix = np.eye(4)
     matrix[:3, 3] = _triple(_single(offset), "translate")
     return matrix
 
 
 def scale(*factors: ArrayLike) -> Matrix:
-    """Scale by one factor or by three, one an axis: numbers, or one array (3,)."""
+    """Scale by a factor, or by three factors along the axes: numbers, or an array (3,)."""
     values = np.asarray(_single(factors), np.float64)
     if values.ndim == 0:
         values = np.full(3, values)
@@ -159,14 +159,14 @@ def flips_handedness(matrix: ArrayLike) -> bool:
 
 
 def _single(arguments: tuple[ArrayLike, ...]) -> Any:
-    """Return what was given: the argument if it is one, else all of them."""
+    """Return the only argument, or all arguments."""
     return arguments[0] if len(arguments) == 1 else arguments
 
 
-def _triple(values: ArrayLike, what: str) -> Matrix:
+def _triple(values: ArrayLike, name: str) -> Matrix:
     values = np.asarray(values, np.float64)
     if values.shape != (3,) or not np.isfinite(values).all():
-        raise SceneError(f"{what}: expected three finite numbers, found {values.tolist()}")
+        raise SceneError(f"{name}: expected three finite numbers, found {values.tolist()}")
     return values
 
 
@@ -177,6 +177,6 @@ def _unit(vector: Matrix, complaint: str) -> Matrix:
     return vector / distance
 
 
-def _check_planes(near: float, far: float, what: str, lowest: float) -> None:
+def _check_planes(near: float, far: float, name: str, lowest: float) -> None:
     if not lowest < near < far:
-        raise SceneError(f"{what}: the clipping planes {near} and {far} are out of order")
+        raise SceneError(f"{name}: the clipping planes {near} and {far} are out of order")

@@ -49,7 +49,7 @@ def checkpoint(path: Path) -> None:
     """Write one as a render does; what it could not do is an error."""
     said: list[str] = []
     kept = film((1, 10, 4, 5))
-    renderer = SimpleNamespace(_hold=lambda: None, _saved_film=lambda held: kept)
+    renderer = SimpleNamespace(_hold=lambda: None, saved_film=lambda held: kept)
     writer = checkpoints.Checkpoints(renderer, path, 1e9, False, (), said.append)
     try:
         writer.save(stopped=False)

@@ -32,29 +32,29 @@ def compiled(vendor: Vendor, device: str, program: programs.Program) -> Row:
 
 
 def measure(
-    vendors: list[Vendor], given: list[programs.Program], known: list[Row]
+    vendors: list[Vendor], selected: list[programs.Program], known: list[Row]
 ) -> Iterator[Row]:
     """Yield a row for each device and program that is not known; devices of each vendor in turn."""
     done = {(row["device"], row["digest"]) for row in known}
     for number in range(max(len(vendor.devices) for vendor in vendors)):
         for vendor in vendors:
             for device in vendor.devices[number : number + 1]:
-                for program in given:
+                for program in selected:
                     if (device, program.digest) not in done:
                         yield compiled(vendor, device, program)
 
 
 def present() -> list[Vendor]:
     """Vendors whose compilers are here; others are told."""
-    found = []
+    compiled = []
     for vendor in VENDORS:
         if vendor.missing:
             click.echo(
                 f"{vendor.name} is left out: {', '.join(vendor.missing)} not found", err=True
             )
         else:
-            found.append(vendor)
-    return found
+            compiled.append(vendor)
+    return compiled
 
 
 @click.command(help=__doc__)
@@ -75,20 +75,20 @@ def main(
     keep: bool,
 ) -> None:
     os.nice(5)
-    given = programs.of_scenes(p for p in programs.scenes() if not names or p.name in names)
+    selected = programs.of_scenes(p for p in programs.scenes() if not names or p.name in names)
     if longest:
-        given = programs.longest(given, longest)
+        selected = programs.longest(selected, longest)
     if fewest:
-        for program in given:
+        for program in selected:
             count = fits(program.text, devices[0] if devices else "sm_89")
             click.echo(f"{program.stage} {program.scene} {program.mode}: {count}")
         return
     known = results.read(json_file) if json_file else []
-    digests = {program.digest for program in given}
+    digests = {program.digest for program in selected}
     rows = [row for row in known if row["digest"] in digests]
     end = time.monotonic() + seconds if seconds else float("inf")
     vendors = [vendor.only(devices) for vendor in present()]
-    for row in measure([vendor for vendor in vendors if vendor.devices], given, rows):
+    for row in measure([vendor for vendor in vendors if vendor.devices], selected, rows):
         rows.append(row)
         if "error" in row:
             click.echo(f"{row['device']} {row['scene']} {row['stage']}: {row['error']}", err=True)

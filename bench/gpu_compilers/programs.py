@@ -1,4 +1,4 @@
-"""The programs of the scenes as a GPU gets them: one lane, along queues, two layouts of trees."""
+"""Programs of scenes for GPUs: a single lane, queues, two layouts of trees."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def scenes() -> list[FilePath]:
 
 def of_scenes(paths: Iterable[FilePath], modes: Iterable[str] = MODES) -> list[Program]:
     """Every text of scenes once; scenes whose files are not made are told and left out."""
-    found: dict[str, Program] = {}
+    by_text: dict[str, Program] = {}
     layouts: dict[str, set[str]] = {}
     for path in paths:
         try:
@@ -67,9 +67,9 @@ def of_scenes(paths: Iterable[FilePath], modes: Iterable[str] = MODES) -> list[P
             for layout in LAYOUTS:
                 for stage, source in _sources(features, layout):
                     program = Program(source.text, stage, path.name, mode, source.registers)
-                    found.setdefault(source.text, program)
+                    by_text.setdefault(source.text, program)
                     layouts.setdefault(source.text, set()).add(layout)
-    return [_named(program, layouts[text]) for text, program in found.items()]
+    return [_named(program, layouts[text]) for text, program in by_text.items()]
 
 
 def _ways(scene: Scene, name: str) -> list[Scene]:
@@ -79,10 +79,10 @@ def _ways(scene: Scene, name: str) -> list[Scene]:
     return [scene, dataclasses.replace(scene, integrator=Path(guiding=True))]
 
 
-def longest(given: Iterable[Program], count: int) -> list[Program]:
+def longest(candidates: Iterable[Program], count: int) -> list[Program]:
     """Of each stage and mode the longest texts: what asks for most."""
     groups: dict[tuple[str, str], list[Program]] = {}
-    for program in sorted(given, key=lambda one: -len(one.text)):
+    for program in sorted(candidates, key=lambda one: -len(one.text)):
         groups.setdefault((program.stage, program.mode), []).append(program)
     return [program for own in groups.values() for program in own[:count]]
 
@@ -101,7 +101,7 @@ def _sources(features: Features, layout: str) -> Iterator[tuple[str, device.Sour
 
 
 def _named(program: Program, layouts: set[str]) -> Program:
-    """The program of a stage; with its layout, if only one has this text."""
+    """Return the program of a stage; with its layout, if only that layout has this text."""
     if len(layouts) > 1:
         return program
     (layout,) = layouts

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from clpt.device import registers
+from clpt.device import native_programs
 
 FOLDER = "GPU_COMPILERS"  # the variable that names where they were unpacked
 PLACES = ("usr/lib/llvm-19/bin", "usr/bin", "nvidia/*/bin", "usr/lib/clc")
@@ -169,9 +169,9 @@ WARPS = {"sm_75": 32, "sm_80": 64, "sm_86": 48, "sm_89": 48, "sm_90": 64}
 
 
 def nvidia(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Figures:
-    """By clang, as PTX for the oldest device of all, and NVIDIA's assembler for this one.
+    """Compile by clang to PTX for the oldest device, and by NVIDIA's assembler for this device.
 
-    Divisions and roots are as exact as OpenCL C asks, 2.5 and 3 ulp: exact ones are calls.
+    Divisions and roots are as exact as OpenCL C asks, 2.5 and 3 ulp: exact operations are calls.
     """
     began = time.perf_counter()
     (folder / "k.ptx").write_text(_ptx(text), encoding="utf-8")
@@ -181,16 +181,16 @@ def nvidia(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Fig
         out = f"k{limit or ''}.cubin"
         said = run(folder, "ptxas", "-v", "-O3", f"-arch={device}", *limited, "k.ptx", "-o", out)
         (folder / f"{out}.txt").write_text(said, encoding="utf-8")
-        return out, registers.told(said)
+        return out, native_programs.registers_used(said)
 
-    cubin, _ = registers.fewest(limits, build)
+    cubin, _ = native_programs.with_fewest_registers(limits, build)
     seconds = time.perf_counter() - began
     said = (folder / f"{cubin}.txt").read_text(encoding="utf-8")
     counts = (-1, -1, -1)
     if find("nvdisasm"):
         lines = run(folder, "nvdisasm", "-c", cubin)
         counts = counted(SASS_NAME.findall(lines), SASS)
-    used, spilled = registers.told(said)
+    used, spilled = native_programs.registers_used(said)
     return Figures(
         used,
         most(r"(\d+) bytes stack frame", said),
@@ -203,9 +203,9 @@ def nvidia(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Fig
 
 
 def fits(text: str, device: str) -> int:
-    """Return the fewest registers, in eights, with which NVIDIA's assembler spills nothing.
+    """Return the fewest registers, in eights, that NVIDIA's assembler needs without spills.
 
-    Left alone it takes more than it needs; a driver is told by `-cl-nv-maxrregcount`.
+    By default it takes more than it needs; `-cl-nv-maxrregcount` limits a driver.
     """
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "k.ptx").write_text(_ptx(text), encoding="utf-8")
@@ -259,7 +259,7 @@ def amd(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Figure
     return Figures(
         most(r"\bVGPRs: (\d+)", said),
         most(r"ScratchSize \[bytes/lane\]: (\d+)", said),
-        most(r"VGPRs Spill: (\d+)", said),  # scalar ones go to vector registers
+        most(r"VGPRs Spill: (\d+)", said),  # scalars spill to vector registers
         least(r"Occupancy \[waves/SIMD\]: (\d+)", said),
         size_of((folder / "k.o").read_bytes()),
         *counts,
@@ -303,12 +303,12 @@ def words(tokens: str, number: int) -> list[list[int]]:
 
 
 def most(pattern: str, said: str) -> int:
-    """The largest of the numbers that a compiler tells, one a kernel; 0 for none."""
+    """Return the largest number of a compiler's report over kernels; 0 without numbers."""
     return max(map(int, re.findall(pattern, said)), default=0)
 
 
 def least(pattern: str, said: str) -> int:
-    """The smallest of the numbers that a compiler tells, one a kernel; 0 for none."""
+    """Return the smallest number of a compiler's report over kernels; 0 without numbers."""
     return min(map(int, re.findall(pattern, said)), default=0)
 
 

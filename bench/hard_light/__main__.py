@@ -1,4 +1,4 @@
-"""Hard light: the error of renderers after equal processor time, on one core.
+"""Hard light: the error of renderers after equal processor time, on a core.
 
 `python -m bench.hard_light [SCENE ...]`. A scene's pixels are those that see something diffuse
 first (direct) and those that see it through or in something sharp (sharp). The relative MSE leaves
@@ -43,8 +43,8 @@ Row = dict[str, Any]
 def compare(
     image: NDArray[np.float64], reference: NDArray[np.float64], chosen: NDArray[np.bool_]
 ) -> dict[str, float] | None:
-    """Return the relative MSE and the share of the light, of the chosen pixels (h, w), each without
-    and with the worst ones; None where there are none."""
+    """Return the relative MSE and the share of light of the chosen pixels (h, w), without and with
+    the worst pixels; None without chosen pixels."""
     if not chosen.any():
         return None
     error = (image - reference) ** 2 / (reference**2 + 1e-2 * reference.mean() ** 2)
@@ -88,7 +88,7 @@ def _shot(method: str, file: Path, seconds: float, seed: int) -> peers.Shot:
             "; Path(sys.argv[5]).write_bytes(pickle.dumps(shot)); os._exit(0)"
         )  # LuxCore's log does not survive the interpreter
         command = [sys.executable, "-c", code, method, str(file), str(seconds), str(seed), str(out)]
-        # on one core, of which PoCL then has one thread
+        # a single core, for a single thread of PoCL
         core = str(min(os.sched_getaffinity(0)))
         done = subprocess.run(
             ["taskset", "-c", core, *command],

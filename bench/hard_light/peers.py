@@ -1,8 +1,8 @@
-"""Renderers of the scenes of hard light, for a given processor time on one core.
+"""Renderers of the scenes of hard light, for a given processor time on a core.
 
 `clpt:INTEGRATOR`, `mitsuba:INTEGRATOR` and `luxcore:METHOD`; LuxCore is `pyluxcore` on PyPI, and is
-left out where it is not installed. Mitsuba and LuxCore run in this process: `run` is called in a
-process of its own.
+left out if it is not installed. Mitsuba and LuxCore run in this process: call `run` in a separate
+process.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Shot:
 def run(method: str, file: Path, seconds: float, seed: int) -> Shot:
     """Render the scene of a file for about `seconds` of processor time.
 
-    Raises KeyError for a method of no renderer, ImportError for one that is not installed.
+    Raises KeyError for an unknown method, ImportError for a renderer that is not installed.
     """
     renderer, how = method.split(":", 1)
     return RENDERERS[renderer](file, how, seconds, seed)
@@ -112,7 +112,7 @@ def _luxcore(file: Path, how: str, seconds: float, seed: int) -> Shot:
     os.environ["OCL_ICD_VENDORS"] = os.devnull
     import pyluxcore
 
-    engine, own = LUXCORE[how]
+    engine, extra = LUXCORE[how]
     depth = SCENES[file.parent.name].depth
     pyluxcore.Init(lambda message: None)
     os.chdir(file.parent)
@@ -127,7 +127,7 @@ def _luxcore(file: Path, how: str, seconds: float, seed: int) -> Shot:
         "path.maxdepth": depth, "light.maxdepth": depth,
         "path.photongi.photon.maxdepth": DEEPEST_PHOTON.get(file.parent.name, 16),
         **{f"path.pathdepth.{k}": depth for k in ("total", "diffuse", "glossy", "specular")},
-        **own,
+        **extra,
     }  # fmt: skip
     properties = pyluxcore.Properties()
     for name, value in settings.items():

@@ -5,8 +5,9 @@
 Photons go from the lights through any number of sharp and diffuse bounces. Their power is summed in
 square texels on every diffuse parallelogram, so that the light which leaves it is known. The camera
 follows sharp bounces alone and reads the texels. Nothing is joined and no lamp has to be hit by
-chance: light seen through water costs no more than light seen directly. The one error besides noise
-is that a texel is even; `density` says how fine they are. Mitsuba's Python traces the rays.
+chance: light seen through water costs no more than light seen directly. The only error besides
+noise is the constant value of a texel; `density` says how fine they are. Mitsuba's Python traces
+the rays.
 
 The files beside this one took 12 to 400 million photons. Their noise is a relative MSE of .0005
 (ring; .0015 where it is sharp), .0008 (pool), .0007 (bulb; .0015), .002 (lens) and .02 (door, good
@@ -93,7 +94,7 @@ class Texels:
         self.power = [drjit.zeros(mi.Float, total) for _ in range(3)]
 
     def at(self, hit: Any, active: Any) -> tuple[Any, Any, Any]:
-        """Return the number of the texel that was hit, its area, and whether there is one."""
+        """Return the number of the hit texel, its area, and whether a texel was hit."""
         mi, dr = self.mi, self.dr
         quad, known = mi.UInt32(0), mi.Bool(False)
         for shape, first in self.first_quad.items():
@@ -195,7 +196,7 @@ def see(texels: Texels, samples: int, seed: int) -> tuple[NDArray[np.float64], N
             seen = seen + dr.select(active, shines, 0)
             active &= hit.is_valid()
             at, area, diffuse = texels.at(hit, active)
-            power = mi.Color3f(*[dr.gather(mi.Float, own, at, diffuse) for own in texels.power])
+            power = mi.Color3f(*[dr.gather(mi.Float, flux, at, diffuse) for flux in texels.power])
             albedo = hit.bsdf().eval_diffuse_reflectance(hit, diffuse)
             seen = seen + dr.select(diffuse, weight * power * albedo / (dr.pi * area), 0)
             active &= ~diffuse

@@ -2,9 +2,8 @@
 
     python -m bench.hard_light.scenes FOLDER
 
-256x256 pixels, box filter, indices by one number, flat normals. What is diffuse is made of
-parallelograms, two triangles each, on which `bench.hard_light.reference` relies. `SCENES` says what
-each of them shows.
+256x256 pixels, box filter, constant indices, flat normals. Diffuse shapes are parallelograms of two
+triangles, which `bench.hard_light.reference` requires. `SCENES` says what each scene shows.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from bench.peer_scenes import Mesh, Point
 
 Corners = tuple[Point, ...]
 SIZE = 256  # pixels of a side
-WALLS = "xXyYzZ"  # sides of a box, a capital one is the farther of its axis
+WALLS = "xXyYzZ"  # sides of a box; a capital letter is the far side of its axis
 
 
 @dataclass(frozen=True)
@@ -56,9 +55,9 @@ Surface = Diffuse | Mirror | Glass | Lamp
 class HardScene:
     """A scene and what it shows.
 
-    depth: most surfaces of a path, that of the light counted; aim: where there is one, the
-    rectangle at height y, from x0 to x1 and z0 to z1, that all light comes down through; sky:
-    radiance of an even one; point: place and intensity of a point light.
+    depth: the most surfaces of a path, including the light; aim: a rectangle at height y, from x0
+    to x1 and z0 to z1, that all light passes, if any; sky: radiance of a constant sky; point:
+    position and intensity of a point light.
     """
 
     shows: str
@@ -124,8 +123,10 @@ def square(centre: Point, target: Point, side: float) -> Mesh:
 
 def ball(level: int, centre: Point, radius: float, inward: bool = False) -> Mesh:
     """An icosahedron, `level` times made finer."""
-    made = trimesh.creation.icosphere(subdivisions=level, radius=radius)
-    return made.vertices + np.array(centre), made.faces[:, ::-1] if inward else made.faces
+    icosphere = trimesh.creation.icosphere(subdivisions=level, radius=radius)
+    return icosphere.vertices + np.array(centre), icosphere.faces[
+        :, ::-1
+    ] if inward else icosphere.faces
 
 
 def ring(radius: float, height: float, n: int) -> Mesh:
@@ -360,8 +361,8 @@ def _mitsuba(surface: Surface) -> str:
 
 
 def luxcore_text(scene: HardScene) -> str:
-    """A scene as LuxCore's properties. Its rows begin one pixel lower than the others': the window
-    is moved by that much."""
+    """Return a scene as LuxCore's properties. Its rows begin a pixel lower than the others': the
+    window is moved by a pixel."""
     step = 2 / SIZE
     lines = [
         "scene.camera.type = perspective",
@@ -385,9 +386,9 @@ def luxcore_text(scene: HardScene) -> str:
             f"{lamp}.efficency = 0",
         ]  # fmt: skip
     for part, (_, surface) in scene.shapes.items():
-        own, thing = f"scene.materials.{part}", f"scene.objects.{part}"
-        lines += [f"{own}.{line}" for line in _luxcore(surface)]
-        lines += [f"{thing}.ply = {part}.ply", f"{thing}.material = {part}"]
+        material_key, object_key = f"scene.materials.{part}", f"scene.objects.{part}"
+        lines += [f"{material_key}.{line}" for line in _luxcore(surface)]
+        lines += [f"{object_key}.ply = {part}.ply", f"{object_key}.material = {part}"]
     return "\n".join([*lines, ""])
 
 

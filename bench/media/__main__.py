@@ -1,9 +1,9 @@
-"""Light in media: efficiency of clpt and of Mitsuba, in turns on one core.
+"""Light in media: efficiency of clpt and of Mitsuba, in turns on a core.
 
 `python -m bench.media [SCENE ...]`. The relative MSE of passes, each beside the mean of the others,
 over the square of a reference: (pass - others)^2 / (reference^2 + (mean / 10)^2). Efficiency is
 1 / (relative MSE x processor seconds), without the worst hundredth of the pixels, as all samplers
-have fireflies here. `bias` is that of the mean picture, with its standard error.
+have fireflies here. `bias` is the mean picture's, with its standard error.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Row = dict[str, Any]
 
 
 def figures(passes: np.ndarray, reference: np.ndarray, seconds: float) -> dict[str, float]:
-    """The figures of passes (n, h, w, 3), each of which took some seconds."""
+    """Return the figures of passes (n, h, w, 3); took: seconds of a pass."""
     values, target = passes.astype(np.float64), reference.astype(np.float64)
     count, total = len(values), values.sum(axis=0)
     scale = target**2 + (0.1 * target.mean()) ** 2

@@ -1,13 +1,13 @@
-"""What the noise of a medium of several colours is beside that of grey ones.
+"""Noise of a coloured medium beside the noise of grey media.
 
 `python -m bench.media.colours`
 
 The ball of the scene `chroma`, whose extinction is 2, 6 and 9 per metre in red, green and blue,
-beside three grey balls with one of these extinctions each: variances over the square of the mean,
-at equal samples, without the worst hundredth of the ball's pixels. Ratios of a channel to that of
-the grey ball of its own extinction, and of the mean of the channels to the geometric mean of those
-of the grey balls; the same of the luminance. All channels of a grey ball share their paths; in the
-other a path's flights suit one of them best: where they suit no other, a channel's ratio is 3.
+beside three grey balls with these extinctions: variances over the square of the mean,
+at equal samples, without the worst hundredth of the ball's pixels. Ratios of a channel to
+the grey ball of its extinction, and of the channels' mean to the grey balls' geometric mean; the
+same for luminance. All channels of a grey ball share their paths; in the coloured ball a path's
+flights suit a channel best: if they suit no other, a channel's ratio is 3.
 """
 
 from __future__ import annotations

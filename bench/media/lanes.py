@@ -80,7 +80,7 @@ def counting_kernels(folder: Path) -> Path:
 
 
 def count(file: Path, spp: int) -> dict[str, float]:
-    """Of a scene's paths: the mean steps of one, of its block, and how many flights it begins."""
+    """Return the mean steps of a path and of its block, and its flights."""
     scene = clpt.load(file)
     scene.film = dataclasses.replace(scene.film, mode="rgb")
     with clpt.Renderer(scene, threads=1) as renderer:
@@ -97,15 +97,15 @@ def count(file: Path, spp: int) -> dict[str, float]:
 @click.argument("scenes", nargs=-1, type=click.Choice(list(SCENES)))
 @click.option("--json", "path", type=click.Path(), help="append the figures as JSON lines")
 def main(scenes: tuple[str, ...], path: str | None) -> None:
-    with tempfile.TemporaryDirectory() as made:
-        folder = Path(made)
+    with tempfile.TemporaryDirectory() as folder_name:
+        folder = Path(folder_name)
         unpack(folder)
         kernels = counting_kernels(folder)
         source.kernels_folder = lambda: kernels
         for name in scenes or SCENES:
-            found = count(folder / f"{name}.xml", SCENES[name])
-            machine.console().print(name, found)
-            rows = [{**machine.circumstances(), "scene": name, **found}]
+            counts = count(folder / f"{name}.xml", SCENES[name])
+            machine.console().print(name, counts)
+            rows = [{**machine.circumstances(), "scene": name, **counts}]
             machine.append(path, "lanes", rows)
 
 

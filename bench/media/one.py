@@ -1,4 +1,4 @@
-"""Passes of one renderer over one file.
+"""Passes of a renderer over a file.
 
 `python -m bench.media.one RENDERER FILE MODE SPP SECONDS OUT`
 

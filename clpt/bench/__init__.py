@@ -1,7 +1,7 @@
 """The benchmark: pictures, rays, stages, builds and starts of any OpenCL device, from clpt alone.
 
-`clpt bench` runs it; docs/benchmark.md tells what the figures mean. `measure` gives them one after
-the other, each as soon as it is known; one that cannot be true tells why in `refused`.
+`clpt bench` runs it; docs/benchmark.md explains the figures. `measure` yields each figure at once;
+`refused` tells why a figure cannot be true.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from clpt.bench.scenes import opened
 __all__ = ["DEFAULT_PARTS", "PARTS", "Figure", "measure", "opened"]
 
 PARTS = {
-    "pictures": "fixed scenes rendered, each picture verified: points of each, one number of all",
+    "pictures": "fixed scenes rendered, each picture verified: points of each, and a total",
     "bandwidth": "a kernel that only copies, GB/s",
     "rays": "rays a second by layout, set and query, hits checked",
-    "stages": "what each stage of a render gets through, Mitems/s and GB/s; sort and film too",
-    "shading": "every kind of material in a box of its own, Mitems/s, beside diffuse; if asked for",
-    "agreement": "each stage beside itself without optimisation; if asked for",
+    "stages": "speed of each stage of a render, Mitems/s and GB/s; sort and film too",
+    "shading": "every kind of material in a closed box, Mitems/s, beside diffuse; on request",
+    "agreement": "each stage beside itself without optimisation; on request",
     "build": "trees built and refitted, Mtri/s",
     "start": "whole processes until a first picture, with empty caches and with full ones",
 }
 DEFAULT_PARTS = tuple(part for part in PARTS if part not in ("shading", "agreement"))
-START_SCENE = "cornell"  # where none is asked for
+START_SCENE = "cornell"  # by default
 
 
 def measure(
@@ -43,12 +43,12 @@ def measure(
     count: int | None = None,
     size: str = "standard",
 ) -> Iterator[Figure]:
-    """Figures of a device, whose queue must be profiling.
+    """Yield the figures of a device, whose queue must be profiling.
 
-    parts: names of PARTS; only: of the stages, kinds: of materials, if not all; scene: as of
-    `opened`, by default the atrium, and for starts the Cornell box; layouts: names of
-    clpt.bvh.TREES; rounds: of each figure; count: rays of a set; size: of the pictures, which
-    are left out if the scene is none of theirs. Raises SceneError, DeviceError.
+    parts: names of PARTS; only: names of stages, kinds: of materials, by default all; scene: see
+    `opened`, by default the atrium, for starts the Cornell box; layouts: names of clpt.bvh.TREES;
+    rounds: of each figure; count: rays of a set; size: of pictures, which are left out for other
+    scenes. Raises SceneError, DeviceError.
     """
     if "pictures" in parts and (scene is None or scene in PICTURES):
         yield from pictures.measure(on, rounds, size, (scene,) if scene else ())

@@ -1,7 +1,7 @@
-"""Stages beside themselves: what each writes, and what a witness writes from the same words.
+"""Agreement of stages: the words that a device writes beside a witness's words.
 
-The witness is a CPU of another platform, or else the device itself with a program that its compiler
-did not optimise. Most faults of drivers are faults of optimisers, so that they show there.
+The witness is a CPU of another platform, or else the device with a program that its compiler did
+not optimise. Most faults of drivers are faults of optimisers.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from clpt.scene import Scene
 
 PART = "agreement"
 SLOTS = 1 << 12
-WARM = 4  # bounces before, so that paths of all depths are in flight
-NAMED = 4  # members that are named at most
+WARM = 4  # bounces before the check, so that paths of all depths are in flight
+NAMED = 4  # the most members in a message
 
 
 @dataclass(frozen=True)
 class Witness:
-    """A device that runs launches again, the options of its compiler, and its name in a line."""
+    """A device that repeats launches, its compiler's options, and its name."""
 
     on: device.Device
     options: tuple[str, ...]
@@ -35,15 +35,15 @@ class Witness:
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """A launch whose words after it are the witness's; what the device made of it; the members."""
+    """A launch with the witness's words, the device's comparison, and the members that differ."""
 
     launch: Launch
     comparison: Comparison
     members: Sequence[str]
 
     @property
-    def told(self) -> str:
-        """Say what is wrong, or ""."""
+    def problem(self) -> str:
+        """The error as text, or ""."""
         if not self.comparison.wrong:
             return ""
         names = ", ".join(self.members[:NAMED]) + (", ..." if len(self.members) > NAMED else "")
@@ -67,8 +67,8 @@ def checked(
 ) -> Iterator[Checked]:
     """Run a bounce of a scene; yield each stage's launch beside the witness's.
 
-    only: names of stages, all by default. Raises UnknownKindError for one that is not there; as
-    Flight does, and KernelBuildError, DeviceError, MemoryBudgetError of the witness.
+    only: names of stages, by default all. Raises UnknownKindError for another name; errors of
+    Flight; KernelBuildError, DeviceError, MemoryBudgetError of the witness.
     """
     flight = Flight(on, scene, SLOTS)
     for _ in range(WARM):
@@ -85,40 +85,41 @@ def checked(
 
 
 def measure(on: device.Device, scene: Scene, only: Sequence[str] = ()) -> Iterator[Figure]:
-    """Figures of the stages of a bounce: words that agree with the witness's, of those written.
+    """Yield figures of a bounce's stages: the share of written words that agree with the witness.
 
-    only: names of stages, all by default. Raises as `checked` does.
+    only: names of stages, by default all. Raises like `checked`.
     """
     witness = witness_of(on)
-    for one in checked(on, scene, witness, only):
-        stage, share = one.launch.stage, 100.0 * (1.0 - one.comparison.share)
+    for result in checked(on, scene, witness, only):
+        stage, share = result.launch.stage, 100.0 * (1.0 - result.comparison.share)
         more = {"witness": witness.name, "stage": stage, "mode": scene.film.mode}
         figure = Figure(PART, stage, "%", (share,), scene.name, more)
-        yield figure.refuse(f"wrong: {one.told}, beside {witness.name}" if one.told else "")
+        problem = result.problem and f"wrong: {result.problem}, beside {witness.name}"
+        yield figure.refuse(problem)
 
 
 def first_wrong(on: device.Device, scene: Scene) -> str:
-    """Return the first stage whose words are wrong, and how, for a line; or that all are right."""
+    """Return a line on the first stage with wrong words, or that all stages are right."""
     witness = witness_of(on)
-    for one in checked(on, scene, witness):
-        if one.told:
-            stage = one.launch.stage.replace("_", " ")
-            return f"first in {stage}: {one.told}, beside {witness.name}"
-    return f"its rays are right, and its stages as those of {witness.name}: look at accumulate"
+    for result in checked(on, scene, witness):
+        if result.problem:
+            stage = result.launch.stage.replace("_", " ")
+            return f"first in {stage}: {result.problem}, beside {witness.name}"
+    return f"its rays are right, and its stages agree with {witness.name}: look at accumulate"
 
 
 def members(flight: Flight, comparison: Comparison) -> list[str]:
-    """Return the names of the members of slabs, and of other buffers, with words that are off."""
-    found: dict[str, None] = {}
+    """Return the names of slabs' members, and of other buffers, with wrong words."""
+    names: dict[str, None] = {}
     for name, words in comparison.off.items():
-        record = next((one for one in SLABS if f"{one.name.lower()}_words" == name), None)
+        record = next((slab for slab in SLABS if f"{slab.name.lower()}_words" == name), None)
         if record is None:
-            found |= dict.fromkeys([name] if len(words) else [])
+            names |= dict.fromkeys([name] if len(words) else [])
             continue
         stride = flight.wavefront.paths.rows(record, 0).pitch // 4
         in_blocks = flight.wavefront.lanes == 1
         rows = words // SLAB_BLOCK % record.step if in_blocks else words // stride
         for member in record.members:
             if ((rows >= member.word) & (rows < member.word + member.words)).any():
-                found[member.name] = None
-    return list(found)
+                names[member.name] = None
+    return list(names)

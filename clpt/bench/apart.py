@@ -1,7 +1,7 @@
-"""A device measured in a process of its own, so that a driver that crashes or hangs ends only that.
+"""Measurement of a device in a separate process, which a driver may crash or hang.
 
-The process tells JSON lines on what was its standard output; what drivers print goes to its
-standard error, of which the last words are told if it dies.
+The process writes JSON lines to its standard output. Drivers' output goes to standard error, whose
+last line is reported if the process dies.
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ from clpt.bench.figures import Figure
 from clpt.errors import ClptError, one_line
 from clpt.files import child_processes
 
-PART = "process"  # of figures that tell how a process ended
-HANGS = "it hangs"  # how the figure of a process begins that told nothing for too long
-LIMIT = 900.0  # seconds without a figure after which a process is ended
+PART = "process"  # of figures that report the end of a process
+HANGS = "it hangs"  # prefix of the figure of a silent process
+LIMIT = 900.0  # [s] without a figure, after which a process is killed
 
 About = Mapping[str, Any]  # of a device, see clpt.bench.records.of_device
-Told = tuple[About, Figure]
+Measured = tuple[About, Figure]
 
 
 def measured(
     which: str | int | None, label: str | None, settings: Mapping[str, Any], limit: float
-) -> Iterator[Told]:
-    """Measure a device in a process of its own; yield figures with what the device is.
+) -> Iterator[Measured]:
+    """Measure a device in a separate process; yield the device's description with each figure.
 
-    which: as clpt.device.choose takes it; label: of one of several devices; settings: of
-    clpt.bench.measure, as JSON takes them; limit: seconds that may pass without a figure.
-    A process that dies or hangs is a last figure, which is refused; of one of several devices an
-    error of clpt's is too. Else it is raised, as ClptError.
+    which: see clpt.device.choose; label: of the device if several are measured, else None;
+    settings: JSON values for clpt.bench.measure; limit: seconds without a figure.
+    A process that dies or hangs yields a refused figure at the end. So does an error of clpt with a
+    label; without a label it is raised as ClptError.
     """
     main = f"from {__name__} import main; main(*sys.argv[1:])"
     command = child_processes.command(main, json.dumps(which), json.dumps(dict(settings)))
     about: About = {"device": label or which or "the default device"}
-    last = "it began"
+    last = "its start"
     with tempfile.TemporaryFile() as errors, _process(command, errors) as process:
         try:
             for message in _messages(process, limit):
@@ -70,7 +70,7 @@ def measured(
 
 @contextlib.contextmanager
 def _process(command: list[str], errors: IO[bytes]) -> Iterator[subprocess.Popen[str]]:
-    """Start a process, which is killed at the end with those that it has started."""
+    """Start a process; kill it with its child processes at the end."""
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=errors, text=True, encoding="utf-8",
         errors="replace", start_new_session=os.name == "posix",
@@ -87,7 +87,7 @@ def _process(command: list[str], errors: IO[bytes]) -> Iterator[subprocess.Popen
 
 
 def _messages(process: subprocess.Popen[str], limit: float) -> Iterator[dict[str, Any]]:
-    """Yield what a process tells until it ends. Raises TimeoutError if nothing comes for long."""
+    """Yield a process's messages. Raises TimeoutError after `limit` seconds without any."""
     lines: queue.Queue[str | None] = queue.Queue()
 
     def read(output: Iterable[str]) -> None:
@@ -103,13 +103,13 @@ def _messages(process: subprocess.Popen[str], limit: float) -> Iterator[dict[str
             raise TimeoutError from None
         if line is None:
             return
-        with contextlib.suppress(ValueError):  # a line that a crash has cut
+        with contextlib.suppress(ValueError):  # a crash cuts a line
             message = json.loads(line)
             yield message
 
 
 def _ended(why: str, errors: IO[bytes]) -> Figure:
-    """Return the figure of a process that did not come to its end."""
+    """Return the figure of a process that ended early."""
     errors.seek(0)
     words = errors.read().decode("utf-8", "replace").strip().splitlines()[-1:]
     return _refused(": ".join([why, *words]))
@@ -127,16 +127,16 @@ def _status(code: int) -> str:
 
 
 def main(which: str, settings: str) -> None:
-    """The process that measures: a JSON line for the device, each figure, an error and the end."""
+    """Measure a device; write a JSON line for the device, each figure, an error and the end."""
     from clpt import bench as benchmark
     from clpt.bench import records
 
-    with os.fdopen(os.dup(1), "w", encoding="utf-8") as told:
+    with os.fdopen(os.dup(1), "w", encoding="utf-8") as output:
         os.dup2(2, 1)
 
         def tell(**message: Any) -> None:
-            told.write(json.dumps(message) + "\n")
-            told.flush()
+            output.write(json.dumps(message) + "\n")
+            output.flush()
 
         try:
             on = device.choose(json.loads(which), profiling=True)
@@ -148,4 +148,4 @@ def main(which: str, settings: str) -> None:
         else:
             tell(end=True)
     sys.stdout.flush()
-    os._exit(0)  # a driver that crashes when it is unloaded has measured all the same
+    os._exit(0)  # skip unloading the driver, which may crash

@@ -1,7 +1,7 @@
 """The atrium: a two-storey court of columns and arches, with curtains, plants and hanging lamps.
 
-Everything is made from formulas: 309,472 triangles. y is up; the court is 40 long (x), 16 high and
-18 wide (z), open to the sky in the middle. `scenes/atrium` is made of it.
+Formulas give its 309,472 triangles. y is up; the court is 40 long (x), 16 high and 18 wide (z), and
+open to the sky in the middle. `scenes/atrium` is written from it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Surface = Callable[[Angles, Angles], Point]
 
 
 def atrium() -> tuple[np.ndarray, np.ndarray, dict[str, slice]]:
-    """vertices (n, 3) float32, faces (m, 3) uint32, and which faces each part is made of.
+    """Return vertices (n, 3) float32, faces (m, 3) uint32, and the faces of each part.
 
     Parts: floor, walls, galleries, columns, arches, curtains, vases, foliage, chains, lamps and
     relief.
@@ -47,9 +47,9 @@ def atrium() -> tuple[np.ndarray, np.ndarray, dict[str, slice]]:
     parts: dict[str, slice] = {}
     begin = 0
     for name, make in makers.items():
-        made = make()
-        meshes += made
-        parts[name] = slice(begin, begin + sum(len(faces) for _, faces in made))
+        part = make()
+        meshes += part
+        parts[name] = slice(begin, begin + sum(len(faces) for _, faces in part))
         begin = parts[name].stop
     first = np.cumsum([0] + [len(vertices) for vertices, _ in meshes])
     vertices = np.concatenate([vertices for vertices, _ in meshes]).astype(np.float32)
@@ -100,18 +100,18 @@ def walls() -> list[Mesh]:
 
 def galleries() -> list[Mesh]:
     """Floors around the court at the height of the second storey and of the roof."""
-    made = []
+    meshes = []
     for y in (7.0, 15.0):
         for z0, z1 in ((0.0, 4.5), (13.5, WIDTH)):
-            made += box((0, y, z0), (LENGTH, y + 0.4, z1), 2)
+            meshes += box((0, y, z0), (LENGTH, y + 0.4, z1), 2)
         for x0, x1 in ((0.0, 3.0), (37.0, LENGTH)):
-            made += box((x0, y, 4.5), (x1, y + 0.4, 13.5), 2)
-    return made
+            meshes += box((x0, y, 4.5), (x1, y + 0.4, 13.5), 2)
+    return meshes
 
 
 def columns() -> list[Mesh]:
     """Fluted columns with bases and capitals, in two storeys."""
-    made = []
+    meshes = []
     for y0, y1 in ((0.0, 4.6), (7.4, 12.6)):
         for z in ROWS:
             for x in COLUMNS:
@@ -123,15 +123,15 @@ def columns() -> list[Mesh]:
                     r += 0.15 * np.exp(-((14 * v) ** 2)) + 0.18 * np.exp(-((12 * (1 - v)) ** 2))
                     return x + r * np.cos(TAU * u), y0 + (y1 - y0) * v, z + r * np.sin(TAU * u)
 
-                made.append(grid(shaft, 36, 20))
-                made += box((x - 0.6, y0, z - 0.6), (x + 0.6, y0 + 0.25, z + 0.6))
-                made += box((x - 0.6, y1 - 0.1, z - 0.6), (x + 0.6, y1 + 0.2, z + 0.6))
-    return made
+                meshes.append(grid(shaft, 36, 20))
+                meshes += box((x - 0.6, y0, z - 0.6), (x + 0.6, y0 + 0.25, z + 0.6))
+                meshes += box((x - 0.6, y1 - 0.1, z - 0.6), (x + 0.6, y1 + 0.2, z + 0.6))
+    return meshes
 
 
 def arches() -> list[Mesh]:
     """Round arches from column to column."""
-    made = []
+    meshes = []
     for y in (4.8, 12.8):
         for z in ROWS:
             for x0, x1 in itertools.pairwise(COLUMNS):
@@ -148,13 +148,13 @@ def arches() -> list[Mesh]:
                     r = radius - 0.25 + 0.3 * np.cos(TAU * v) * (1 + 0.1 * np.sin(20 * a))
                     return x - r * np.cos(a), y + 1.2 * r * np.sin(a), z + 0.4 * np.sin(TAU * v)
 
-                made.append(grid(arch, 26, 14))
-    return made
+                meshes.append(grid(arch, 26, 14))
+    return meshes
 
 
 def curtains(rng: np.random.Generator) -> list[Mesh]:
     """Wavy cloth in every second arch."""
-    made = []
+    meshes = []
     for x in COLUMNS[:-1:2] + 0.5:
         for z in ROWS:
             phase = 6 * rng.random()
@@ -167,8 +167,8 @@ def curtains(rng: np.random.Generator) -> list[Mesh]:
                 depth += 0.1 * np.sin(7 * v + phase)
                 return x + 1.9 * u * (1 + 0.2 * np.sin(3 * v)), y, z + depth
 
-            made.append(grid(cloth, 56, 40))
-    return made
+            meshes.append(grid(cloth, 56, 40))
+    return meshes
 
 
 def _pots() -> list[tuple[float, float]]:
@@ -177,20 +177,20 @@ def _pots() -> list[tuple[float, float]]:
 
 def vases() -> list[Mesh]:
     """Vases that stand along the court."""
-    made = []
+    meshes = []
     for x, z in _pots():
 
         def vase(u: Angles, v: Angles, x: float = x, z: float = z) -> Point:
             r = 0.35 + 0.25 * np.sin(3 * v) ** 2 - 0.1 * v
             return x + r * np.cos(TAU * u), 1.1 * v, z + r * np.sin(TAU * u)
 
-        made.append(grid(vase, 32, 20))
-    return made
+        meshes.append(grid(vase, 32, 20))
+    return meshes
 
 
 def foliage(rng: np.random.Generator, leaves: int = 260) -> list[Mesh]:
     """Diamond-shaped leaves, two triangles each, in a cloud above every vase."""
-    made = []
+    meshes = []
     for x, z in _pots():
         centre = np.array([x, 1.5, z]) + rng.normal(0, 1, (leaves, 3)) * (0.45, 0.35, 0.45)
         long = rng.normal(0, 1, (leaves, 3))
@@ -200,13 +200,13 @@ def foliage(rng: np.random.Generator, leaves: int = 260) -> list[Mesh]:
         long, wide = 0.16 * long, 0.06 * wide
         corners = np.stack([centre - long, centre - wide, centre + wide, centre + long], 1)
         faces = np.array([[0, 1, 2], [3, 2, 1]]) + 4 * np.arange(leaves)[:, None, None]
-        made.append((corners.reshape(-1, 3), faces.reshape(-1, 3)))
-    return made
+        meshes.append((corners.reshape(-1, 3), faces.reshape(-1, 3)))
+    return meshes
 
 
 def chains() -> list[Mesh]:
     """Chains of interlocking rings that the lamps hang from."""
-    made = []
+    meshes = []
     for x in np.linspace(6, 34, 8):
         for link in range(14):
 
@@ -216,13 +216,13 @@ def chains() -> list[Mesh]:
                 across, along = (p, s) if link % 2 else (s, p)
                 return x + across, 14.5 - 0.22 * link + q, 9 + along
 
-            made.append(grid(ring, 14, 8))
-    return made
+            meshes.append(grid(ring, 14, 8))
+    return meshes
 
 
 def lamps() -> list[Mesh]:
     """Dimpled globes."""
-    made = []
+    meshes = []
     for x in np.linspace(6, 34, 8):
 
         def globe(u: Angles, v: Angles, x: float = x) -> Point:
@@ -230,8 +230,8 @@ def lamps() -> list[Mesh]:
             ring, y = r * np.sin(np.pi * v), 11 + r * np.cos(np.pi * v)
             return x + ring * np.cos(TAU * u), y, 9 + ring * np.sin(TAU * u)
 
-        made.append(grid(globe, 64, 40))
-    return made
+        meshes.append(grid(globe, 64, 40))
+    return meshes
 
 
 def relief() -> list[Mesh]:

@@ -45,7 +45,7 @@ def _lamp() -> Shape:
 
 
 def _set_up(name: str, shapes: list[Shape], sky: float, max_depth: int) -> Scene:
-    """Shapes on the floor under the lamp and an even sky, seen from the front."""
+    """Return shapes on the floor under the lamp and an even sky, seen from the front."""
     view = transforms.look_at((0, 2.6, 6.4), (0, 0.75, 0), (0, 1, 0))
     return Scene(
         camera=Perspective(fov=46.0, to_world=view),
@@ -65,7 +65,7 @@ def spheres() -> Scene:
 
 
 def glass() -> Scene:
-    """Balls of clear and of green glass, one with air inside, under an even sky."""
+    """Balls of clear and green glass and a ball with air inside, under an even sky."""
     clear, green = Dielectric(int_ior="BK7"), Dielectric(absorption=(1.6, 0.25, 1.1))
     air = Dielectric(int_ior=1.000277, ext_ior="BK7")
     bubble = Sphere(center=(1.8, 0.8, 0.0), radius=0.7, material=air)
@@ -74,7 +74,7 @@ def glass() -> Scene:
 
 
 def mist() -> Scene:
-    """A white and a coloured ball of mist, and one of wine, without surfaces."""
+    """Balls of white mist, coloured mist and wine, without surfaces."""
     white = media.Homogeneous(sigma_s=5.0, phase=phases.HenyeyGreenstein(g=0.6))
     amber = media.Homogeneous(sigma_t=(1.2, 3.0, 7.0), albedo=(0.999, 0.99, 0.96))
     wine = media.Homogeneous(sigma_a=(0.3, 3.4, 3.0), sigma_s=0.1)

@@ -1,4 +1,4 @@
-"""Bytes a second that a kernel moves which only copies: others are compared with it."""
+"""Bandwidth of a copying kernel, the yardstick of other kernels."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ kernel void copy(global const uint16 *restrict from, global uint16 *restrict to)
 """
 LARGEST = 1 << 27  # [bytes] beyond the caches of most devices
 WORD = 0x9E3779B9
-SLACK = 1.25  # how much faster than a copy may be: parts of what moves stay in registers
+SLACK = 1.25  # over a copy's bandwidth: caches and registers may hold a part
 
 
 class Copying:
     """Copies between two buffers.
 
-    Raises MemoryBudgetError if the device does not have them.
+    Raises MemoryBudgetError if the device lacks memory.
     """
 
     def __init__(self, on: device.Device):
@@ -33,7 +33,7 @@ class Copying:
         self._rates: dict[int, float] = {}
 
     def rounds(self, nbytes: int, rounds: int) -> tuple[list[Taken], str]:
-        """Time copies of about `nbytes` bytes; return the times, and what is wrong if anything."""
+        """Time copies of about `nbytes` bytes; return the times, and a complaint or ""."""
         items = max(nbytes // 64, 64)
         give = device.Buffers(self.device)
         source = (np.arange(items * 16, dtype=np.uint32) * WORD).view(np.uint32)
@@ -53,21 +53,21 @@ class Copying:
         taken = [timed(self.device, enqueue) for _ in range(rounds)]
         wrong = (give.download(second, source.shape, np.uint32) != source).sum()
         complaint = f"{wrong:,} of {source.size:,} words were not copied" if wrong else ""
-        each = [Taken(one.device / repeats, one.host / repeats) for one in taken]
+        each = [Taken(t.device / repeats, t.host / repeats) for t in taken]
         return each, complaint or clock_complaint(taken)
 
     def rate(self, nbytes: int) -> float:
-        """Bytes read and written a second, by copies of as many bytes in all; measured once."""
+        """Return bytes read and written a second by copies of `nbytes`; measured once."""
         half = max(nbytes // 2 // 4096, 1) * 4096
         if half not in self._rates:
             taken, _ = self.rounds(half, 5)
-            self._rates[half] = 2 * half / min(one.device for one in taken)
+            self._rates[half] = 2 * half / min(t.device for t in taken)
         return self._rates[half]
 
     def complaint(self, nbytes: float, seconds: float, within: int) -> str:
-        """Why bytes cannot have been moved in the time, or "".
+        """Return why bytes cannot have been moved in the time, or "".
 
-        within: [bytes] of memory that they lie in, which may fit a cache or not.
+        within: size of the memory that holds them [bytes], which may fit a cache.
         """
         limit = SLACK * max(self.rate(within), self.rate(2 * LARGEST))
         if nbytes <= limit * seconds:
@@ -81,11 +81,11 @@ class Copying:
 def measure(
     on: device.Device, rounds: int, sizes: Sequence[int] = (1 << 21, LARGEST)
 ) -> Iterator[Figure]:
-    """Figures of copies: GB/s read and written together, of a small and a large buffer."""
+    """Yield figures of copies: GB/s read and written, for a small and a large buffer."""
     copying = Copying(on)
     for size in sizes:
         size = min(size, on.info.max_alloc // 64 * 64)
         taken, complaint = copying.rounds(size, rounds)
-        speeds = tuple(2e-9 * size / one.device for one in taken)
+        speeds = tuple(2e-9 * size / t.device for t in taken)
         name = f"copy {size / 2**20:g} MiB"
         yield Figure("bandwidth", name, "GB/s", speeds, more={"bytes": 2 * size}).refuse(complaint)

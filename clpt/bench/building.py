@@ -1,4 +1,4 @@
-"""Speed of building trees on the device, and of refitting them to triangles that have moved."""
+"""Speed of builds of trees on the device, and of refits to moved triangles."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from clpt.choices import Quality
 from clpt.rays import Accel
 from clpt.scene import Scene
 
-BEND = 0.02  # of the scene's height, by which vertices move
+BEND = 0.02  # of the scene's height: the move of vertices
 
 
 def measure(
@@ -29,9 +29,9 @@ def measure(
     count: int | None = None,
     accel: type[Accel] = Accel,
 ) -> Iterator[Figure]:
-    """Figures of builds and refits, in Mtri/s by the host's clock, from arrays on the device.
+    """Yield figures of builds and refits, in Mtri/s by the host's clock, from device arrays.
 
-    count: rays by which the trees are checked; accel: what answers them, called as Accel is.
+    count: rays that check the trees; accel: class to trace them, with the parameters of Accel.
     """
     work = _Work(on, sets(on, scene, count), scene.name, accel)
     builds = [(layout, quality) for layout in layouts for quality in get_args(Quality)]
@@ -61,27 +61,28 @@ def _name(layout: str, quality: Quality) -> str:
 
 
 class _Work:
-    """Triangles on the device, where they are and where they move to, and rays among them."""
+    """Triangles on the device in two positions, and rays to check trees."""
 
-    def __init__(self, on: device.Device, given: Sets, scene: str, accel: type[Accel]):
-        self.device, self.given, self.scene, self.accel = on, given, scene, accel
-        height = float(np.ptp(given.vertices[:, 1]))
-        wave = np.sin(given.vertices[:, [1, 2, 0]] * (12.0 / max(height, 1e-6)))
-        self.bent = (given.vertices + BEND * height * wave).astype(np.float32)
-        self.rays = given.rays.get("diffuse") or given.rays["primary"]
+    def __init__(self, on: device.Device, triangles: Sets, scene: str, accel: type[Accel]):
+        self.device, self.sets, self.scene, self.accel = on, triangles, scene, accel
+        height = float(np.ptp(triangles.vertices[:, 1]))
+        wave = np.sin(triangles.vertices[:, [1, 2, 0]] * (12.0 / max(height, 1e-6)))
+        self.bent = (triangles.vertices + BEND * height * wave).astype(np.float32)
+        self.rays = triangles.rays.get("diffuse") or triangles.rays["primary"]
         self.copying, give = Copying(on), device.Buffers(on)
         self._building = bvh.Building(on)
         self.points, self.moved = (
-            give.upload("vertices", points, np.float32) for points in (given.vertices, self.bent)
+            give.upload("vertices", points, np.float32)
+            for points in (triangles.vertices, self.bent)
         )
-        self.faces = give.upload("faces", given.faces, np.uint32)
+        self.faces = give.upload("faces", triangles.faces, np.uint32)
 
     def build(self, layout: str, quality: Quality) -> bvh.Bvh:
-        """A tree from the beginning."""
+        """Build a tree."""
         return bvh.build(self.device, self.points, self.faces, layout=layout, quality=quality)
 
     def refit(self, tree: bvh.Bvh, number: int) -> None:
-        """Let a tree follow its vertices, there and back."""
+        """Refit a tree to the moved vertices or, for even numbers, back."""
         bvh.refit(self._building, tree, (self.moved, self.points)[number % 2], self.faces)
         self._building.stream.wait()
 
@@ -89,11 +90,11 @@ class _Work:
         self, name: str, layout: str, quality: Quality, seconds: list[float], tree: bvh.Bvh,
         *, moves: bool,
     ) -> Figure:  # fmt: skip
-        """Return the speed of all rounds but the first, which compiles; check the hits."""
-        count = len(self.given.faces)
+        """Return the speed of the rounds after the first, which compiles; check hits."""
+        count = len(self.sets.faces)
         stats = {} if moves else {k: v for k, v in tree.stats.items() if k != "seconds"}
         more = {"layout": layout, "quality": quality, "triangles": count, **stats}
-        least = self.given.vertices.nbytes + self.given.faces.nbytes + tree.bytes
+        least = self.sets.vertices.nbytes + self.sets.faces.nbytes + tree.bytes
         rounds = rates(count, seconds[1:])
         figure = Figure("build", name, "Mtri/s", rounds, self.scene, {**more, "bytes": tree.bytes})
         slow = self.copying.complaint(least, min(seconds[1:]), least)
@@ -101,14 +102,16 @@ class _Work:
 
     @cached_property
     def _truths(self) -> tuple[Truth, Truth]:
-        """The expected hits of the rays, before the triangles move and after."""
-        faces, rays = self.given.faces, self.rays
-        return Truth(self.given.vertices, faces, rays), Truth(self.bent, faces, rays)
+        """The expected hits of the rays, before and after the triangles move."""
+        faces, rays = self.sets.faces, self.rays
+        return Truth(self.sets.vertices, faces, rays), Truth(self.bent, faces, rays)
 
     def _answers(self, layout: str, quality: Quality, *, moves: bool) -> str:
-        """Trace the rays through such a tree; return what is wrong with its hits, or ""."""
-        queue, given = self.device.queue, self.given
-        tree = self.accel(queue, given.vertices, given.faces, layout=layout, quality=quality)
+        """Trace the rays through such a tree; return a complaint on its hits, or ""."""
+        queue, triangles = self.device.queue, self.sets
+        tree = self.accel(
+            queue, triangles.vertices, triangles.faces, layout=layout, quality=quality
+        )
         if moves:
             tree.update(self.bent)
         hits, _ = Traced(self.device, self.rays).closest(tree)

@@ -1,4 +1,4 @@
-"""A card of the picture benchmark to post, as SVG or PNG: its points, and what made them."""
+"""A card with the points of the picture benchmark and its device, as SVG or PNG."""
 
 from __future__ import annotations
 
@@ -6,19 +6,22 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
 from clpt.bench.figures import Figure
 from clpt.bench.pictures import ALL, PART
 from clpt.files import output_files
 
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+
 WIDTH, MARGIN, ROW, HEAD, FOOT = 640, 28, 34, 132, 60  # [pixels]
 NAMES, VALUES = 120, 96  # widths of the columns beside the bars [pixels]
 PAPER, INK, FAINT, BAR, WRONG = "#fbfaf7", "#22252b", "#6c717c", "#2f6f9f", "#b3261e"
 LONGEST = 58  # characters of a device's name
 FORMATS = (".svg", ".png")
-SCALE = 2  # pixels of a PNG for one of the SVG
+SCALE = 2  # pixels of the PNG over the SVG
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,22 @@ class Text:
     bold: bool = False
     right: bool = False
 
+    def svg(self) -> str:
+        """Return the element of an SVG."""
+        return (
+            f'<text x="{self.x}" y="{self.y}" font-size="{self.size}" fill="{self.colour}" '
+            f'font-weight="{"bold" if self.bold else "normal"}" '
+            f'text-anchor="{"end" if self.right else "start"}">{escape(self.words)}</text>'
+        )
+
+    def draw(self, drawing: ImageDraw) -> None:
+        """Draw the words on the PNG."""
+        from PIL import ImageFont  # here: slow
+
+        at, anchor = (SCALE * self.x, SCALE * self.y), "rs" if self.right else "ls"
+        font = ImageFont.load_default(SCALE * self.size)
+        drawing.text(at, self.words, self.colour, font, anchor, stroke_width=int(self.bold))
+
 
 @dataclass(frozen=True)
 class Bar:
@@ -43,17 +62,30 @@ class Bar:
     length: float
     height: int = 18
 
+    def svg(self) -> str:
+        """Return the element of an SVG."""
+        return (
+            f'<rect x="{self.x}" y="{self.y}" width="{self.length:.1f}" height="{self.height}" '
+            f'rx="3" fill="{BAR}"/>'
+        )
+
+    def draw(self, drawing: ImageDraw) -> None:
+        """Draw the bar on the PNG."""
+        left, top = SCALE * self.x, SCALE * self.y
+        corners = (left, top, left + SCALE * self.length, top + SCALE * self.height)
+        drawing.rounded_rectangle(corners, min(6.0, SCALE * self.length / 2), BAR)
+
 
 @dataclass(frozen=True)
 class Card:
-    """A card of a height, and what is drawn on it."""
+    """A card of a height, with its elements."""
 
     height: int
     drawn: Sequence[Text | Bar]
 
     def svg(self) -> str:
         """Return the card as the text of an SVG."""
-        lines = [_svg_bar(one) if isinstance(one, Bar) else _svg_text(one) for one in self.drawn]
+        lines = [element.svg() for element in self.drawn]
         return "\n".join(
             [
                 f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{self.height}" '
@@ -65,22 +97,15 @@ class Card:
         )
 
     def png(self) -> bytes:
-        """Return the card as a PNG of twice the size, in the font that Pillow brings."""
-        from PIL import Image, ImageDraw, ImageFont  # here: slow
+        """Return the card as a PNG of twice the size, in Pillow's font."""
+        from PIL import Image, ImageDraw  # here: slow
 
         image = Image.new("RGBA", (SCALE * WIDTH, SCALE * self.height))
         draw = ImageDraw.Draw(image)
         whole = (0, 0, SCALE * WIDTH - 1, SCALE * self.height - 1)
         draw.rounded_rectangle(whole, SCALE * 12, PAPER)
-        for one in self.drawn:
-            at = SCALE * one.x, SCALE * one.y
-            if isinstance(one, Bar):
-                end = at[0] + SCALE * one.length, at[1] + SCALE * one.height
-                draw.rounded_rectangle((*at, *end), min(6.0, SCALE * one.length / 2), BAR)
-            else:
-                font = ImageFont.load_default(SCALE * one.size)
-                anchor, width = "rs" if one.right else "ls", int(one.bold)
-                draw.text(at, one.words, one.colour, font, anchor, stroke_width=width)
+        for element in self.drawn:
+            element.draw(draw)
         content = io.BytesIO()
         image.save(content, "PNG")
         return content.getvalue()
@@ -96,15 +121,15 @@ class Card:
 def card(about: Mapping[str, Any], figures: Sequence[Figure]) -> Card:
     """Return the card of a device.
 
-    about: what a record tells of the device and the circumstances, see clpt.bench.records.
+    about: a record's description of device and circumstances, see clpt.bench.records.
     """
-    own = [figure for figure in figures if figure.part == PART]
-    scenes = [figure for figure in own if figure.name != ALL]
-    total = next((figure for figure in own if figure.name == ALL), None)
+    points_figures = [figure for figure in figures if figure.part == PART]
+    scenes = [figure for figure in points_figures if figure.name != ALL]
+    total = next((figure for figure in points_figures if figure.name == ALL), None)
     good = total is not None and bool(total.rounds) and not total.refused
     height = HEAD + ROW * len(scenes) + FOOT
-    size = own[0].more["size"] if own else ""
-    version = own[0].more["benchmark_version"] if own else ""
+    more = points_figures[0].more if points_figures else {"size": "", "benchmark_version": ""}
+    size, version = more["size"], more["benchmark_version"]
     label, driver = str(about.get("device", "")), str(about.get("driver", ""))
     label = label if len(label) <= LONGEST else label[: LONGEST - 1] + "…"
     points = f"{total.value:,.0f}" if good and total is not None else "no score"
@@ -119,10 +144,10 @@ def card(about: Mapping[str, Any], figures: Sequence[Figure]) -> Card:
     for i, figure in enumerate(scenes):
         drawn += _row(figure, HEAD + ROW * i, most)
     passed = sum(not figure.refused for figure in scenes)
-    told = f"{passed} of {len(scenes)} pictures verified; "
-    told += f"clpt {about.get('clpt', '')} {about.get('commit', '')}".rstrip()
-    told += f", {str(about.get('date', ''))[:10]}"
-    drawn.append(Text(MARGIN, height - 24, told, 12, FAINT))
+    summary = f"{passed} of {len(scenes)} pictures verified; "
+    summary += f"clpt {about.get('clpt', '')} {about.get('commit', '')}".rstrip()
+    summary += f", {str(about.get('date', ''))[:10]}"
+    drawn.append(Text(MARGIN, height - 24, summary, 12, FAINT))
     return Card(height, drawn)
 
 
@@ -131,7 +156,7 @@ def _points(figure: Figure) -> float:
 
 
 def _row(figure: Figure, top: int, most: float) -> list[Text | Bar]:
-    """Return a scene's name, bar and points; of a wrong one why it is refused."""
+    """Return a scene's name, bar and points, or the complaint on its picture."""
     left, base = MARGIN + NAMES, top + 18
     name = Text(MARGIN, base, figure.scene, 14, INK)
     if figure.refused:
@@ -140,18 +165,3 @@ def _row(figure: Figure, top: int, most: float) -> list[Text | Bar]:
     length = (WIDTH - left - MARGIN - VALUES) * points / most if most else 0.0
     value = Text(WIDTH - MARGIN, base, f"{points:,.0f}", 14, INK, right=True)
     return [name, Bar(left, top + 4, length), value]
-
-
-def _svg_bar(bar: Bar) -> str:
-    return (
-        f'<rect x="{bar.x}" y="{bar.y}" width="{bar.length:.1f}" height="{bar.height}" rx="3" '
-        f'fill="{BAR}"/>'
-    )
-
-
-def _svg_text(text: Text) -> str:
-    return (
-        f'<text x="{text.x}" y="{text.y}" font-size="{text.size}" fill="{text.colour}" '
-        f'font-weight="{"bold" if text.bold else "normal"}" '
-        f'text-anchor="{"end" if text.right else "start"}">{escape(text.words)}</text>'
-    )

@@ -1,4 +1,4 @@
-"""Whether hits can be right: each by itself, some against all triangles, layouts against others."""
+"""Checks of hits: each for consistency, some against all triangles, layouts with each other."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 LEAST = 0.9999  # share of rays that must agree
-PAIRS = 1 << 24  # of a ray and a triangle, that are looked at one by one
-AGREE = 2e-4  # by which distances may differ, as a share of them
+PAIRS = 1 << 24  # pairs of ray and triangle that are tested by brute force
+AGREE = 2e-4  # largest relative difference of distances
 EDGE = 1e-4  # barycentric distance to an edge below which a hit may be missed
 MISS = -1
 
 
 class Truth:
-    """Expected hits of a set of rays, which the hits of a tree are checked against.
+    """Expected hits of a set of rays, to check a tree's hits.
 
     vertices: (n, 3) float32; faces: (m, 3) uint32; rays: a clpt.bench.rays.Rays.
     """
@@ -35,7 +35,7 @@ class Truth:
         self._nearest: list[tuple[float, float]] = [self._brute(i) for i in self.sample]
 
     def closest(self, hits: Mapping[str, NDArray]) -> str:
-        """Check hits, named as in clpt.rays.Hits; return what is wrong with them, or ""."""
+        """Check hits, with the names of clpt.rays.Hits; return a complaint, or ""."""
         prim, t = hits["primitive"], hits["t"]
         unknown = (prim < MISS) | (prim >= len(self.corners))
         if unknown.any():
@@ -49,30 +49,30 @@ class Truth:
         return self._against_all(prim, t)
 
     def _on_triangles(self, hits: Mapping[str, NDArray], met: NDArray) -> NDArray:
-        """Whether the hits of rays that met anything are where their triangles are."""
+        """Return whether hits lie on their triangles."""
         v0, v1, v2 = self.corners[hits["primitive"][met]].transpose(1, 0, 2)
         u, v = hits["barycentrics"][met].astype(np.float64).T
         t = hits["t"][met].astype(np.float64)
         o, d = (a[met].astype(np.float64) for a in (self.rays.origins, self.rays.directions))
-        there = v0 + u[:, None] * (v1 - v0) + v[:, None] * (v2 - v0)
-        error = np.linalg.norm(o + t[:, None] * d - there, axis=1)
+        point = v0 + u[:, None] * (v1 - v0) + v[:, None] * (v2 - v0)
+        error = np.linalg.norm(o + t[:, None] * d - point, axis=1)
         inside = (u > -1e-3) & (v > -1e-3) & (u + v < 1 + 1e-3)
         return inside & (error <= 1e-4 * t + 1e-5 * self.scale) & (t <= self.rays.t_max[met])
 
     def _against_all(self, prim: NDArray, t: NDArray) -> str:
-        """The sample beside every triangle, in float64."""
+        """Compare the sample with brute force over all triangles, in float64."""
         wrong = 0
         for i, (nearest, sure) in zip(self.sample, self._nearest, strict=True):
             near = t[i] if prim[i] >= 0 else np.inf
             margin = AGREE * (nearest if np.isfinite(nearest) else 1.0) + 1e-5 * self.scale
-            # it may not be nearer than the nearest, nor farther than the nearest that is no edge's
+            # not nearer than the nearest hit, nor farther than the nearest hit inside of an edge
             wrong += not (near >= nearest - margin and (near == sure or near <= sure + margin))
         if wrong:
             return f"{wrong} of {len(self.sample)} rays tried with every triangle met another one"
         return ""
 
     def _brute(self, i: int) -> tuple[float, float]:
-        """The nearest distance of a ray, and the nearest of hits that are no edge's; inf: none."""
+        """Return a ray's nearest hit, and its nearest hit off edges [distance]; inf: none."""
         o, d = self.rays.origins[i].astype(np.float64), self.rays.directions[i].astype(np.float64)
         turned = np.cross(o, d)
         with np.errstate(all="ignore"):
@@ -91,7 +91,7 @@ class Truth:
 
 
 def differ(hits: Mapping[str, NDArray], others: Mapping[str, NDArray]) -> str:
-    """Compare the hits of the same rays in two layouts; return what is wrong, or ""."""
+    """Compare the hits of the same rays in two layouts; return a complaint, or ""."""
     met, theirs = hits["primitive"] >= 0, others["primitive"] >= 0
     with np.errstate(invalid="ignore"):
         near = np.abs(hits["t"] - others["t"]) <= AGREE * others["t"]
@@ -100,7 +100,7 @@ def differ(hits: Mapping[str, NDArray], others: Mapping[str, NDArray]) -> str:
 
 
 def any_hit(met: NDArray, hits: Mapping[str, NDArray]) -> str:
-    """Compare any-hit answers (n,), 0 or 1, with the closest hits; return what is wrong, or ""."""
+    """Compare any-hit answers (n,), 0 or 1, with closest hits; return a complaint, or ""."""
     if (met > 1).any():
         return f"{(met > 1).sum():,} of {len(met):,} rays were not traced"
     share = float(((met != 0) == (hits["primitive"] >= 0)).mean())

@@ -1,4 +1,4 @@
-"""Figures beside those of a record: of before, or of another device."""
+"""Comparison of figures with records: of earlier runs, or of another device."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _KEY = ("bench", "scene", "figure", "unit", "mode", "size", "benchmark_version")
 
 @dataclass(frozen=True)
 class Ratio:
-    """A figure that is measured now beside the same figure in a record.
+    """A measured figure beside the same figure in a record.
 
-    ratio: above 1 where it is better now, whatever the unit; noise: by which it may be off, from
-    the spread of both; then: the record.
+    ratio: above 1 if the new figure is better, in any unit; noise: relative uncertainty, from the
+    spread of both; then: the record.
     """
 
     figure: Figure
@@ -28,7 +28,7 @@ class Ratio:
     noise: float
 
     def below(self, limit: float) -> bool:
-        """Whether it is below a limit by more than noise."""
+        """Return whether the ratio is below a limit by more than noise."""
         return self.ratio * (1.0 + self.noise) < limit
 
 
@@ -38,23 +38,23 @@ def key(record: Row) -> tuple[Any, ...]:
 
 
 def against(figures: Iterable[Figure], records: Iterable[Row], device: str) -> list[Ratio]:
-    """Ratios of the figures that the records have too, the newest of each.
+    """Return ratios of the figures to the newest record of each.
 
-    device: the label of the one that was measured; its own records go before those of others.
-    Raises SceneError if there are none.
+    device: label of the measured device, whose records precede other devices'. Raises
+    SceneError if no figure has a record.
     """
     then: dict[tuple[Any, ...], Row] = {}
     for record in sorted(records, key=lambda record: record.get("device") == device):
         if isinstance(record.get("value"), (int, float)) and "figure" in record:
             then[key(record)] = record
-    found = [
+    ratios = [
         _ratio(figure, then[key(figure.record())])
         for figure in figures
         if figure.rounds and not figure.refused and key(figure.record()) in then
     ]
-    if not found:
+    if not ratios:
         raise SceneError("the record to compare with has none of the figures that were measured")
-    return found
+    return ratios
 
 
 def _ratio(figure: Figure, then: Row) -> Ratio:

@@ -1,4 +1,4 @@
-"""A figure: what was measured in rounds, how much it scatters, and whether it can be true."""
+"""Figures: quantities measured in rounds, with their spread and plausibility."""
 
 from __future__ import annotations
 
@@ -11,18 +11,17 @@ from typing import Any
 import numpy as np
 
 from clpt import device
-from clpt.device.timing import Timings
+from clpt.device.stream import Timings
 
-SECONDS = "s"  # the one unit of which less is better
+SECONDS = "s"  # the only unit where less is better
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One measured quantity.
+    """A measured quantity.
 
-    part: what measured it, a name in clpt.bench.PARTS; name: tells it from others of the part;
-    scene: what it was measured on, or ""; rounds: what each round gave; more: what belongs to it,
-    as JSON takes it; refused: why it cannot be true, or "".
+    part: a name in clpt.bench.PARTS; name: unique in the part; scene: its name, or ""; rounds: the
+    value of each round; more: further JSON values; refused: why it cannot be true, or "".
     """
 
     part: str
@@ -54,13 +53,13 @@ class Figure:
         )
 
     def record(self) -> dict[str, Any]:
-        """Return this figure as a record of values that JSON can hold; refused, without a value."""
-        own: dict[str, Any] = {"scene": self.scene} if self.scene else {}
+        """Return this figure as JSON values; a refused figure has no value."""
+        optional: dict[str, Any] = {"scene": self.scene} if self.scene else {}
         if self.refused:
-            own["refused"] = self.refused
+            optional["refused"] = self.refused
         return {
             "bench": self.part,
-            **own,
+            **optional,
             "figure": self.name,
             "unit": self.unit,
             "value": self.value if self.rounds and not self.refused else None,
@@ -71,14 +70,14 @@ class Figure:
 
 
 def rates(items: float | Sequence[float], seconds: Iterable[float]) -> tuple[float, ...]:
-    """Millions a second, of each round."""
+    """Return millions a second of each round."""
     taken = np.asarray(list(seconds))
     return tuple((np.asarray(items) * 1e-6 / taken).tolist())
 
 
 @dataclass(frozen=True)
 class Taken:
-    """Seconds by the device's clock, and by the host's until the device was done."""
+    """Seconds by the device's clock, and by the host's clock until the device had ended."""
 
     device: float
     host: float
@@ -97,13 +96,13 @@ def timed(on: device.Device, enqueue: Callable[[], Iterable[Any]]) -> Taken:
 
 
 def clock_complaint(taken: Iterable[Taken]) -> str:
-    """Why the device's clock cannot be right, or "": it stands still, or outruns the host's."""
-    for one in taken:
-        if not one.device > 0.0:
+    """Return why the device's clock is wrong, or "": it stands still, or outruns the host's."""
+    for seconds in taken:
+        if not seconds.device > 0.0:
             return "the device's clock tells that it took no time"
-        if one.device > 1.1 * one.host + 1e-3:
+        if seconds.device > 1.1 * seconds.host + 1e-3:
             return (
-                f"the device's clock tells {one.device:.3g} s "
-                f"of what took {one.host:.3g} s by the host's"
+                f"the device's clock tells {seconds.device:.3g} s "
+                f"of what took {seconds.host:.3g} s by the host's"
             )
     return ""

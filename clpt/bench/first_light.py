@@ -1,7 +1,7 @@
-"""First light: what to run on a device that nobody has tried, and the report of it.
+"""First light: checks of an untried device, and their report.
 
-Each check is a process of its own, so that a crash or a hang is a row. The report is one Markdown
-file: what works, what is wrong, how fast it is, what to report and to whom, and the records.
+Each check runs in a separate process, so that a crash or a hang becomes a row. The report is a
+Markdown file: results, speeds, faults to report with the right tracker, and the records.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from clpt.bench import agreement, apart, pictures, records
 from clpt.bench.figures import Figure
 from clpt.bench.picture_scenes import PICTURES
 
-MOST_HANGS = 2  # after which nothing else is tried
-TRACKERS = {  # of drivers, by a word of the platform's, the device's or the version's name
+MOST_HANGS = 2  # no further check is tried after these
+TRACKERS = {  # by a word of the platform, the device or the version
     "pocl": "PoCL: https://github.com/pocl/pocl/issues",
     "rusticl": "Mesa: https://gitlab.freedesktop.org/mesa/mesa/-/issues",
     "clover": "Mesa: https://gitlab.freedesktop.org/mesa/mesa/-/issues",
@@ -43,7 +43,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Result:
-    """The end of a check: figures, some of which may be refused, the device, and seconds."""
+    """The result of a check: figures, perhaps refused, the device, and seconds."""
 
     check: Check
     about: apart.About
@@ -56,8 +56,8 @@ class Result:
         return [figure for figure in self.figures if figure.refused]
 
     @property
-    def told(self) -> str:
-        """Say what became of it, in a line."""
+    def summary(self) -> str:
+        """The result as a line."""
         if self.wrong:
             more = f" (and {len(self.wrong) - 1} more)" if len(self.wrong) > 1 else ""
             return f"{self.wrong[0].name}: {self.wrong[0].refused}{more}"
@@ -65,35 +65,35 @@ class Result:
 
 
 def checks() -> list[Check]:
-    """Return all checks, in their order: what others rest on comes first."""
+    """Return all checks in their order: basic checks first."""
     alone: dict[str, Any] = {"rounds": 1}
-    found = [
+    all_checks = [
         Check("memory and clock", {**alone, "parts": ["bandwidth"]}),
         Check("rays and trees", {**alone, "parts": ["rays"], "scene": "cornell", "count": 4096}),
     ]
     for name, kept in PICTURES.items():
         stages = {"parts": [agreement.PART], "scene": name, "mode": kept.mode}
-        found.append(Check(f"stages of {name}", {**alone, **stages}))
+        all_checks.append(Check(f"stages of {name}", {**alone, **stages}))
     for name in PICTURES:
-        own = {"parts": [pictures.PART], "scene": name, "size": "quick"}
-        found.append(Check(f"picture of {name}", {**alone, **own}))
-    found.append(Check("building trees", {**alone, "parts": ["build"], "scene": "atrium"}))
-    found.append(Check("first picture", {**alone, "parts": ["start"], "scene": "cornell"}))
-    return found
+        settings = {"parts": [pictures.PART], "scene": name, "size": "quick"}
+        all_checks.append(Check(f"picture of {name}", {**alone, **settings}))
+    all_checks.append(Check("building trees", {**alone, "parts": ["build"], "scene": "atrium"}))
+    all_checks.append(Check("first picture", {**alone, "parts": ["start"], "scene": "cornell"}))
+    return all_checks
 
 
-def run(which: str | int | None, limit: float, given: Iterable[Check]) -> Iterator[Result]:
-    """Run checks on a device; yield each result. Stop where no device opens, or all hangs.
+def run(which: str | int | None, limit: float, checks: Iterable[Check]) -> Iterator[Result]:
+    """Run checks on a device; yield results. Stop if no device opens, or after MOST_HANGS.
 
-    which: as clpt.device.choose takes it; limit: seconds that may pass without a figure.
+    which: see clpt.device.choose; limit: seconds without a figure.
     """
     hangs = 0
-    for check in given:
+    for check in checks:
         start = time.monotonic()
         label = str(which) if which is not None else "the default device"
-        told = list(apart.measured(which, label, check.settings, limit))
-        about = told[-1][0] if told else {"device": label}
-        figures = [figure for _, figure in told]
+        measured = list(apart.measured(which, label, check.settings, limit))
+        about = measured[-1][0] if measured else {"device": label}
+        figures = [figure for _, figure in measured]
         result = Result(check, about, figures, time.monotonic() - start)
         yield result
         hangs += any(figure.part == apart.PART and apart.HANGS in figure.refused
@@ -103,14 +103,14 @@ def run(which: str | int | None, limit: float, given: Iterable[Check]) -> Iterat
 
 
 def tracker(about: Mapping[str, Any]) -> str:
-    """Return where faults of a device's driver are reported."""
+    """Return the tracker for faults of a device's driver."""
     words = f"{about.get('device', '')} {about.get('opencl', '')}".casefold()
     return next((to for word, to in TRACKERS.items() if word in words), NOBODY)
 
 
 def report(results: Sequence[Result], total: int) -> str:
-    """Return the report, as Markdown; total: how many checks there are."""
-    about = next((one.about for one in results if "opencl" in one.about), results[0].about)
+    """Return the report as Markdown; total: the number of checks."""
+    about = next((r.about for r in results if "opencl" in r.about), results[0].about)
     host = records.circumstances()
     rows = [f"# First light of {about['device']}", ""]
     facts = {**about, **{name: host[name] for name in ("processor", "cores", "clpt", "commit")}}
@@ -118,29 +118,29 @@ def report(results: Sequence[Result], total: int) -> str:
     rows += [f"| {name} | {value} |" for name, value in facts.items() if value != ""]
     rows += _works(results, total) + _speeds(results)
     rows += ["", "## What to report, and to whom", ""]
-    rows += advice([one for one in results if one.wrong], about)
+    rows += advice([result for result in results if result.wrong], about)
     rows += ["", "## Records", "", "```json"]
-    for one in results:
-        for figure in one.figures:
-            record = {**host, **figure.record(), **one.about}
+    for result in results:
+        for figure in result.figures:
+            record = {**host, **figure.record(), **result.about}
             rows.append(json.dumps({"bench": figure.part, **record}))
     return "\n".join([*rows, "```", ""])
 
 
 def _works(results: Sequence[Result], total: int) -> list[str]:
-    """Return the rows of what works, and what is wrong."""
-    right = sum(not one.wrong for one in results)
+    """Return the rows of checks with their results."""
+    right = sum(not result.wrong for result in results)
     rows = ["", "## What works, and what is wrong", ""]
     rows.append(f"{right} of {total} checks are right; {total - len(results)} were not tried.")
     rows += ["", "| check | | seconds |", "| --- | --- | --- |"]
-    rows += [f"| {one.check.name} | {_cell(one.told)} | {one.seconds:.0f} |" for one in results]
+    rows += [f"| {r.check.name} | {_cell(r.summary)} | {r.seconds:.0f} |" for r in results]
     return rows
 
 
 def _speeds(results: Sequence[Result]) -> list[str]:
-    """Return the rows of how fast it is."""
+    """Return the rows of speeds."""
     rows = ["", "## How fast", "", "| figure | | |", "| --- | --- | --- |"]
-    for figure in (figure for one in results for figure in one.figures):
+    for figure in (figure for result in results for figure in result.figures):
         if figure.rounds and not figure.refused and figure.part != agreement.PART:
             scene = f" of {figure.scene}" if figure.scene and figure.scene != figure.name else ""
             named = f"{figure.part}{scene}: {figure.name}"
@@ -149,13 +149,13 @@ def _speeds(results: Sequence[Result]) -> list[str]:
 
 
 def advice(bad: Sequence[Result], about: Mapping[str, Any]) -> list[str]:
-    """Return what to do about results that are wrong, a row of a list each."""
+    """Return advice on wrong results, a list item each."""
     if not bad:
         return ["- Nothing is wrong. Send this file to clpt with an issue: the device is new."]
     to = tracker(about)
     rows: dict[str, None] = {}
-    for one in bad:
-        scene, wrong = one.check.settings.get("scene", "cornell"), one.wrong[0]
+    for result in bad:
+        scene, wrong = result.check.settings.get("scene", "cornell"), result.wrong[0]
         if wrong.part == agreement.PART:
             todo = f"`clpt kernels {scene} -o fault --repro {wrong.name}` writes a program that "
             todo += f"shows it without clpt. Send that folder to {to}"
@@ -168,7 +168,7 @@ def advice(bad: Sequence[Result], about: Mapping[str, Any]) -> list[str]:
             todo += f"Send that, and the words above, to {to}"
         else:
             todo = "send this file to clpt first: it may be either's fault"
-        rows[f"- {one.check.name}: {todo}."] = None
+        rows[f"- {result.check.name}: {todo}."] = None
     return [*rows, "- Send this file to clpt with an issue, in any case."]
 
 

@@ -1,4 +1,4 @@
-"""Paths in flight: a wavefront whose bounces are run one stage at a time, and looked into."""
+"""A wavefront whose stages run singly, with access to its paths."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _TYPES = {"integer": np.int32, "natural": np.uint32}
 
 
 class Flight:
-    """A scene's paths in flight, a slot for about every pixel: a picture in small.
+    """A scene's paths in flight, with about a slot for each pixel of a small picture.
 
-    slots: paths in flight, by default what a render on the device has. The other parameters are
-    those of clpt.render.wavefront.wavefront.Wavefront.create. Raises as that does.
+    slots: paths in flight, by default the number of a render on the device. Other parameters and
+    errors: see clpt.render.wavefront.wavefront.Wavefront.create.
     """
 
     def __init__(self, on: device.Device, scene: Scene, slots: int | None = None, **wavefront: Any):
@@ -44,15 +44,15 @@ class Flight:
         self.restart()
 
     def restart(self) -> None:
-        """Empty the film, and let every slot begin at its first sample."""
+        """Empty the film, and restart every slot at its first sample."""
         self.wavefront.clear()
         self.wavefront.paths.restart()
         self.wavefront.stages[0].bound.set_args(samples=(0, ENDLESS))
 
     def bounce(self, around: Callable[[Step, Callable[[], Any]], Any] | None = None) -> None:
-        """Enqueue the stages of one bounce.
+        """Enqueue the stages of a bounce.
 
-        around: called with each stage and what enqueues it, which it must call.
+        around: called with each stage and its `enqueue`, which it must call.
         """
         for step in self.wavefront.stages:
             self.stage(step, around)
@@ -60,7 +60,7 @@ class Flight:
     def stage(
         self, step: Step, around: Callable[[Step, Callable[[], Any]], Any] | None = None
     ) -> None:
-        """Enqueue one stage; around: see `bounce`."""
+        """Enqueue a stage; around: see `bounce`."""
 
         def enqueue() -> Any:
             return self.wavefront.stream.run(step.bound, step.size, step.group)
@@ -71,7 +71,7 @@ class Flight:
             around(step, enqueue)
 
     def read(self, record: Record, name: str) -> NDArray:
-        """A member of all slots: (slots,), or (slots, components)."""
+        """Return a member of all slots: (slots,), or (slots, components)."""
         member = next(m for m in record.members if m.name == name)
         wave = self.wavefront
         buffer = wave.paths.arguments[f"{record.name.lower()}_words"]
@@ -92,7 +92,7 @@ class Flight:
 
     @property
     def waiting(self) -> NDArray[np.bool_]:
-        """Which slots begin a path in the next bounce, once theirs is over or missed all."""
+        """Which slots begin a path in the next bounce: their path has ended or left the scene."""
         state = self.read(PATH, "state")
         alive = (state & ALIVE) != 0
         missed = alive & ((state & FRESH) == 0) & (self.read(HIT, "prim") < 0)
@@ -100,12 +100,12 @@ class Flight:
 
     @property
     def shadowed(self) -> NDArray[np.bool_]:
-        """Which slots have a ray to a light that waits to be tested."""
+        """Which slots have an untested shadow ray."""
         return self.read(SHADOW, "t") > 0.0
 
     @property
     def kinds(self) -> NDArray[np.int32]:
-        """The kind of material that each slot waits for, in the order of the features; or -1."""
+        """The kind of material at each slot's hit, in the order of the features; or -1."""
         word = self.read(HIT, "material").view(np.uint32)
         return np.where(self.met, (word >> 24).astype(np.int32), -1)
 

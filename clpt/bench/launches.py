@@ -1,9 +1,9 @@
-"""Launches of kernels: all that a stage is given and what it makes of that, to be run again.
+"""Launches of kernels with all input and output words, to be repeated.
 
-A stage that is launched again on another device, or by a program that its compiler did not
-optimise, must write the same words but for rounding. Which words may differ, and by how much, is a
-number for each, its margin m: m >= 0 compares floats, which may differ by m; below, whole numbers
-modulo 2^32 that may differ by -1 - m. A word of infinite margin is not compared.
+A repeated launch on another device, or by a program without optimisation, must write the same words
+up to rounding. Each word has a margin m: for m >= 0 the words are floats that may differ by m; for
+m < 0 they are whole numbers modulo 2^32 that may differ by -1 - m. Words of infinite margin are not
+compared.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from clpt.records import SLABS
 from clpt.render.flow import programs
 from clpt.render.wavefront.bounce_loop import Step
 
-PLAIN = ("-cl-opt-disable",)  # options of a compiler that shall not optimise
-ROUNDING = 1e-3  # by which a float may differ, of itself and of the mean size of its like
+PLAIN = ("-cl-opt-disable",)  # compiler options against optimisation
+ROUNDING = 1e-3  # margin of a float, over its size plus the mean size of its member
 EXACT, FREE = -1.0, np.inf  # margins
-MOST_OFF = 0.01  # of the words that a launch changes: paths whose choices hang on a rounding
-FREE_MEMBERS = ("low", "high", "cone")  # digits that follow from others; halves of a word
-COUNTS = ("queue_starts", "queue_counts")  # what else is compared; the order in queues is free
+MOST_OFF = 0.01  # of a launch's changed words: a rounding may decide a path's choice
+FREE_MEMBERS = ("low", "high", "cone")  # low digits of sums; packed halves
+COUNTS = ("queue_starts", "queue_counts")  # other compared buffers; the order in queues is free
 
 
 @dataclass(frozen=True, eq=False)
 class Launch:
     """A launch of a kernel.
 
-    stage: its name in a bounce; text: of its program; size, group: numbers of work-items;
-    before, after: the words of each buffer by the argument's name; values: the other arguments as
-    bytes, None for a null pointer; margins: of the words that are compared, by buffer.
+    stage: its name in a bounce; text: of its program; size, group: numbers of work-items; before,
+    after: the words of each buffer by argument; values: other arguments as bytes, None for a null
+    pointer; margins: of the compared words, by buffer.
     """
 
     stage: str
@@ -72,16 +72,16 @@ class Launch:
         return after
 
     def expecting(self, after: Mapping[str, Words], flight: Flight) -> Launch:
-        """Return this launch with other words after it, and their margins."""
+        """Return this launch with other output words and their margins."""
         margins = {name: _margins(flight, name, after[name]) for name in self.margins}
         return dataclasses.replace(self, after={**self.after, **after}, margins=margins)
 
-    def compare(self, found: Mapping[str, Words]) -> Comparison:
-        """Compare what a device has made of this launch with the words after it."""
+    def compare(self, words: Mapping[str, Words]) -> Comparison:
+        """Compare a device's output words with this launch's."""
         changed, off = 0, {}
         for name, margins in self.margins.items():
             expected = self.after[name]
-            which = is_off(found[name], expected, margins)
+            which = is_off(words[name], expected, margins)
             changed += int(((self.before[name] != expected) & (margins != FREE)).sum())
             off[name] = np.flatnonzero(which)
         return Comparison(self.stage, changed, off)
@@ -89,7 +89,7 @@ class Launch:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A launch beside another: how many words it should change, and those that are off."""
+    """A comparison of launches: the number of changed words, and the indices of wrong words."""
 
     stage: str
     changed: int
@@ -97,18 +97,18 @@ class Comparison:
 
     @property
     def share(self) -> float:
-        """Words that are off, over those that the launch changes; at most 1."""
+        """Wrong words over changed words, at most 1."""
         count = sum(map(len, self.off.values()))
         return min(count / max(self.changed, 1), 1.0)
 
     @property
     def wrong(self) -> bool:
-        """Whether more words are off than rounding explains."""
+        """Whether rounding cannot explain all wrong words."""
         return self.share > MOST_OFF
 
 
 def launches(flight: Flight) -> Iterator[Launch]:
-    """Run a bounce; yield the launch of each stage, before the next one runs."""
+    """Run a bounce; yield the launch of each stage before the next stage runs."""
     wave = flight.wavefront
     loop, chosen = wave.loops[-1], wave.scene.strategy
     texts = programs.sources(
@@ -121,11 +121,11 @@ def launches(flight: Flight) -> Iterator[Launch]:
 
 def _launch(flight: Flight, step: Step, text: device.Source) -> Launch:
     """Run a stage; return its launch."""
-    kernel, given = step.bound.kernel, step.bound.values
+    kernel, bound = step.bound.kernel, step.bound.values
     buffers: dict[str, Any] = {}
     values: dict[str, bytes | None] = {}
     for argument in kernel.arguments:
-        value = given[argument.name]
+        value = bound[argument.name]
         if argument.by_value:
             values[argument.name] = np.asarray(value).tobytes()
         elif value is None:
@@ -149,29 +149,29 @@ def _words(flight: Flight, buffer: Any) -> Words:
     return flight.wavefront.stream.read(buffer, np.empty(buffer.size // 4, np.uint32))
 
 
-def is_off(found: Words, expected: Words, margins: NDArray[np.float32]) -> NDArray[np.bool_]:
+def is_off(words: Words, expected: Words, margins: NDArray[np.float32]) -> NDArray[np.bool_]:
     """Return which words differ by more than their margins."""
     with np.errstate(all="ignore"):
-        apart = np.abs(found.view(np.float32) - expected.view(np.float32))
+        apart = np.abs(words.view(np.float32) - expected.view(np.float32))
         near = apart <= margins
-        both_nan = np.isnan(found.view(np.float32)) & np.isnan(expected.view(np.float32))
-        steps = np.abs((found - expected).view(np.int32).astype(np.float64))
+        both_nan = np.isnan(words.view(np.float32)) & np.isnan(expected.view(np.float32))
+        steps = np.abs((words - expected).view(np.int32).astype(np.float64))
     floats = (near | both_nan) & (margins >= 0)
     whole = (steps <= -1.0 - margins.astype(np.float64)) & (margins < 0)
-    return np.asarray((found != expected) & ~floats & ~whole & (margins != FREE))
+    return np.asarray((words != expected) & ~floats & ~whole & (margins != FREE))
 
 
 def _margins(flight: Flight, name: str, expected: Words) -> NDArray[np.float32]:
     """Return the margin of each word of a buffer."""
     margins: NDArray[np.float32] = np.full(len(expected), EXACT, np.float32)
-    record = next((one for one in SLABS if f"{one.name.lower()}_words" == name), None)
+    record = next((slab for slab in SLABS if f"{slab.name.lower()}_words" == name), None)
     if record is None:
         return margins
-    rows, own = rows_of(flight, record, expected), rows_of(flight, record, margins)
+    rows, limits = rows_of(flight, record, expected), rows_of(flight, record, margins)
     for member in record.members:
         for word in range(member.word, member.word + member.words):
             digit = ("low", "middle", "high")[word - member.word] if member.type == "fixed" else ""
-            own[:, word] = _of_member(digit or member.name, member.type, rows[:, word])
+            limits[:, word] = _member_margins(digit or member.name, member.type, rows[:, word])
     return margins
 
 
@@ -182,8 +182,8 @@ def rows_of(flight: Flight, record: Record, words: NDArray) -> NDArray:
     return words.reshape(1, record.step, -1)
 
 
-def _of_member(name: str, kind: str, words: NDArray[np.uint32]) -> NDArray:
-    """Return the margins of a word of all slots."""
+def _member_margins(name: str, kind: str, words: NDArray[np.uint32]) -> NDArray:
+    """Return the margins of a member's word for all slots."""
     if name in FREE_MEMBERS:
         return np.full(words.shape, FREE)
     if name == "middle":  # of a sum in units of 2^-48: this word counts units of 2^-16

@@ -2,9 +2,9 @@
 
     python -m clpt.bench.make_references [SCENE...]
 
-takes four minutes of a processor's time; scenes that are not named stay as they are in the file.
-The device should be a well-tried one, and its pictures are to be looked at. Each scene is rendered
-RENDERS times, with seeds that no measurement uses.
+takes four minutes of processor time; unnamed scenes stay as they are in the file. Use a well-tested
+device, and look at its pictures. Each scene is rendered RENDERS times, with seeds that no
+measurement uses.
 """
 
 from __future__ import annotations
@@ -41,26 +41,28 @@ def main(names: Sequence[str]) -> None:
 
 def render(on: device.Device, name: str) -> Reference:
     """Render the reference of a scene."""
-    scene, found = picture(name, SIZE), []
+    scene, renders = picture(name, SIZE), []
     with Renderer(scene, on) as renderer:
         renderer.run(SIZES[SIZE].samples)
         films = {SIZE: film_digest(renderer), "class": film_class(renderer)}
         for number in range(RENDERS):
             renderer.update(scene=dataclasses.replace(scene, seed=FIRST_SEED + number))
             renderer.run(SAMPLES)
-            found.append(regions(renderer.image()))
+            renders.append(regions(renderer.image()))
     samples = Size(SIZES[SIZE].side, SAMPLES).all_samples
-    return Reference(np.mean(found, 0), np.std(found, 0, ddof=1), RENDERS, samples, films)
+    return Reference(np.mean(renders, 0), np.std(renders, 0, ddof=1), RENDERS, samples, films)
 
 
 def write(kept: dict[str, Reference], label: str) -> None:
-    """Write references to the file; label: of the device that made them."""
+    """Write references to the file; label: of their device."""
     arrays: dict[str, Any] = {}
     scenes: dict[str, dict[str, object]] = {}
-    for name, one in kept.items():
-        arrays[f"{name}_mean"] = one.mean.astype(np.float32)
-        arrays[f"{name}_deviation"] = one.deviation.astype(np.float32)
-        scenes[name] = {"count": one.count, "samples": one.samples, "films": one.films}
+    for name, reference in kept.items():
+        arrays[f"{name}_mean"] = reference.mean.astype(np.float32)
+        arrays[f"{name}_deviation"] = reference.deviation.astype(np.float32)
+        scenes[name] = {
+            "count": reference.count, "samples": reference.samples, "films": reference.films,
+        }  # fmt: skip
     about = {"version": BENCHMARK_VERSION, "device": label, "scenes": scenes}
     np.savez_compressed(FILE, about=np.array(json.dumps(about)), **arrays)
 

@@ -1,7 +1,7 @@
-"""Fixed scenes and sizes of the picture benchmark, and the speeds that points stand for.
+"""Fixed scenes and sizes of the picture benchmark, and the speeds of 1000 points.
 
-A change to anything here or to the scenes changes what is measured: then BENCHMARK_VERSION rises,
-and `python -m clpt.bench.make_references` makes the references anew.
+After a change here or to the scenes, raise BENCHMARK_VERSION and write new references by
+`python -m clpt.bench.make_references`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from clpt.bench.scenes import made
+from clpt.bench.scenes import build_scene
 from clpt.scene import Scene
 from clpt.scene.integrators import Box, Film
 
@@ -38,7 +38,7 @@ class Kept:
 
 
 SIZES = {"quick": Size(128, 64), "standard": Size(384, 64), "large": Size(1024, 128)}
-PICTURES = {  # speeds: about those of two cores with AVX-512, by PoCL
+PICTURES = {  # speeds of about two cores with AVX-512, by PoCL
     "cornell": Kept("rgb", 10.0),
     "atrium": Kept("rgb", 1.0),
     "spheres": Kept("rgb", 20.0),
@@ -48,10 +48,10 @@ PICTURES = {  # speeds: about those of two cores with AVX-512, by PoCL
 
 
 def picture(name: str, size: str, seed: int = 0) -> Scene:
-    """Return a scene of PICTURES with a film of one of SIZES, each pixel a mean over its square.
+    """Return a scene of PICTURES with a box filter and a film whose size is a key of SIZES.
 
     Raises UnknownKindError for a scene that the benchmark does not have.
     """
-    scene, side = made(name), SIZES[size].side
+    scene, side = build_scene(name), SIZES[size].side
     film = Film(width=side, height=side, mode=PICTURES[name].mode, filter=Box())
     return dataclasses.replace(scene, film=film, seed=seed, spp=SIZES[size].samples)

@@ -1,4 +1,4 @@
-"""Pictures of fixed scenes: samples a second, each picture verified, points of each and of all."""
+"""Pictures of fixed scenes: samples a second, verification, and points."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from clpt.scene import Scene
 
 PART = "pictures"
 UNIT, POINTS = "Msamples/s", "points"
-ALL = "all scenes"  # the figure of the one number
-CHECKED_RAYS = 1024  # of a set, to find the stage that is wrong
+ALL = "all scenes"  # the name of the total's figure
+CHECKED_RAYS = 1024  # of a set, to find the wrong stage
 
 
 def measure(
     on: device.Device, rounds: int, size: str, only: Collection[str] = ()
 ) -> Iterator[Figure]:
-    """Figures of the scenes of PICTURES in one of SIZES, then their score if all are measured.
+    """Yield figures of the scenes of PICTURES, then their score if all are measured.
 
-    only: names of scenes, all by default. Raises DeviceError.
+    size: a key of SIZES; only: names of scenes, by default all. Raises DeviceError.
     """
     figures = []
     plain = device.Device.open(on.info)  # a render is not profiled
@@ -44,7 +44,7 @@ def measure(
 
 
 def score(figures: Sequence[Figure], size: str) -> Figure:
-    """Return the one number: the geometric mean of the scenes' points; refused if one is wrong."""
+    """Return the geometric mean of the scenes' points, refused if any picture is wrong."""
     wrong = [figure.scene for figure in figures if figure.refused or not figure.rounds]
     more = {"size": size, "benchmark_version": BENCHMARK_VERSION}
     if wrong:
@@ -56,7 +56,7 @@ def score(figures: Sequence[Figure], size: str) -> Figure:
 
 
 def _measure(on: device.Device, plain: device.Device, name: str, size: str, rounds: int) -> Figure:
-    """Measure one scene, after a round that does not count; every round makes the same film."""
+    """Measure a scene after an uncounted round; all rounds must render the same film."""
     scene, samples = picture(name, size), SIZES[size].samples
     all_samples = SIZES[size].all_samples
     start = time.perf_counter()
@@ -96,7 +96,7 @@ def _measure(on: device.Device, plain: device.Device, name: str, size: str, roun
 def _exact(
     reference: tiles.Reference, size: str, made_by: str, films: Collection[str]
 ) -> bool | None:
-    """Whether the film is the reference's to the bit; None if another class of device made that."""
+    """Return whether the film equals the reference's; None for another device class."""
     known = reference.films.get(size)
     if known is None or reference.films["class"] != made_by:
         return None
@@ -104,9 +104,9 @@ def _exact(
 
 
 def first_wrong_stage(on: device.Device, scene: Scene, layout: str) -> str:
-    """Tell which stage is wrong: `intersect` by the check of `rays`, others by `agreement`.
+    """Return a line on the first wrong stage: `intersect` by `rays`, others by `agreement`.
 
-    on: profiling; layout: of the render's triangles.
+    on: with a profiling queue; layout: of the render's triangles.
     """
     layouts = (layout,) if layout in bvh.TREES else bvh.TREES[:1]
     try:
@@ -119,7 +119,7 @@ def first_wrong_stage(on: device.Device, scene: Scene, layout: str) -> str:
 
 
 def film_digest(renderer: Renderer) -> str:
-    """Return the SHA-256 of what the film holds."""
+    """Return the SHA-256 of the film's content."""
     state = renderer.film_state()
     hashed = hashlib.sha256(repr(state.scale).encode())
     for name, words in sorted(vars(state).items()):
@@ -129,5 +129,5 @@ def film_digest(renderer: Renderer) -> str:
 
 
 def film_class(renderer: Renderer) -> str:
-    """Return what decides the last bits of a film: the class of the device, and the kernels."""
+    """Return the device class and the kernels' digest, which decide a film's last bits."""
     return json.dumps({**renderer._device_class(), "kernels": kernels_digest()}, sort_keys=True)

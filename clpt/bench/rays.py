@@ -1,8 +1,8 @@
-"""Speed of each layout for rays of the scene itself, and a check of its hits.
+"""Speed of each layout for the scene's rays, and a check of its hits.
 
-`primary`: the camera's, in tiles of 4 x 4 pixels; `diffuse`: cosine-distributed from what those
-met; `shadow`: from there to the scene's lights, as its integrator chooses them. `closest` asks for
-the nearest triangle, `any` whether there is one.
+`primary`: camera rays, in tiles of 4 x 4 pixels; `diffuse`: cosine-distributed from their hits;
+`shadow`: from their hits to lights that the integrator samples. `closest` asks for the nearest
+triangle, `any` for any hit.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from clpt.render.wavefront.bounce_loop import Step
 from clpt.scene import Scene
 
 CPU_RAYS, GPU_RAYS = 1 << 16, 1 << 20
-RAY_BYTES = 28  # that a kernel reads of each ray at least
-ANSWER_BYTES = {"closest": 16, "any": 1}  # and writes
-POISON = -7  # a primitive that nothing answers
+RAY_BYTES = 28  # that a kernel reads for each ray, at least
+ANSWER_BYTES = {"closest": 16, "any": 1}  # that it writes
+POISON = -7  # an invalid primitive
 
 
 @dataclass(frozen=True)
 class Rays:
-    """Rays: origins and directions (n, 3) float32, far ends (n,) float32 in units of those."""
+    """Rays: origins and directions (n, 3) float32, far ends (n,) float32 in units of directions."""
 
     origins: NDArray[np.float32]
     directions: NDArray[np.float32]
@@ -45,7 +45,7 @@ class Rays:
 
 @dataclass(frozen=True)
 class Sets:
-    """Triangles of a scene, vertices (n, 3) float32 and faces (m, 3) uint32, and rays by set."""
+    """A scene's vertices (n, 3) float32 and faces (m, 3) uint32, and its rays by set."""
 
     vertices: NDArray[np.float32]
     faces: NDArray[np.uint32]
@@ -53,7 +53,7 @@ class Sets:
 
 
 def sets(on: device.Device, scene: Scene, count: int | None = None) -> Sets:
-    """About `count` rays of each set, from the stages of a render; sets without rays are left out.
+    """Return about `count` rays of each set, from a render's stages, without empty sets.
 
     Raises SceneError for a scene without triangles.
     """
@@ -62,20 +62,20 @@ def sets(on: device.Device, scene: Scene, count: int | None = None) -> Sets:
     vertices, faces = triangles.world(flight.wavefront.scene.lowered)
     if not len(faces):
         raise SceneError("rays are measured on triangles, and the scene has none")
-    found: dict[str, Rays] = {}
+    rays_by_set: dict[str, Rays] = {}
 
     def look(step: Step, enqueue: Callable[[], Any]) -> None:
         enqueue()
         name = step.bound.kernel.name
         if name in ("generate", "emit"):
-            found["primary"] = _path_rays(flight)
+            rays_by_set["primary"] = _path_rays(flight)
         elif name == "intersect":
-            found["diffuse"] = _diffuse(flight)
+            rays_by_set["diffuse"] = _diffuse(flight)
         elif name == "shade":
-            found["shadow"] = _shadow_rays(flight)
+            rays_by_set["shadow"] = _shadow_rays(flight)
 
     flight.bounce(look)
-    return Sets(vertices, faces, {name: rays for name, rays in found.items() if len(rays)})
+    return Sets(vertices, faces, {name: rays for name, rays in rays_by_set.items() if len(rays)})
 
 
 def _path_rays(flight: Flight) -> Rays:
@@ -90,7 +90,7 @@ def _shadow_rays(flight: Flight) -> Rays:
 
 
 def _diffuse(flight: Flight) -> Rays:
-    """Rays from what has been met, off its surface by a small share of the scene."""
+    """Return diffuse rays from hits, with a small offset from the surface."""
     which = flight.met
     o, d, n = (
         flight.read(record, name)[which].astype(np.float64)
@@ -108,7 +108,7 @@ def _diffuse(flight: Flight) -> Rays:
 
 
 class Traced:
-    """A set of rays on the device, and what a layout answers."""
+    """A set of rays on the device, for queries of layouts."""
 
     def __init__(self, on: device.Device, rays: Rays):
         self.device, self.count = on, len(rays)
@@ -117,12 +117,12 @@ class Traced:
         }
 
     def _filled(self, array: NDArray) -> device.DeviceArray:
-        there = device.DeviceArray(self.device.queue, array.shape, array.dtype)
-        there.set(array)
-        return there
+        copy = device.DeviceArray(self.device.queue, array.shape, array.dtype)
+        copy.set(array)
+        return copy
 
     def closest(self, tree: Any) -> tuple[dict[str, NDArray], Taken]:
-        """The hits by name, and what they took."""
+        """Return the hits by name, and their time."""
         n = self.count
         out = Hits(
             t=self._filled(np.full(n, np.nan, np.float32)),
@@ -135,7 +135,7 @@ class Traced:
         return {k: getattr(out, k).get() for k in ("t", "primitive", "barycentrics")}, taken
 
     def occluded(self, tree: Any) -> tuple[NDArray[np.uint8], Taken]:
-        """Whether each ray meets anything, and what that took."""
+        """Return whether each ray hits anything, and the time."""
         out = self._filled(np.full(self.count, 0xEE, np.uint8))
         taken = timed(self.device, lambda: tree.occluded(**self.named, out=out).events[-1:])
         return out.get(), taken
@@ -149,29 +149,30 @@ def measure(
     count: int | None = None,
     accel: Any = Accel,
 ) -> Iterator[Figure]:
-    """Figures of every layout, set and query, in Mrays/s; raises as `sets` does.
+    """Yield figures of every layout, set and query, in Mrays/s. Raises like `sets`.
 
-    accel: what is measured, called as clpt.rays.Accel is.
+    accel: the measured class, with the parameters of clpt.rays.Accel.
     """
-    given = sets(on, scene, count)
+    ray_sets = sets(on, scene, count)
     copying = Copying(on)
-    trees = {name: accel(on.queue, given.vertices, given.faces, layout=name) for name in layouts}
-    for name, rays in given.rays.items():
-        traced, truth = Traced(on, rays), checks.Truth(given.vertices, given.faces, rays)
+    vertices, faces = ray_sets.vertices, ray_sets.faces
+    trees = {name: accel(on.queue, vertices, faces, layout=name) for name in layouts}
+    for name, rays in ray_sets.rays.items():
+        traced, truth = Traced(on, rays), checks.Truth(vertices, faces, rays)
         taken: dict[str, list[Taken]] = {}
         hits: dict[str, dict[str, NDArray]] = {}
         wrong: dict[str, str] = {}
         for _ in range(rounds + 1):  # taking turns, so that a noisy second meets all
             for layout, tree in trees.items():
                 closest, either = f"{layout} {name} closest", f"{layout} {name} any"
-                hits[layout], one = traced.closest(tree)
-                taken.setdefault(closest, []).append(one)
-                met, one = traced.occluded(tree)
-                taken.setdefault(either, []).append(one)
+                hits[layout], seconds = traced.closest(tree)
+                taken.setdefault(closest, []).append(seconds)
+                met, seconds = traced.occluded(tree)
+                taken.setdefault(either, []).append(seconds)
                 wrong[either] = wrong.get(either) or checks.any_hit(met, hits[layout])
         first = next(iter(hits.values()))
-        for layout, found in hits.items():
-            complaint = truth.closest(found) or checks.differ(found, first)
+        for layout, answers in hits.items():
+            complaint = truth.closest(answers) or checks.differ(answers, first)
             wrong[f"{layout} {name} closest"] = complaint
         for figure, each in taken.items():
             yield _figure(figure, each, wrong[figure], copying, scene.name, len(rays))
@@ -180,8 +181,8 @@ def measure(
 def _figure(
     name: str, taken: list[Taken], wrong: str, copying: Copying, scene: str, count: int
 ) -> Figure:
-    taken = taken[1:]  # the first one compiles
-    seconds = [one.device for one in taken]
+    taken = taken[1:]  # the first compiles
+    seconds = [t.device for t in taken]
     layout, rays, query = name.split()
     nbytes = count * (RAY_BYTES + ANSWER_BYTES[query])
     slow = clock_complaint(taken) or copying.complaint(nbytes, min(seconds), nbytes)

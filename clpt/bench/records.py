@@ -1,4 +1,4 @@
-"""Where and when something was measured, and the JSON lines that keep it."""
+"""Circumstances of measurements, and records as JSON lines."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ ROOT = Path(__file__).parents[2]
 def processor() -> str:
     """Return the name of the host's processor."""
     try:
-        found = re.search(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text())
+        model = re.search(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text())
     except OSError:
-        found = None
-    return found[1].strip() if found else platform.processor() or platform.machine()
+        model = None
+    return model[1].strip() if model else platform.processor() or platform.machine()
 
 
 def vectors() -> str:
-    """The widest vector instructions of an x86 processor, which a virtual one's name may hide."""
+    """Return the widest vector instructions of an x86 processor, "" for others."""
     try:
         flags = set(Path("/proc/cpuinfo").read_text().split())
     except OSError:
@@ -39,7 +39,7 @@ def vectors() -> str:
 
 
 def commit() -> str:
-    """The commit of a checkout, with a plus sign where files differ from it; "" if installed."""
+    """Return the commit of a checkout, with a plus sign after changes; "" if installed."""
     if not (ROOT / ".git").exists():
         return ""
 
@@ -56,7 +56,7 @@ def commit() -> str:
 
 
 def version() -> str:
-    """The version of clpt that is installed; "" if it runs from a checkout that is not."""
+    """Return clpt's installed version; "" if it runs from a checkout that is not installed."""
     try:
         return metadata.version("clpt")
     except metadata.PackageNotFoundError:
@@ -64,7 +64,7 @@ def version() -> str:
 
 
 def circumstances() -> dict[str, Any]:
-    """Return the part of all records: date, version, commit, processor, its cores and its load."""
+    """Return the common part of records: date, version, commit, processor, cores and load."""
     busy = {"load": round(os.getloadavg()[0], 1)} if hasattr(os, "getloadavg") else {}
     return {
         "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
@@ -78,7 +78,7 @@ def circumstances() -> dict[str, Any]:
 
 def of_device(info: device.DeviceInfo) -> dict[str, Any]:
     """Return the part of a record that describes the device."""
-    own = info.cl_device
+    cl_device = info.cl_device
     return {
         "device": info.label,
         "kind": info.kind,
@@ -87,16 +87,16 @@ def of_device(info: device.DeviceInfo) -> dict[str, Any]:
         "compute_units": info.compute_units,
         "global_mem": info.global_mem,
         "max_alloc": info.max_alloc,
-        "local_mem": own.local_mem_size,
-        "group": own.max_work_group_size,
-        "address_align": own.mem_base_addr_align // 8,
-        "doubles": "cl_khr_fp64" in own.extensions.split(),
-        "images": bool(own.image_support),
+        "local_mem": cl_device.local_mem_size,
+        "group": cl_device.max_work_group_size,
+        "address_align": cl_device.mem_base_addr_align // 8,
+        "doubles": "cl_khr_fp64" in cl_device.extensions.split(),
+        "images": bool(cl_device.image_support),
     }
 
 
 def append(path: str | Path, rows: Iterable[dict[str, Any]]) -> None:
-    """Add records to a file of JSON lines, made where it is not there. Raises SceneError."""
+    """Append records to a file of JSON lines; create it if missing. Raises SceneError."""
     about = circumstances()
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
@@ -108,7 +108,7 @@ def append(path: str | Path, rows: Iterable[dict[str, Any]]) -> None:
 
 
 def read(path: str | Path) -> list[dict[str, Any]]:
-    """The records of a file of JSON lines. Raises SceneError, telling the line."""
+    """Return the records of a file of JSON lines. Raises SceneError with the line."""
     rows = []
     try:
         lines = Path(path).read_text(encoding="utf-8").splitlines()

@@ -1,7 +1,7 @@
-"""A launch as a program of its own, which shows a fault of a driver without clpt.
+"""A launch as a standalone program, which shows a driver's fault without clpt.
 
-The folder has the kernel's text, the words that it is given and those that are expected, and two
-hosts that run it, one in C and one in Python.
+The folder has the kernel's text, its input words, the expected output words, and a host program in
+C and in Python.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from clpt.errors import SceneError
 from clpt.files import output_files
 
 DATA = Path(__file__).parent / "data"
-HOSTS = ("launch.c", "launch.py")  # with .txt behind: they are no part of clpt
+HOSTS = ("launch.c", "launch.py")  # stored as .txt: they are no part of clpt
 _ROW = re.compile(r"^#line \d+.*$", re.MULTILINE)
-README = Template("""A launch of one OpenCL kernel, made by clpt $version.
+README = Template("""A launch of an OpenCL kernel, written by clpt $version.
 
     python launch.py [PLATFORM [DEVICE]]
     cc -std=c99 launch.c -lOpenCL -lm -o launch && ./launch [PLATFORM [DEVICE]]
@@ -33,7 +33,7 @@ nothing ran. launch.txt has the numbers of work-items and the arguments in their
 scene       $scene
 stage       $stage
 expected    by $witness
-found       $found
+device      $result
 on          $label, $opencl, driver $driver
 
 All files hold words of 32 bits in the host's order. *.margins has a float for each word, by which
@@ -43,18 +43,18 @@ whole numbers, and may differ by -1 - m. Infinite: the word is not compared.
 
 
 def write(
-    folder: Path, launch: Launch, scene: str, on: device.DeviceInfo, witness: str, found: str
+    folder: Path, launch: Launch, scene: str, on: device.DeviceInfo, witness: str, result: str
 ) -> None:
-    """Write a launch as a program of its own, with the words after it as what is expected.
+    """Write a launch as a standalone program that expects the launch's output words.
 
-    scene, witness, found: for its README. Raises SceneError where it cannot be written.
+    scene, witness, result: for its README. Raises SceneError if it cannot be written.
     """
     rows, files = _described(launch)
-    told = README.substitute(
-        version=version.described(), scene=scene, stage=launch.stage, witness=witness, found=found,
-        label=on.label, opencl=on.version, driver=on.driver,
+    readme = README.substitute(
+        version=version.described(), scene=scene, stage=launch.stage, witness=witness,
+        result=result, label=on.label, opencl=on.version, driver=on.driver,
     )  # fmt: skip
-    texts = {"launch.txt": "\n".join([*rows, ""]), "README.txt": told}
+    texts = {"launch.txt": "\n".join([*rows, ""]), "README.txt": readme}
     texts["kernel.cl"] = _ROW.sub("", launch.text.text)
     texts |= {name: (DATA / f"{name}.txt").read_text(encoding="utf-8") for name in HOSTS}
     try:
@@ -68,7 +68,7 @@ def write(
 
 
 def _described(launch: Launch) -> tuple[list[str], dict[str, bytes]]:
-    """Return the rows of launch.txt, and the files of words."""
+    """Return the rows of launch.txt, and the content of files of words."""
     rows = [" ".join(["options", *OPTIONS]), f"kernel {launch.kernel}"]
     rows.append(" ".join(["size", *map(str, launch.size)]))
     if launch.group:

@@ -1,7 +1,7 @@
-"""The scenes that come with the benchmark, made from formulas; no file is read.
+"""The benchmark's scenes, from formulas without files.
 
 `atrium`: 309 thousand triangles of three kinds of material under sun and sky; `cornell`: 32
-triangles and a lamp, which are met without a tree; the others: clpt.bench.balls.
+triangles and a lamp, traced without a tree; others: see clpt.bench.balls.
 """
 
 from __future__ import annotations
@@ -44,11 +44,12 @@ def atrium() -> Scene:
     materials |= {"floor": marble, "chains": brass, "relief": brass}
     shapes: list[Shape] = []
     for name, which in parts.items():
-        used, own = np.unique(faces[which], return_inverse=True)
-        own = own.reshape(-1, 3)
+        used, local = np.unique(faces[which], return_inverse=True)
+        local = local.reshape(-1, 3)
         if name == "floor":  # its front is up
-            own = own[:, ::-1]
-        shapes.append(Mesh(name=name, vertices=vertices[used], faces=own, material=materials[name]))
+            local = local[:, ::-1]
+        mesh = Mesh(name=name, vertices=vertices[used], faces=local, material=materials[name])
+        shapes.append(mesh)
     view = transforms.look_at((2.0, 5.5, 9.0), (40.0, 5.0, 9.5), (0, 1, 0))
     return Scene(
         camera=Perspective(fov=70.0, to_world=view),
@@ -63,7 +64,7 @@ def atrium() -> Scene:
 
 
 def cornell() -> Scene:
-    """A box with two boxes in it, under a square lamp."""
+    """A room with two boxes under a square lamp."""
     white, red, green = (
         TwoSided(front=Diffuse(reflectance=colour))
         for colour in ((0.73, 0.71, 0.68), (0.57, 0.043, 0.044), (0.105, 0.378, 0.076))
@@ -113,20 +114,20 @@ SCENES: dict[str, Callable[[], Scene]] = {
 }
 
 
-def made(name: str) -> Scene:
-    """The scene of that name. Raises UnknownKindError, telling which there are."""
+def build_scene(name: str) -> Scene:
+    """Return a scene of SCENES. Raises UnknownKindError, which lists the names."""
     if name not in SCENES:
         raise UnknownKindError("scene", name, SCENES)
     return SCENES[name]()
 
 
 def opened(name: str, mode: str | None = None) -> Scene:
-    """A scene that comes with the benchmark, or any file or folder that clpt loads.
+    """Return a scene of the benchmark, or of any file or folder that clpt loads.
 
-    mode: rgb or spectral, the scene's own by default. Raises SceneError.
+    mode: rgb or spectral, by default the scene's. Raises SceneError.
     """
     if name in SCENES:
-        scene = made(name)
+        scene = build_scene(name)
     else:
         from clpt.formats import load
 
@@ -136,7 +137,7 @@ def opened(name: str, mode: str | None = None) -> Scene:
 
 
 def in_mode(scene: Scene, mode: str | None) -> Scene:
-    """Return a scene whose light is made of rgb or spectral; None: as it is."""
+    """Return a scene in the mode rgb or spectral; unchanged for None."""
     if mode is None:
         return scene
     return dataclasses.replace(scene, film=dataclasses.replace(scene.film, mode=mode))

@@ -1,7 +1,7 @@
-"""Cost of each kind of material: items that are shaded a second, beside `diffuse`.
+"""Cost of each kind of material: shaded items a second, beside `diffuse`.
 
-A closed box of one material, so that all slots wait for that kind in every bounce. The yardstick is
-a box of constant `diffuse`, measured by turns with each of the others.
+A closed box has a single material, so that all slots shade this kind in every bounce. The yardstick
+is a box of constant `diffuse`, which takes turns with each other kind.
 """
 
 from __future__ import annotations
@@ -32,25 +32,25 @@ _SIDES = ((_X, 0), (_X, 90), (_X, 180), (_X, 270), (_Y, 90), (_Y, 270))
 
 
 def variants(cls: type[Material]) -> dict[str, Material]:
-    """Materials of a kind, by names of VARIANTS: as many as it has.
+    """Return a kind's materials by names of VARIANTS, where they exist.
 
-    constant: all defaults; textured: the first colour is an image; full: every share that is 0 by
-    default is above it, so that no lobe is left out.
+    constant: all defaults; textured: the first colour is an image; full: shares with a default of 0
+    are positive, so that no lobe is left out.
     """
-    made = {"constant": cls()}
+    materials = {"constant": cls()}
     declared, usual = params.device_params(cls), params.defaults(cls)
     colours = [n for n, p in declared.items() if p.role is REFLECTANCE and p.textured]
     if colours:
         image: dict[str, Any] = {colours[0]: _image()}
-        made["textured"] = cls(**image)
+        materials["textured"] = cls(**image)
     lobes: dict[str, Any] = {
         name: 0.3
         for name, p in declared.items()
         if p.textured and (p.low, usual[name]) == (0.0, 0.0) and p.high <= 2.0
     }
     if lobes:
-        made["full"] = cls(**lobes)
-    return made
+        materials["full"] = cls(**lobes)
+    return materials
 
 
 def _image() -> textures.Bitmap:
@@ -61,7 +61,7 @@ def _image() -> textures.Bitmap:
 
 def box(material: Material, mode: str) -> Scene:
     """A closed box of a material around the camera, with a lamp of the same material."""
-    away = transforms.translate((0, 0, -1))  # from where its front is seen
+    away = transforms.translate((0, 0, -1))  # so that its front faces the camera
     walls: list[Shape] = [
         Rectangle(
             material=material,
@@ -87,9 +87,9 @@ def measure(
     modes: Iterable[str] = MODES,
     slots: int | None = None,
 ) -> Iterator[Figure]:
-    """Figures of kinds of materials, in Mitems/s; `more` has what they are of the yardstick.
+    """Yield figures of kinds of materials, in Mitems/s; `more` has ratios to the yardstick.
 
-    kinds: names of leaf materials, all by default. Raises UnknownKindError, DeviceError.
+    kinds: names of leaf materials, by default all. Raises UnknownKindError, DeviceError.
     """
     known = {cls.kind: cls for cls in LEAVES}
     for name in kinds:
@@ -104,16 +104,16 @@ def measure(
 
 
 def _figure(name: str, flight: Flight, yardstick: Flight, rounds: int) -> Figure:
-    """A kind's figure; the yardstick's takes turns with it."""
-    for one in (flight, yardstick):
-        one.restart()
+    """Return a kind's figure, measured in turns with the yardstick."""
+    for running in (flight, yardstick):
+        running.restart()
         for _ in range(WARM):
-            one.bounce()
+            running.bounce()
     both = [(_shade(flight), _shade(yardstick)) for _ in range(rounds + 1)][1:]
-    own, others = (
+    speeds, yardstick_speeds = (
         [items * 1e-6 / t.device for items, t in side] for side in zip(*both, strict=True)
     )
-    ratio = float(np.median(np.divide(own, others)))
+    ratio = float(np.median(np.divide(speeds, yardstick_speeds)))
     mode = flight.scene.film.mode
     more = {
         "mode": mode,
@@ -122,21 +122,21 @@ def _figure(name: str, flight: Flight, yardstick: Flight, rounds: int) -> Figure
         "lanes": flight.wavefront.lanes,
         "note": f"{mode}, {ratio:.2f} of diffuse",
     }
-    figure = Figure("shading", name, "Mitems/s", tuple(own), flight.scene.name, more)
+    figure = Figure("shading", name, "Mitems/s", tuple(speeds), flight.scene.name, more)
     return figure.refuse(clock_complaint(taken for (_, taken), _ in both))
 
 
 def _shade(flight: Flight) -> tuple[int, Taken]:
-    """Items that were shaded in a few bounces, and what that took."""
-    found: list[tuple[int, Taken]] = []
+    """Return the number of items shaded in a few bounces, and the time."""
+    launches: list[tuple[int, Taken]] = []
 
     def around(step: Step, enqueue: Callable[[], Any]) -> None:
         if step.bound.kernel.name == "shade":
-            found.append((flight.items(step), timed(flight.device, lambda: [enqueue()])))
+            launches.append((flight.items(step), timed(flight.device, lambda: [enqueue()])))
         else:
             enqueue()
 
     for _ in range(BOUNCES):
         flight.bounce(around)
-    taken = Taken(sum(t.device for _, t in found), sum(t.host for _, t in found))
-    return sum(items for items, _ in found), taken
+    taken = Taken(sum(t.device for _, t in launches), sum(t.host for _, t in launches))
+    return sum(items for items, _ in launches), taken

@@ -1,8 +1,8 @@
-"""Speed of each stage of a render: items a second, and bytes a second beside those of a copy.
+"""Speed of each stage of a render: items a second, and bytes a second beside a copy's.
 
-Each stage runs on the state that the stages before have left; its items are the slots that it has
-work for. Bytes are those of clpt.bench.traffic: what it must move of each path's state, without
-the scene's tables, trees and textures.
+Each stage runs on the state that former stages have left; its items are the slots with work for it.
+clpt.bench.traffic counts the bytes: the moved state of paths, without the scene's tables, trees and
+textures.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from clpt.render.wavefront.bounce_loop import Step
 from clpt.scene import Scene
 
 QUEUEING = [kernel for kernel, *_ in queues.steps(1, 1)]
-WARM = 4  # bounces before anything is noted, so that paths of all depths are in flight
-BOUNCES = 4  # of a round: in a single one few paths may begin
+WARM = 4  # bounces before the measurement, so that paths of all depths are in flight
+BOUNCES = 4  # of a round: in a single bounce few paths may begin
 
-Work = tuple[int, Taken]  # items, and what they took
+Work = tuple[int, Taken]  # items, and their time
 
 
 def measure(
@@ -38,10 +38,10 @@ def measure(
     only: Sequence[str] = (),
     **wavefront: Any,
 ) -> Iterator[Figure]:
-    """Figures of every stage, in Mitems/s, each round a few bounces.
+    """Yield figures of every stage, in Mitems/s; a round has a few bounces.
 
-    only: names of stages, or how they begin, as `shade`; all by default.
-    wavefront: parameters of clpt.render.wavefront.wavefront.Wavefront.create; raises as that does.
+    only: names of stages, or prefixes such as `shade`; by default all.
+    wavefront: parameters of clpt.render.wavefront.wavefront.Wavefront.create, with its errors.
     """
     flight, copying = Flight(on, scene, **wavefront), Copying(on)
     for _ in range(WARM):
@@ -56,35 +56,33 @@ def measure(
         for _ in range(BOUNCES):
             flight.bounce(note)
         for name, each in noted.items():
-            noted[name] = [*each[:number], _whole(each[number:])]
+            noted[name] = [*each[:number], _round(each[number:])]
     wave = flight.wavefront
     features, layout = wave.features, wave.scene.strategy.layout
     moved = traffic(features, layout, queued=wave.scene.strategy.queued)
-    for name, found in noted.items():
-        if name not in QUEUEING and _asked(name, only):
-            yield _figure(flight, copying, name, moved[name].total, found)
-    if _asked("append", only):
+    for name, work in noted.items():
+        if name not in QUEUEING and _selected(name, only):
+            yield _figure(flight, copying, name, moved[name].total, work)
+    if _selected("append", only):
         yield _queue(flight, copying, rounds)
-    if _asked("accumulate", only):
+    if _selected("accumulate", only):
         yield _accumulate(flight, copying, rounds)
 
 
-def _whole(each: Sequence[Work]) -> Work:
-    """The bounces of a round as one, without those that had nothing to do."""
+def _round(each: Sequence[Work]) -> Work:
+    """Return the sum of a round's bounces, without idle bounces."""
     busy = [(items, taken) for items, taken in each if items]
     taken = Taken(sum(t.device for _, t in busy), sum(t.host for _, t in busy))
     return sum(items for items, _ in busy), taken
 
 
-def _asked(name: str, only: Sequence[str]) -> bool:
-    return not only or any(name == one or name.startswith(f"{one}_") for one in only)
+def _selected(name: str, only: Sequence[str]) -> bool:
+    return not only or any(name == stage or name.startswith(f"{stage}_") for stage in only)
 
 
-def _figure(
-    flight: Flight, copying: Copying, name: str, nbytes: float, found: list[Work]
-) -> Figure:
-    """Return the speed of a stage; rounds in which no slot had work for it are left out."""
-    busy = [(items, taken) for items, taken in found if items]
+def _figure(flight: Flight, copying: Copying, name: str, nbytes: float, work: list[Work]) -> Figure:
+    """Return the speed of a stage, without idle rounds."""
+    busy = [(items, taken) for items, taken in work if items]
     within = 4 * sum(record.step for record in SLABS) * flight.slots
     speeds = tuple(items * 1e-6 / taken.device for items, taken in busy)
     more: dict[str, Any] = {"stage": name, "slots": flight.slots}
@@ -109,11 +107,11 @@ def _figure(
 
 
 def _queue(flight: Flight, copying: Copying, rounds: int) -> Figure:
-    """All slots brought into queues by the kind of their material, looked at afterwards."""
+    """Sort all slots into queues by their material's kind, and check the queues."""
     on, wave = flight.device, flight.wavefront
     features, layout = wave.features, wave.scene.strategy.layout
     kinds = len(features.materials.kinds)
-    for step in wave.stages:  # so that hits wait to be shaded
+    for step in wave.stages:  # up to unshaded hits
         if step.bound.kernel.name == "shade" or step.name in QUEUEING:
             break
         flight.stage(step)
@@ -126,34 +124,36 @@ def _queue(flight: Flight, copying: Copying, rounds: int) -> Figure:
         kernel = program.kernel(name)
         bound = kernel.bind(**{a.name: named[a.name] for a in kernel.arguments})
         steps.append((bound, (size,), (group,) if group else None))
-    found = []
+    work: list[Work] = []
     for _ in range(rounds + 1):
         wave.stream.fill(named["queue"], 0xFFFFFFFF, 0, named["queue"].size)
         taken = timed(on, lambda: [wave.stream.run(*step) for step in steps])
-        found.append((flight.slots, taken))
+        work.append((flight.slots, taken))
     nbytes = traffic(features, layout, queued=True)["append"].total
-    figure = _figure(flight, copying, "append", nbytes, found[1:])
+    figure = _figure(flight, copying, "append", nbytes, work[1:])
     queue, starts, counts = (
         give.download(named[name], (named[name].size // 4,), np.uint32)
         for name in ("queue", "queue_starts", "queue_counts")
     )
     wrong = 0
     for kind in range(kinds):
-        own = queue[starts[kind] :][: counts[kind]]
+        slots = queue[starts[kind] :][: counts[kind]]
         expected = np.flatnonzero(flight.kinds == kind)
         wrong += (
-            int((np.sort(own) != expected).sum()) if len(own) == len(expected) else len(expected)
+            int((np.sort(slots) != expected).sum())
+            if len(slots) == len(expected)
+            else len(expected)
         )
     return figure.refuse(f"{wrong:,} slots are not where they belong" if wrong else "")
 
 
 def _accumulate(flight: Flight, copying: Copying, rounds: int) -> Figure:
-    """The film made into a picture; its items are pixels."""
+    """Measure the development of the film; items are pixels."""
     wave = flight.wavefront
     size = flight.scene.film.size
     nbytes = 4.0 * (FILM_WORDS + 4)
-    found = []
+    work: list[Work] = []
     for _ in range(rounds + 1):
         taken = timed(flight.device, lambda: [wave.accumulate_film()])
-        found.append((size[0] * size[1], taken))
-    return _figure(flight, copying, "accumulate", nbytes, found[1:])
+        work.append((size[0] * size[1], taken))
+    return _figure(flight, copying, "accumulate", nbytes, work[1:])

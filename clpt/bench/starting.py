@@ -1,7 +1,7 @@
-"""Whole processes: seconds until a first picture of a scene, with empty caches and with full ones.
+"""Starts of processes: seconds until a first picture, with empty and with full caches.
 
-Each is a new Python that imports clpt and renders 64x64 pixels with one sample. Cold means that
-the caches of clpt and of the drivers that are known here are empty folders.
+A new Python process imports clpt and renders 64x64 pixels with a sample each. In a cold start the
+cache folders of clpt and of known drivers are empty.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from clpt.bench.figures import SECONDS, Figure
 from clpt.errors import DeviceError
 from clpt.files import child_processes, output_files
 
-CACHES = (  # what tells clpt and drivers where to keep what they compiled
+CACHES = (  # variables for cache folders of clpt and drivers
     "HOME", "XDG_CACHE_HOME", "POCL_CACHE_DIR", "CUDA_CACHE_PATH", "cl_cache_dir",
     "NEO_CACHE_DIR", "AMD_COMGR_CACHE_DIR",
 )  # fmt: skip
@@ -30,14 +30,14 @@ SIDE = 64
 
 @dataclass(frozen=True)
 class Process:
-    """Time of a process [s]: from its start to its end, and of the processor."""
+    """A process's time from start to end, and its processor time [s]."""
 
     seconds: float
     cpu: float
 
 
 def run(command: Sequence[str], caches: Path, **environment: str) -> Process:
-    """Run a command whose caches lie in a folder. Raises DeviceError with its words if it fails."""
+    """Run a command with caches in a folder. Raises DeviceError with its last line."""
     variables = {name: str(caches / name.lower()) for name in CACHES}
     for folder in variables.values():
         os.makedirs(folder, exist_ok=True)
@@ -56,37 +56,39 @@ def run(command: Sequence[str], caches: Path, **environment: str) -> Process:
         if process.wait():
             output.seek(0)
             words = output.read().strip().splitlines()[-1:] or [f"status {process.returncode}"]
-            raise DeviceError(f"a process that was to be measured failed: {words[0]}")
+            raise DeviceError(f"a measured process failed: {words[0]}")
     return Process(seconds, cpu)
 
 
 def measure(
     scene: str, mode: str | None, device: str | int, rounds: int, name: str
 ) -> Iterator[Figure]:
-    """Figures of a cold and a warm start, in seconds.
+    """Yield figures of a cold and a warm start, in seconds.
 
-    scene: as `clpt.bench.opened` takes it; device: an index or a part of a name; name: the
-    scene's, for the figures. Raises DeviceError if a process fails.
+    scene: see `clpt.bench.opened`; device: an index or a part of a name; name: the scene's, for
+    the figures. Raises DeviceError if a process fails.
     """
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
         main = f"from {__name__} import main; main(*sys.argv[1:])"
         command = child_processes.command(main, str(report), scene, mode or "", str(device))
-        for what, times in (("cold", 1), ("warm", rounds)):
+        for kind, times in (("cold", 1), ("warm", rounds)):
             taken, stats = [], []
             for _ in range(times):
                 report.unlink(missing_ok=True)
                 taken.append(run(command, Path(folder) / "caches"))
                 stats.append(json.loads(report.read_text(encoding="utf-8")))
-            yield _figure(f"{what} start", taken, stats, name)
+            yield _figure(f"{kind} start", taken, stats, name)
 
 
 def _figure(name: str, taken: list[Process], stats: list[dict[str, Any]], scene: str) -> Figure:
     middle = sorted(range(len(taken)), key=lambda i: taken[i].seconds)[len(taken) // 2]
     more = {**stats[middle], "cpu": taken[middle].cpu}
-    figure = Figure("start", name, SECONDS, tuple(one.seconds for one in taken), scene, more)
+    figure = Figure(
+        "start", name, SECONDS, tuple(process.seconds for process in taken), scene, more
+    )
     dark = any(not fact["mean"] > 0.0 for fact in stats)
-    longer = any(fact["ready"] > one.seconds for fact, one in zip(stats, taken, strict=True))
+    longer = any(s["ready"] > process.seconds for s, process in zip(stats, taken, strict=True))
     return figure.refuse(
         "its picture is black or not finite" if dark else "",
         "it was ready later than its process ended" if longer else "",
@@ -94,7 +96,7 @@ def _figure(name: str, taken: list[Process], stats: list[dict[str, Any]], scene:
 
 
 def main(target: str, scene: str, mode: str, which: str) -> None:
-    """The process that is measured: one small picture, and what it took."""
+    """Render a small picture, and write its times: the measured process."""
     start = time.perf_counter()
     import dataclasses
 
@@ -121,12 +123,12 @@ def main(target: str, scene: str, mode: str, which: str) -> None:
 
 
 def _peak() -> int:
-    """The largest resident set of this process so far [bytes]; 0 where the system does not tell.
+    """Return the largest resident set of this process [bytes]; 0 if unknown.
 
-    getrusage would tell that of the process which started it, if that was larger.
+    getrusage would report the parent's, if that was larger.
     """
     try:
-        found = re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text())
+        peak = re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text())
     except OSError:
-        found = None
-    return int(found[1]) * 1024 if found else 0
+        peak = None
+    return int(peak[1]) * 1024 if peak else 0

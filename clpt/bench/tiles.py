@@ -1,10 +1,10 @@
-"""Whether a picture is right: means of its tiles beside those of a reference, by Student's t.
+"""Verification of pictures: tile means beside a reference's, by Student's t.
 
-A reference is the mean and the standard deviation over `count` renders of one size with seeds of
-their own. The mean of a tile in a further render, of r times as many samples, has by the same
-deviation s the variance s^2 (1 / r + 1 / count): their difference over its root is distributed as
-t with count - 1 degrees of freedom. More samples a pixel lower the variance of Sobol points by
-more than 1 / r, and smaller pixels do not raise it, so that the test then errs to the safe side.
+A reference is the mean and the standard deviation s over `count` renders with different seeds. If
+another render has r times as many samples, the difference of a tile's means has the variance
+s^2 (1 / r + 1 / count); divided by its root it has Student's t distribution with count - 1 degrees
+of freedom. More samples a pixel lower the variance of Sobol points by more than 1 / r, and smaller
+pixels do not raise it, so the test is then conservative.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from clpt.arrays import Floats, Image
 
 FILE = Path(__file__).parent / "data" / "references.npz"
 TILES = 8  # along each side
-FALSE_ALARMS = 1e-4  # of right pictures, the share that is called wrong
-ROUNDING = 1e-3  # by which devices may differ, as a share of a tile's mean
+FALSE_ALARMS = 1e-4  # share of right pictures that the test rejects
+ROUNDING = 1e-3  # relative difference between devices, of a tile's mean
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Means that the tiles of a scene should have.
+    """Expected tile means of a scene.
 
-    mean, deviation: (65, 3), of one render's `regions`; count: renders; samples: of all pixels of
-    one render; films: digests of films by size, and the class of the device that made them.
+    mean, deviation: (65, 3), of a render's `regions`; count: renders; samples: of all pixels of a
+    render; films: digests of films by size, and their device class.
     """
 
     mean: Floats
@@ -43,7 +43,7 @@ class Reference:
 
 
 class Verdict(NamedTuple):
-    """A picture beside its reference: share of wrong tiles, largest |t|, what is wrong or ""."""
+    """A picture beside its reference: share of wrong tiles, largest |t|, a complaint or ""."""
 
     share: float
     largest: float
@@ -60,27 +60,27 @@ def regions(image: Image) -> Floats:
 
 
 def compare(image: Image, reference: Reference, samples: int) -> Verdict:
-    """Compare a picture, whose pixels have that many samples together, with its reference."""
-    found = regions(image)
+    """Compare a picture with its reference; samples: of all pixels together."""
+    means = regions(image)
     share = reference.samples / samples + 1.0 / reference.count
     noise, rounding = reference.deviation * math.sqrt(share), ROUNDING * np.abs(reference.mean)
     expected: Floats = np.hypot(noise, rounding)
     with np.errstate(all="ignore"):
-        t: Floats = np.abs(found - reference.mean) / np.maximum(expected, 1e-9)
-    t = np.where(np.isfinite(found), t, np.inf)
+        t: Floats = np.abs(means - reference.mean) / np.maximum(expected, 1e-9)
+    t = np.where(np.isfinite(means), t, np.inf)
     off = np.asarray((t > limit(reference.count - 1, FALSE_ALARMS / t.size)).any(1))
     tiles, largest = float(off[:-1].mean()), float(t.max())
     if off[:-1].any():
         return Verdict(tiles, largest, f"wrong: {max(tiles, 0.01):.0%} of tiles".replace("%", " %"))
     if off[-1]:
-        ratio = found[-1].mean() / reference.mean[-1].mean() - 1.0
+        ratio = means[-1].mean() / reference.mean[-1].mean() - 1.0
         return Verdict(0.0, largest, f"wrong: all of it is {100 * ratio:+.2g} % off")
     return Verdict(0.0, largest, "")
 
 
 @cache
 def limit(freedom: int, rate: float) -> float:
-    """Return the |t| that is exceeded at that rate; freedom: degrees of it, an odd number.
+    """Return the |t| that is exceeded at a rate; freedom: degrees of freedom, odd.
 
     The distribution is Abramowitz and Stegun 26.7.3.
     """
@@ -99,10 +99,10 @@ def limit(freedom: int, rate: float) -> float:
 
 @cache
 def references() -> Mapping[str, Reference]:
-    """Return the references that clpt ships, by the names of scenes."""
+    """Return clpt's references by scene."""
     with np.load(FILE, allow_pickle=False) as file:
         about = json.loads(str(file["about"]))
         return {
-            name: Reference(mean=file[f"{name}_mean"], deviation=file[f"{name}_deviation"], **own)
-            for name, own in about["scenes"].items()
+            name: Reference(mean=file[f"{name}_mean"], deviation=file[f"{name}_deviation"], **more)
+            for name, more in about["scenes"].items()
         }

@@ -1,8 +1,7 @@
-"""Memory traffic: what each stage of a bounce reads and writes of the state of a path.
+"""Memory traffic: the bytes of a path's state that each stage of a bounce reads and writes.
 
-Counted in the text that the compiler gets: the loads and stores of the slabs of clpt/records.py.
-What a stage fetches from the scene's tables and trees depends on the rays and is not counted: a
-figure is the least that must move.
+The loads and stores of slabs (clpt/records.py) are counted in the program's text. Reads of the
+scene's tables and trees depend on rays and are not counted: a figure is a lower bound.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ _QUEUED = {"append": (0, 1), "shade": (1, 0)}  # words read and written of a que
 
 @dataclass(frozen=True)
 class Moved:
-    """Bytes that one item of a stage reads and writes; all branches taken."""
+    """Bytes that an item of a stage reads and writes, with all branches taken."""
 
     read: int
     written: int
@@ -34,10 +33,10 @@ class Moved:
 
 
 def traffic(features: Features, layout: str, *, queued: bool = False) -> dict[str, Moved]:
-    """Return what a slot's part of each program moves, by the names of `programs.sources`.
+    """Return the traffic of an item in each program, by the names of `programs.sources`.
 
-    An item is a slot that has work there: in `generate` a path that ends and the one that begins,
-    in `intersect` and `shade_...` a ray and its hit, in `shadow` a shadow ray, in `append` a slot.
+    An item is a slot with work: in `generate` a path that ends and its successor, in `intersect`
+    and `shade_...` a ray and its hit, in `shadow` a shadow ray, in `append` a slot.
     """
     texts = programs.sources(features, layout, 1, queued=queued)
     unused = blocks.unused(features)
@@ -50,13 +49,13 @@ def traffic(features: Features, layout: str, *, queued: bool = False) -> dict[st
     }
     moved = {}
     for name, source in texts.items():
-        own = _QUEUED.get(name.split("_")[0]) if queued else None
-        moved[name] = _moved(source.text, sizes, *(own or (0, 0)))
+        queue_words = _QUEUED.get(name.split("_")[0]) if queued else None
+        moved[name] = _moved(source.text, sizes, *(queue_words or (0, 0)))
     return moved
 
 
 def _moved(text: str, sizes: Mapping[str, int], read: int, written: int) -> Moved:
-    """Count what an item moves, in words; sizes: of slabs' members; read, written: beside these."""
+    """Return an item's traffic; sizes: words of slabs' members; read, written: further words."""
     words: dict[str, set[str]] = {"load": set(), "store": set()}
     for call in _CALL.finditer(_COMMENT.sub("", text)):
         if call["member"] in sizes:

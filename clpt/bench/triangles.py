@@ -1,4 +1,4 @@
-"""The triangles of a scene as one mesh, those of instances where they are placed."""
+"""A scene's triangles as a single mesh, including placed instances."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 
 from clpt.render.flow.scene_to_tables import Lowered
 
-MOST = 1 << 22  # triangles that instances may become; further ones are left out
+MOST = 1 << 22  # triangles; further instances are left out
 
 
 def world(lowered: Lowered) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
-    """Vertices (n, 3) and faces (m, 3); what is analytic has none."""
+    """Return vertices (n, 3) and faces (m, 3), without analytic shapes."""
     instances = lowered.instances
-    own = len(lowered.faces) - sum(instances.triangles)
-    ends = own + np.cumsum([0, *instances.triangles])
-    vertices, faces = [lowered.vertices], [lowered.faces[:own]]
-    count, total = len(lowered.vertices), own
+    world_count = len(lowered.faces) - sum(instances.triangles)
+    ends = world_count + np.cumsum([0, *instances.triangles])
+    vertices, faces = [lowered.vertices], [lowered.faces[:world_count]]
+    count, total = len(lowered.vertices), world_count
     groups = []
     for begin, end in pairwise(ends.tolist()):
         used, inside = np.unique(lowered.faces[begin:end], return_inverse=True)

@@ -1,4 +1,4 @@
-"""Building acceleration structures: triangles or boxes in, buffers for traversal out."""
+"""Builds of acceleration structures over triangles or boxes."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ log = logging.getLogger(__name__)
 
 BRUTE_LIMIT = 96  # triangles up to which brute force is faster; see bench/notes/traversal.md
 
-WIDE8_BYTES = 54  # of a triangle, with its share of nodes, in large scenes
-MOST = (2**31 - 1) // 3  # triangles or vertices: kernels count words of them by an int
+WIDE8_BYTES = 54  # of a triangle with its share of nodes, in large scenes
+MOST = (2**31 - 1) // 3  # triangles or vertices: kernels count their words by an int
 _REACH = TREE_REACHES["reach"]
 
 
@@ -35,9 +35,9 @@ class Bvh:
     """An acceleration structure on a device.
 
     layout: the name of its traversal in kernels/bvh; count: triangles or boxes; buffers: by the
-    names of that traversal's arguments; parts: the trees in them, as `refit` needs them; stats:
-    seconds, and for wide8 nodes, leaves, depth and cost (nodes and blocks that a random line
-    through the scene is tested against).
+    names of the traversal's arguments; parts: the trees in the buffers, for `refit`; stats:
+    seconds, and for wide8 nodes, leaves, depth and cost (expected nodes and blocks that a random
+    line through the scene visits).
     """
 
     layout: str
@@ -48,9 +48,9 @@ class Bvh:
 
     @property
     def bytes(self) -> int:
-        """Device memory that it holds."""
-        own = [buffer for part in self.parts for buffer in part.own]
-        return sum(buffer.size for buffer in [*self.buffers.values(), *own])
+        """Device memory of all buffers [bytes]."""
+        private = [buffer for part in self.parts for buffer in part.private]
+        return sum(buffer.size for buffer in [*self.buffers.values(), *private])
 
 
 def choose_layout(device: Device, n_triangles: int) -> str:
@@ -61,17 +61,17 @@ def choose_layout(device: Device, n_triangles: int) -> str:
 
 
 def choose_tree(device: Device) -> str:
-    """Return the layout that traces fastest on the device among those that have a tree.
+    """Return the layout with a tree that traces fastest on the device.
 
-    Measured on CPUs and a GPU of NVIDIA's. Elsewhere it is the literature's choice, as compilers
-    for AMD's and Intel's GPUs have too few registers for the other: see bench/notes/gpus.md.
+    The choice was measured on CPUs and an NVIDIA GPU. Other GPUs get the literature's choice, since
+    compilers for AMD and Intel have too few registers for wide8: see bench/notes/gpus.md.
     """
     measured = device.info.is_cpu or "nvidia" in device.info.vendor.casefold()
     return "wide8" if measured else "compact"
 
 
 def outgrows_caches(device: Device, layout: str, n_triangles: int) -> bool:
-    """Return whether incoherent rays would wait for memory, so that interleaving them pays."""
+    """Return whether incoherent rays wait for memory, so that interleaving pays."""
     caches = device.info.cl_device.global_mem_cache_size
     return device.info.is_cpu and layout == "wide8" and WIDE8_BYTES * n_triangles > caches
 
@@ -87,13 +87,13 @@ def build(
     """Build an acceleration structure over triangles.
 
     vertices: (n, 3) float32; faces: (m, 3) uint32; tags: (m,) uint32, a word for each triangle that
-    its hits return (zeros if None). Buffers of these types are read in place, not checked.
-    layout: a key of LAYOUTS; None asks `choose_layout`. quality: "fast" cuts leaves out of a
-    space-filling curve, and builds the nodes above them as "high" does; brute has no tree.
+    its hits return (zeros if None). Buffers of these types are read in place, without checks.
+    layout: a key of LAYOUTS; None calls `choose_layout`. quality: "fast" cuts leaves from a
+    space-filling curve, and builds the nodes above them like "high"; brute has no tree.
 
-    The build takes up to 250 bytes a triangle and .25 MiB on the device, beside its input, of which
-    about 60 bytes stay (binary: 130); no buffer has more than 64 bytes a triangle. What is no CPU
-    takes 45 kB a compute unit more, for counters.
+    The build takes up to 250 bytes a triangle and .25 MiB on the device, in addition to its input.
+    About 60 bytes a triangle stay (binary: 130); no buffer has more than 64 bytes a triangle. Other
+    devices than CPUs take 45 kB more for each compute unit, for counters.
     Trees are never deeper than BVH_DEPTH of kernels/bvh/node.cl: traversals cannot overflow.
 
     Raises SceneError for vertices that are not finite or beyond 1e12, for indices out of range and
@@ -112,7 +112,7 @@ def _build(
 ) -> Bvh:
     start = time.perf_counter()
     count, device = _check(vertices, faces, tags), building.device
-    if count == 0:  # one degenerate triangle, which no ray hits
+    if count == 0:  # a degenerate triangle, which no ray hits
         vertices, faces, tags = np.zeros((1, 3)), np.zeros((1, 3)), None
     if quality not in get_args(Quality):
         raise SceneError(f"a tree's quality is high or fast, not {quality!r}")
@@ -135,10 +135,10 @@ def _build(
 
 @dataclass(frozen=True)
 class Runs:
-    """Runs of triangles, one after the other; triangles count from 0 in each.
+    """Consecutive runs of triangles; triangles count from 0 in each run.
 
-    counts: their lengths; keys: of each run how many rows a vertex has, 1 by default, see
-    clpt.bvh.keyed; corners: the vertices on the host, for runs of several.
+    counts: their lengths; keys: the number of rows of a vertex in each run, 1 by default, see
+    clpt.bvh.keyed; corners: the vertices on the host, for runs with several keys.
     """
 
     counts: Sequence[int]
@@ -147,7 +147,7 @@ class Runs:
 
     @property
     def firsts(self) -> list[int]:
-        """The first triangle of each run, and the end of the last one."""
+        """The first triangle of each run, and the end of the last run."""
         ends: list[int] = np.cumsum([0, *self.counts]).tolist()
         return ends
 
@@ -163,8 +163,8 @@ def build_parts(
 ) -> tuple[Bvh, NDArray[np.uint32]]:
     """Build a tree for each run of triangles, in shared buffers.
 
-    Returns the trees, and the offsets of the nodes and leaves of each, (n, 2) uint32 [32 bytes].
-    The other parameters are those of `build`, which raises alike.
+    Returns the trees, and the offsets of their nodes and leaves, (n, 2) uint32 [32 bytes]. Other
+    parameters and errors: see `build`.
     """
     start = time.perf_counter()
     trees, building = [], Building(device)
@@ -190,13 +190,13 @@ def build_parts(
 def _joined(
     building: Building, trees: list[Bvh]
 ) -> tuple[dict[str, cl.Buffer], NDArray[np.uint32]]:
-    """Copy trees into shared buffers; return these, and the offsets as `build_parts` does."""
+    """Copy trees into shared buffers; return the buffers, and offsets like `build_parts`."""
     sizes = np.array([[b.size for b in (t.buffers["nodes"], t.buffers["leaves"])] for t in trees])
     offsets = np.cumsum(sizes, axis=0) - sizes
     buffers = {}
-    for name, own, whole in zip(("nodes", "leaves"), offsets.T, sizes.sum(axis=0), strict=True):
+    for name, starts, whole in zip(("nodes", "leaves"), offsets.T, sizes.sum(axis=0), strict=True):
         buffers[name] = building.allocate(int(whole))
-        for tree_, offset in zip(trees, own, strict=True):
+        for tree_, offset in zip(trees, starts, strict=True):
             building.stream.copy(buffers[name], tree_.buffers[name], dst_offset=int(offset))
     building.stream.wait()
     return buffers, (offsets // 32).astype(np.uint32)
@@ -205,8 +205,8 @@ def _joined(
 def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes_binary") -> Bvh:
     """Build a tree over boxes, (m, 2, 3) float32 low and high corners.
 
-    layout: a key of BOX_LAYOUTS. Leaves of "shapes_binary" hold up to two boxes; those of the
-    others one, and their nodes are as in the layout of that name. Raises as `build` does.
+    layout: a key of BOX_LAYOUTS. Leaves of "shapes_binary" hold up to two boxes; leaves of other
+    layouts hold a box, with the nodes of the layout for triangles. Raises like `build`.
     """
     start = time.perf_counter()
     boxes = np.asarray(boxes, np.float32).reshape(-1, 2, 3)
@@ -219,7 +219,7 @@ def build_boxes(device: Device, boxes: NDArray, layout: str = "shapes_binary") -
 
 
 def _check(vertices: Array, faces: Array, tags: Array | None) -> int:
-    """The number of triangles. Raises SceneError for arrays that a tree cannot hold."""
+    """Return the number of triangles. Raises SceneError for arrays that a tree cannot hold."""
     count = faces.size // 12 if isinstance(faces, cl.Buffer) else len(faces)
     if count > MOST:
         raise SceneError(f"{count:,} triangles are more than a tree holds, {MOST:,}")
@@ -237,7 +237,7 @@ def _check(vertices: Array, faces: Array, tags: Array | None) -> int:
     return count
 
 
-def _check_reach(corners: NDArray, what: str) -> None:
-    # As Python's numbers, which hold the limit, and more than the least of a type of integers.
+def _check_reach(corners: NDArray, subject: str) -> None:
+    # Python's floats hold the limit and the negated minimum of every integer type.
     if corners.size and not max(-float(corners.min()), float(corners.max())) < _REACH:
-        raise SceneError(f"{what} has a coordinate that is not finite, or beyond {_REACH:g}")
+        raise SceneError(f"{subject} has a coordinate that is not finite, or beyond {_REACH:g}")

@@ -1,4 +1,4 @@
-"""State that the steps of a build share: the device, its memory, kernels."""
+"""The state of a build: device, memory, kernels."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from ..device import build as build_program
 
 Array: TypeAlias = NDArray | cl.Buffer
 
-_ZERO_COPY = 1 << 16  # [bytes] of the smallest array that is not copied
-_GROUP = 8  # work-items of a group where each has one triangle or node
+_ZERO_COPY = 1 << 16  # [bytes] arrays from this size on are read in place
+_GROUP = 8  # work-items of a group, each with a triangle or node
 _ADVICE = "use fewer triangles, or a device with more memory"
 
 
@@ -25,9 +25,9 @@ def _source(root: str) -> Source:
 
 
 class Building:
-    """A build on a device. Programs and kernels are made once in a context.
+    """A build on a device. Programs and kernels are created once a context.
 
-    stream: that everything is enqueued on, one of its own by default.
+    stream: for all commands, by default a new stream of the device's queue.
     """
 
     def __init__(self, device: Device, stream: Stream | None = None):
@@ -37,11 +37,11 @@ class Building:
         self._programs: dict[str, Program] = {}
 
     def run(self, root: str, kernel: str, n: int, **arguments: object) -> None:
-        """Enqueue n work-items of a kernel of the program at `root`, in groups of one."""
+        """Enqueue n work-items of a kernel of the program at `root`, in groups of 1."""
         self._enqueue(root, kernel, n, 1, arguments)
 
     def run_each(self, root: str, kernel: str, n: int, **arguments: object) -> None:
-        """As `run`, in larger groups, for kernels whose argument `count` is n."""
+        """Enqueue like `run`, in larger groups, for kernels with an argument `count`, set to n."""
         self._enqueue(root, kernel, n, _GROUP, {"count": n, **arguments})
 
     def allocate(self, nbytes: int) -> cl.Buffer:
@@ -49,13 +49,13 @@ class Building:
         return self.buffers.allocate("building the scene's tree", nbytes, _ADVICE)
 
     def upload(self, array: Array, dtype: DTypeLike) -> cl.Buffer:
-        """Return a buffer with an array; a buffer as it is. Raises as `allocate` does."""
+        """Return a buffer with an array; a buffer is returned unchanged. Raises like `allocate`."""
         if isinstance(array, cl.Buffer):
             return array
         return self.buffers.upload("the scene's triangles", array, dtype, _ADVICE)
 
     def wrap_host(self, array: Array, dtype: DTypeLike) -> cl.Buffer:
-        """As `upload`, until the build has ended: a CPU reads an array of that type in place.
+        """Return a buffer like `upload` for the time of the build; CPUs read arrays in place.
 
         The caller keeps the array until the stream has ended.
         """
@@ -68,7 +68,7 @@ class Building:
         return host_buffer(self.device.context, flags, host)
 
     def read(self, buffer: cl.Buffer, n: int, dtype: DTypeLike) -> NDArray:
-        """Return the first n values of a buffer; wait for them."""
+        """Wait and return the first n values of a buffer."""
         return self.stream.read(buffer, np.empty(n, dtype))
 
     def _enqueue(self, root: str, kernel: str, n: int, group: int, arguments: dict) -> None:

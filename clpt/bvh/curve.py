@@ -1,4 +1,4 @@
-"""Leaves cut out of a space-filling curve, for fast builds, by kernels/bvh/curve.cl."""
+"""Leaves cut from a space-filling curve, for fast builds, by kernels/bvh/curve.cl."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from .building import Building
 
 _CURVE, _BUILD = "bvh/curve.cl", "bvh/build.cl"
 _DIGIT, _INDEX = CURVE_KEYS["bits"], CURVE_KEYS["index"]
-_CODE = 33  # bits of a key above those of the index
-_CHUNKS = 4  # for each compute unit, to sort
-_RUN = 2048  # items of the curve that one work-item cuts, and puts into the tree's bounds
+_CODE = 33  # bits of a key above the index
+_CHUNKS = 4  # of a compute unit, for the sort
+_RUN = 2048  # items of the curve that a work-item cuts and bounds
 
 
 def runs(
@@ -23,7 +23,7 @@ def runs(
 ) -> tuple[int, cl.Buffer, cl.Buffer, cl.Buffer]:
     """Cut items into leaves of at most `leaf_size` <= 8; wait for the number of leaves.
 
-    Returns it, the items in the leaves' order, an item for each leaf, and the extents of these.
+    Returns it, the items in the leaves' order, an item for each leaf, and their extents.
     """
     keys = _sorted(building, count, items, parts)
     stretches = -(-count // _RUN)
@@ -41,7 +41,7 @@ def runs(
 
 
 def _sorted(building: Building, count: int, items: cl.Buffer, parts: cl.Buffer) -> cl.Buffer:
-    """The items' keys, ascending."""
+    """Return the items' keys in ascending order."""
     whole, unused = building.allocate(64), building.allocate(16)
     root = {"parts": parts, "n_parts": parts.size // 64, "ranges": unused, "extents": whole}
     building.run(_BUILD, "build_root", 1, count=count, **root)
@@ -63,11 +63,11 @@ def _sorted(building: Building, count: int, items: cl.Buffer, parts: cl.Buffer) 
 
 
 def _cells(span: NDArray[np.float32]) -> dict[str, Any]:
-    """The arguments by which `curve_keys` turns a doubled centroid into its code.
+    """Return the arguments of `curve_keys`, which encodes doubled centroids.
 
-    span: low corner and negated high corner of the doubled centroids, (8,). A cell's longest side
-    is halved, again and again; the first halving is the code's highest bit (Vinkler, Bittner and
-    Havran 2017, "Extended Morton codes").
+    span: low corner and negated high corner of the doubled centroids, (8,). Each step halves a
+    cell's longest side; the first step is the code's highest bit (Vinkler, Bittner and Havran 2017,
+    "Extended Morton codes").
     """
     low = span[:3].astype(float)
     size = np.maximum(-span[4:7].astype(float) - low, 0.0)

@@ -1,7 +1,7 @@
-"""Trees over triangles whose vertices move: nodes and leaves stand there once for each key.
+"""Trees over triangles with moving vertices: nodes and leaves have a copy for each key.
 
-The tree is that of the places in the middle, refitted to every key. What a traversal needs of two
-keys are neighbours, see kernels/bvh/keyed.cl.
+The tree is built over the middle positions, and refitted to every key. Copies of a record for
+consecutive keys are neighbours, see kernels/bvh/keyed.cl.
 """
 
 from __future__ import annotations
@@ -14,8 +14,12 @@ from ..records import TREE_BITS
 from .building import Building
 from .layouts import LAYOUTS, Mesh, Packed, Part, refit_nodes
 
-WORDS = {"binary": (8, 16), "wide8": (64, 88), "compact": (20, 12)}  # of a node, and of a leaf
-_FARTHEST = 1e38  # of boxes of what is not there: finite, so that no product with 0 is NaN
+WORDS = {
+    "binary": (8, 16),
+    "wide8": (64, 88),
+    "compact": (20, 12),
+}  # words of a node, and of a leaf
+_FARTHEST = 1e38  # bounds of empty boxes: finite, so that a product with 0 is not NaN
 _LEAF = np.uint32(TREE_BITS["leaf"])
 
 
@@ -28,17 +32,17 @@ def keyed(
     layout: str,
     quality: Quality = "high",
 ) -> Packed:
-    """Build a tree over triangles of which each vertex has a row for each of `keys` keys.
+    """Build a tree over triangles whose vertices have a row for each key.
 
-    vertices: (n, 3) float32, the rows of a vertex side by side; faces: (m, 3) uint32, which name
-    the first of these. It cannot be refitted. Raises MemoryBudgetError.
+    vertices: (n, 3) float32, with consecutive rows for a vertex's keys; faces: (m, 3) uint32 first
+    rows of vertices; keys: their number. The tree cannot be refitted. Raises MemoryBudgetError.
     """
     first = int(faces.min())
-    own = vertices[first : int(faces.max()) + keys]
-    count = len(own) - keys + 1
+    used = vertices[first : int(faces.max()) + keys]
+    count = len(used) - keys + 1
     lower, upper = (keys - 1) // 2, keys // 2
-    middle = own.copy()
-    middle[:count] = 0.5 * (own[lower : lower + count] + own[upper : upper + count])
+    middle = used.copy()
+    middle[:count] = 0.5 * (used[lower : lower + count] + used[upper : upper + count])
     local = np.ascontiguousarray(faces - np.uint32(first))
     mesh = Mesh(
         len(local),
@@ -48,13 +52,13 @@ def keyed(
         quality,
     )
     packed = LAYOUTS[layout](building, mesh)
-    copies = _refitted(building, packed, own, local, keys)
+    copies = _refitted(building, packed, used, local, keys)
     node_words, leaf_words = WORDS[layout]
-    made = _side_by_side([one[0] for one in copies], node_words)
+    keyed_nodes = _interleaved([nodes for nodes, _ in copies], node_words)
     if layout == "wide8":
-        _finish_wide(made, keys)
-    buffers = {"nodes": _whole_steps(made)}
-    buffers["leaves"] = _whole_steps(_side_by_side([one[1] for one in copies], leaf_words))
+        _finish_wide(keyed_nodes, keys)
+    keyed_leaves = _interleaved([leaves for _, leaves in copies], leaf_words)
+    buffers = {"nodes": _padded(keyed_nodes), "leaves": _padded(keyed_leaves)}
     uploaded = {name: building.upload(words, np.uint32) for name, words in buffers.items()}
     return Packed(uploaded, Part(0), packed.stats)
 
@@ -83,22 +87,22 @@ def _refitted(
     return copies
 
 
-def _side_by_side(copies: list[NDArray[np.uint32]], words: int) -> NDArray[np.uint32]:
-    """Records of `words` words of several copies, (n, copies, words)."""
+def _interleaved(copies: list[NDArray[np.uint32]], words: int) -> NDArray[np.uint32]:
+    """Return records of `words` words of several copies, (n, copies, words)."""
     count = len(copies[0]) // words
-    return np.stack([one[: count * words].reshape(count, words) for one in copies], axis=1)
+    return np.stack([c[: count * words].reshape(count, words) for c in copies], axis=1)
 
 
 def _finish_wide(nodes: NDArray[np.uint32], keys: int) -> None:
-    """Let the words of wide nodes count nodes and blocks of all keys, and boxes be finite."""
-    links, there = nodes[..., 48:56], nodes[..., 56:64] != 0
+    """Multiply the links of wide nodes by the number of keys, and make boxes finite."""
+    links, exists = nodes[..., 48:56], nodes[..., 56:64] != 0
     leaf = links & _LEAF
-    links[...] = np.where(there, leaf | (links ^ leaf) * np.uint32(keys), links)
+    links[...] = np.where(exists, leaf | (links ^ leaf) * np.uint32(keys), links)
     boxes = nodes[..., :48].view(np.float32)
     boxes[...] = np.clip(boxes, -_FARTHEST, _FARTHEST)
 
 
-def _whole_steps(words: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Words in whole steps of 32 bytes, in which trees that share a buffer begin."""
+def _padded(words: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Return words padded to steps of 32 bytes, the alignment of trees in shared buffers."""
     flat = words.reshape(-1)
     return np.concatenate([flat, np.zeros(-len(flat) % 8, np.uint32)])

@@ -1,4 +1,4 @@
-"""The layouts: the buffers of each traversal in kernels/bvh."""
+"""Layouts of trees: the buffers of each traversal in kernels/bvh."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Part:
-    """One tree in buffers that several may share, as refitting needs it.
+    """A tree in perhaps shared buffers, for refitting.
 
-    count: triangles or boxes; reach: the largest coordinate that it was built with; steps: (begin,
-    count) of each launch of a kernel, from the leaves up: of wide nodes, or of ranges in the heap
-    `ranges` of a binary tree; bounds: of the nodes of a compressed tree, in full precision; nodes,
-    leaves: offsets of its own [32 bytes]; first: its first triangle; binary, totals: of a wide tree
-    that follows a binary one, the nodes of that, and on the device how many wide nodes there are.
+    count: triangles or boxes; reach: the largest coordinate at the build; steps: (begin, count) of
+    each launch of a kernel, from the leaves up: of wide nodes, or of ranges in the heap `ranges` of
+    a binary tree; bounds: of the nodes of a compressed tree, in full precision; nodes, leaves:
+    offsets in the buffers [32 bytes]; first: its first triangle; binary, totals: for a wide tree
+    that follows a binary tree: its nodes, and the number of wide nodes on the device.
     """
 
     count: int
@@ -62,15 +62,15 @@ class Part:
     totals: cl.Buffer | None = None
 
     @property
-    def own(self) -> tuple[cl.Buffer, ...]:
-        """The buffers that refitting needs and traversals do not."""
+    def private(self) -> tuple[cl.Buffer, ...]:
+        """The buffers that only refitting needs."""
         every = (self.ranges, self.bounds, self.binary, self.totals)
         return tuple(buffer for buffer in every if buffer is not None)
 
 
 @dataclass(frozen=True)
 class Packed:
-    """Buffers by the names of the traversal's arguments, what refitting needs, and figures."""
+    """Buffers by the names of the traversal's arguments, the part for refitting, and figures."""
 
     buffers: dict[str, cl.Buffer]
     part: Part
@@ -78,7 +78,7 @@ class Packed:
 
 
 def brute(building: Building, mesh: Mesh) -> Packed:
-    """Make records of the triangles, on the host: so few are not worth compiling a kernel for."""
+    """Compute records of few triangles on the host, which saves compiling a kernel."""
     size = mesh.vertices.size // 12
     vertices = building.read(mesh.vertices, 3 * size, np.float32).reshape(size, 3)
     faces = building.read(mesh.faces, 3 * mesh.count, np.uint32).reshape(-1, 3)
@@ -92,7 +92,7 @@ def brute(building: Building, mesh: Mesh) -> Packed:
     sides = np.abs(np.concatenate(edges, 1)).max(axis=1)
     ends = np.stack([planes, sides], 1)
     records = np.concatenate([v0, *edges, normals, words.view(np.float32), ends], 1)
-    buffer = building.allocate(records.nbytes)  # refitting writes to it
+    buffer = building.allocate(records.nbytes)  # refitting writes to the buffer
     building.stream.write(buffer, records.astype(np.float32))
     return Packed({"tris": buffer}, Part(mesh.count))
 
@@ -108,19 +108,21 @@ def binary(building: Building, mesh: Mesh) -> Packed:
 
 
 def wide8(building: Building, mesh: Mesh) -> Packed:
-    """Build a binary tree, make it 8 wide, and pack blocks of 8 triangles."""
+    """Build a binary tree, collapse it to 8-wide nodes, and pack blocks of 8 triangles."""
     built = _binary_tree(building, mesh, _BLOCK, at_once=_BLOCK)
     if mesh.quality == "high" and mesh.count >= REINSERT_LIMIT:
         built = tree.reinserted(building, built)
     chosen = wide.collapse(building, built)
-    made = wide.figures(building, chosen)
-    nodes, blocks = building.allocate(256 * made.nodes), building.allocate(352 * made.leaves)
+    figures = wide.figures(building, chosen)
+    nodes, blocks = building.allocate(256 * figures.nodes), building.allocate(352 * figures.leaves)
     wide.write_nodes(building, chosen, nodes)
     source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
     leaves = {"nodes": built.nodes, "items": built.items, "leaf_roots": chosen.leaf_roots}
-    building.run_each(_COLLAPSE, "collapse_blocks", made.leaves, blocks=blocks, **leaves, **source)
-    part = Part(mesh.count, built.reach(building), made.steps)
-    return Packed({"nodes": nodes, "leaves": blocks}, part, made.stats)
+    building.run_each(
+        _COLLAPSE, "collapse_blocks", figures.leaves, blocks=blocks, **leaves, **source
+    )
+    part = Part(mesh.count, built.reach(building), figures.steps)
+    return Packed({"nodes": nodes, "leaves": blocks}, part, figures.stats)
 
 
 def binary_boxes(building: Building, count: int, boxes: cl.Buffer, leaf_size: int = 1) -> Packed:
@@ -131,41 +133,41 @@ def binary_boxes(building: Building, count: int, boxes: cl.Buffer, leaf_size: in
         built = tree.over(building, count, items, parts, leaf_size, depth=SHAPES_DEPTH)
         building.run_each("bvh/pack.cl", "pack_indices", count, items=items, indices=indices)
         return Packed({"nodes": built.nodes, "indices": indices}, _binary_part(building, built))
-    nodes = building.upload(np.array([0, 0, 0, _LEAF, 0, 0, 0, 0]), np.uint32)  # nothing in it
+    nodes = building.upload(np.array([0, 0, 0, _LEAF, 0, 0, 0, 0]), np.uint32)  # an empty tree
     return Packed({"nodes": nodes, "indices": indices}, Part(0))
 
 
 def wide8_boxes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
-    """As `binary_boxes`, with one box in a leaf, and make the tree 8 wide."""
-    chosen, made, buffers = _wide_over_boxes(building, count, boxes)
-    part = Part(count, chosen.built.reach(building), made.steps)
-    return Packed(buffers, part, made.stats)
+    """Build an 8-wide tree over boxes, with a box in each leaf."""
+    chosen, figures, buffers = _wide_over_boxes(building, count, boxes)
+    part = Part(count, chosen.built.reach(building), figures.steps)
+    return Packed(buffers, part, figures.stats)
 
 
 def wide8_shapes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
-    """As `wide8_boxes`; the binary tree stays too, by which the wide one is refitted."""
+    """Build like `wide8_boxes`, and keep the binary tree to refit the wide tree."""
     if not count:
-        rows = np.repeat([np.inf, -np.inf] * 3 + [0, 0], 8).astype(np.float32)  # nothing in it
+        rows = np.repeat([np.inf, -np.inf] * 3 + [0, 0], 8).astype(np.float32)  # an empty tree
         nodes = building.upload(rows, np.float32)
         return Packed({"nodes": nodes, "indices": building.allocate(0)}, Part(0))
-    chosen, made, buffers = _wide_over_boxes(building, count, boxes, spare=True)
+    chosen, figures, buffers = _wide_over_boxes(building, count, boxes, spare=True)
     binary = {"binary": chosen.built.nodes, "totals": chosen.totals}
     part = replace(_binary_part(building, chosen.built), **binary)
-    return Packed(buffers, part, made.stats)
+    return Packed(buffers, part, figures.stats)
 
 
 def _wide_over_boxes(
     building: Building, count: int, boxes: cl.Buffer, spare: bool = False
 ) -> tuple[wide.Collapse, wide.Figures, dict[str, cl.Buffer]]:
-    """A wide tree and its buffers; spare: with room for another tree over as many boxes."""
+    """Return a wide tree and its buffers; spare: leave room for later trees over the boxes."""
     items, parts = tree.items_of_boxes(building, count, boxes)
     chosen = wide.collapse(building, tree.over(building, count, items, parts, 1))
-    made = wide.figures(building, chosen)
-    room = made.nodes + made.nodes // 4 + 8 if spare else made.nodes
+    figures = wide.figures(building, chosen)
+    room = figures.nodes + figures.nodes // 4 + 8 if spare else figures.nodes
     nodes, indices = building.allocate(256 * room), building.allocate(4 * count)
     wide.write_nodes(building, chosen, nodes)
     wide.write_indices(building, chosen, indices)
-    return chosen, made, {"nodes": nodes, "indices": indices}
+    return chosen, figures, {"nodes": nodes, "indices": indices}
 
 
 def compact(building: Building, mesh: Mesh) -> Packed:
@@ -179,7 +181,7 @@ def compact(building: Building, mesh: Mesh) -> Packed:
 
 
 def compact_boxes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
-    """As `wide8_boxes`, in compressed nodes."""
+    """Build like `wide8_boxes`, with compressed nodes."""
     items, parts = tree.items_of_boxes(building, count, boxes)
     built = tree.over(building, count, items, parts, 1)
     indices = building.allocate(4 * count)
@@ -192,24 +194,24 @@ def compact_boxes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
 def _compact_nodes(
     building: Building, built: tree.Tree, leaves: cl.Buffer, tags: cl.Buffer | None
 ) -> tuple[cl.Buffer, Part, dict[str, float]]:
-    """Compressed nodes that have no boxes yet, for `refit_nodes`; the leaves are filled in."""
+    """Fill in leaves, and return compressed nodes without boxes, for `refit_nodes`."""
     chosen = wide.collapse(building, built)
-    made = wide.figures(building, chosen)
-    nodes = building.allocate(_round_up(80 * made.nodes))
-    common = {"places": building.allocate(8 * made.nodes), "compact": nodes, "tags": tags}
+    figures = wide.figures(building, chosen)
+    nodes = building.allocate(_round_up(80 * figures.nodes))
+    common = {"places": building.allocate(8 * figures.nodes), "compact": nodes, "tags": tags}
     common |= {"nodes": built.nodes, "items": built.items, "leaves": leaves}
     common |= {"costs": chosen.costs, "roots": chosen.roots, "firsts": chosen.firsts}
-    for begin, count in reversed(made.steps):
+    for begin, count in reversed(figures.steps):
         building.run_each("bvh/compact_pack.cl", "compact_nodes", count, begin=begin, **common)
-    bounds = building.allocate(32 * made.nodes)
-    part = Part(built.count, built.reach(building), made.steps, bounds=bounds)
-    return nodes, part, made.stats
+    bounds = building.allocate(32 * figures.nodes)
+    part = Part(built.count, built.reach(building), figures.steps, bounds=bounds)
+    return nodes, part, figures.stats
 
 
 def refit_nodes(building: Building, part: Part, **buffers: cl.Buffer | None) -> None:
-    """Enqueue that a tree in place has the boxes of its contents, from the leaves up.
+    """Enqueue a refit of a tree's boxes to its contents, from the leaves up.
 
-    buffers: those of the tree, and either vertices and faces or boxes and indices, the others None.
+    buffers: of the tree, and either vertices and faces or boxes and indices, the others None.
     """
     common = {
         "nodes_begin": part.nodes,
@@ -218,12 +220,12 @@ def refit_nodes(building: Building, part: Part, **buffers: cl.Buffer | None) -> 
         "reach": part.reach,
         **buffers,
     }
-    kernel, own = "refit_wide8", {}
+    kernel, extra = "refit_wide8", {}
     if part.bounds is not None:
-        kernel, own = "refit_compact", {"bounds": part.bounds}
+        kernel, extra = "refit_compact", {"bounds": part.bounds}
     for i, (begin, count) in enumerate(part.steps):
         if part.ranges is None:
-            building.run_each(_REFIT, kernel, count, begin=begin, **own, **common)
+            building.run_each(_REFIT, kernel, count, begin=begin, **extra, **common)
         else:
             kernel = "refit_level" if i else "refit_subtree"
             building.run(_REFIT, kernel, count, begin=begin, ranges=part.ranges, **common)
@@ -243,7 +245,7 @@ BOX_LAYOUTS: dict[str, Callable[[Building, int, cl.Buffer], Packed]] = {
     "compact": compact_boxes,
 }
 
-# Files of kernels that take the place of others where a ray goes alone on a device without vectors.
+# Kernel files that replace others on devices without vectors.
 ALONE: dict[str, tuple[str, ...]] = {
     "bvh/mask8.cl": ("bvh/mask8_bits.cl",),
     "bvh/wide8_waiting.cl": ("bvh/wide8_levels.cl",),
@@ -253,7 +255,7 @@ TREES = tuple(name for name in LAYOUTS if name in BOX_LAYOUTS)  # all but brute 
 
 
 def shapes_layout(layout: str) -> str:
-    """Return the layout, of BOX_LAYOUTS, for shapes beside triangles in a layout."""
+    """Return the layout of BOX_LAYOUTS for shapes, for triangles in `layout`."""
     return "shapes_wide8" if layout == "wide8" else "shapes_binary"
 
 
@@ -280,5 +282,5 @@ def _binary_tree(building: Building, mesh: Mesh, leaf_size: int, at_once: int = 
 
 
 def _round_up(nbytes: int) -> int:
-    """A size in whole steps of 32 bytes, in which trees that share a buffer begin."""
+    """Return a size rounded up to 32 bytes, the alignment of trees in shared buffers."""
     return -(-nbytes // 32) * 32

@@ -1,8 +1,8 @@
 """Refitting: triangles or boxes move, while the nodes and leaves of their tree stay.
 
 Kernels go from the leaves up, a level at a time: no work-item waits for another. A refitted tree is
-right wherever its triangles are, but the farther they have moved since the build, the more boxes
-overlap and the slower rays get; then build anew.
+correct for any positions, but boxes overlap more and rays get slower with the distance from the
+build; then build again.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ def refit(
     faces: cl.Buffer,
     parts: Iterable[int] | None = None,
 ) -> cl.Event | None:
-    """Enqueue that a tree over triangles, in place, follows its vertices.
+    """Enqueue a refit of a tree over triangles to moved vertices, in place.
 
-    building: with the stream of the kernels; vertices: (n, 3) float32; faces: (m, 3) uint32, those
-    that the tree was built of; parts: the trees of `build_parts` that have moved, all by default.
-    Returns the event of the last kernel; the host waits for nothing.
+    building: with the stream of the kernels; vertices: (n, 3) float32; faces: (m, 3) uint32, as at
+    the build; parts: the trees of `build_parts` that have moved, by default all. Returns the event
+    of the last kernel; the host does not wait.
 
-    No ray meets a triangle while it has a vertex that is not finite, or beyond 1e12.
+    No ray hits a triangle while a vertex is not finite, or beyond 1e12.
     """
     numbers = range(len(tree.parts)) if parts is None else parts
     if tree.layout == "brute":
@@ -52,10 +52,10 @@ def refit(
 
 
 def refit_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event | None:
-    """Enqueue that a tree over boxes, in place, follows them.
+    """Enqueue a refit of a tree over moved boxes, in place; see `refit`.
 
-    boxes: (m, 2, 3) float32 low and high corners, in the order of the build. No ray meets a box
-    that is inside out or not finite. For the rest see `refit`.
+    boxes: (m, 2, 3) float32 low and high corners, in the order of the build. No ray hits a box
+    that is inverted or not finite.
     """
     boxed = {"boxes": boxes, "indices": tree.buffers["indices"]}
     if tree.count:
@@ -69,26 +69,26 @@ def refit_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event | N
 
 
 def rebuild_boxes(building: Building, tree: Bvh, boxes: cl.Buffer) -> cl.Event | None:
-    """Enqueue that a tree of the layout "shapes_...", in place, is built anew over its boxes.
+    """Enqueue another build of a tree of the layout "shapes_..." over its boxes, in place.
 
-    boxes: as of `refit_boxes`. It takes about five times as long, and up to 310 bytes a box while
-    it runs; rays are then as fast as after `build_boxes`. The host waits for nothing: a wide tree
-    that came out larger than there is room for is refitted instead.
+    boxes: see `refit_boxes`. It takes about five times as long, and temporarily up to 310 bytes a
+    box; rays are then as fast as after `build_boxes`. The host does not wait: a wide tree that
+    exceeds the buffer's room is refitted instead.
     """
     if tree.count:
-        own = Building(building.device, building.stream)  # with a memory count of its own
-        items, extents = trees.items_of_boxes(own, tree.count, boxes)
+        fresh = Building(building.device, building.stream)  # counts its memory separately
+        items, extents = trees.items_of_boxes(fresh, tree.count, boxes)
         if tree.parts[0].binary is None:
-            built = trees.over(own, tree.count, items, extents, SHAPES_LEAF, depth=SHAPES_DEPTH)
-            _adopt_binary(own, tree, built)
+            built = trees.over(fresh, tree.count, items, extents, SHAPES_LEAF, depth=SHAPES_DEPTH)
+            _adopt_binary(fresh, tree, built)
         else:
-            _adopt_wide(own, tree, trees.over(own, tree.count, items, extents, 1))
+            _adopt_wide(fresh, tree, trees.over(fresh, tree.count, items, extents, 1))
             refit_boxes(building, tree, boxes)
     return building.stream.last
 
 
 def _adopt_binary(building: Building, tree: Bvh, built: trees.Tree) -> None:
-    """Enqueue that a binary tree takes the place of one."""
+    """Enqueue copies of a new binary tree over the old tree."""
     indices, part = tree.buffers["indices"], tree.parts[0]
     building.run_each("bvh/pack.cl", "pack_indices", tree.count, items=built.items, indices=indices)
     building.stream.copy(tree.buffers["nodes"], built.nodes)
@@ -97,14 +97,14 @@ def _adopt_binary(building: Building, tree: Bvh, built: trees.Tree) -> None:
 
 
 def _adopt_wide(building: Building, tree: Bvh, built: trees.Tree) -> None:
-    """Enqueue that a binary tree and its wide one take the place of others, if there is room."""
+    """Enqueue copies of a new binary and wide tree over the old trees, if there is room."""
     part, nodes = tree.parts[0], tree.buffers["nodes"]
     chosen, indices = wide.collapse(building, built), building.allocate(4 * tree.count)
     wide.write_nodes(building, chosen, nodes)
     wide.write_indices(building, chosen, indices)
-    made = [built.nodes, built.ranges, indices, chosen.totals]
+    adopted = [built.nodes, built.ranges, indices, chosen.totals]
     former = [part.binary, part.ranges, tree.buffers["indices"], part.totals]
-    for new, old in zip(made, former, strict=True):
+    for new, old in zip(adopted, former, strict=True):
         words = new.size // 4
         building.run_each(
             _ROOT, "refit_adopt", -(-words // 16), totals=chosen.totals, room=nodes.size // 256,

@@ -1,4 +1,4 @@
-"""The binary tree that layouts start from, built on the device by kernels/bvh/build.cl."""
+"""The binary tree of all layouts, built on the device by kernels/bvh/build.cl."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from .building import Building
 
 _BUILD, _PACK, _REINSERT = "bvh/build.cl", "bvh/pack.cl", "bvh/reinsert.cl"
 _DEPTH = TREE_SIZES["depth"]
-_RUN = 2048  # items whose bounds one work-item finds
-_SUBTREES = 64  # for each compute unit, so that they even out
-_CPU_UNITS = 16  # those of any CPU: the order of reinsertion, and so the tree, follows from them
-_PASSES = 4  # of reinsertion; more cost a build 2 % each and save rays less
+_RUN = 2048  # items that a work-item bounds
+_SUBTREES = 64  # of a compute unit, for an even load
+_CPU_UNITS = 16  # of any CPU: the tree depends on this number by the order of reinsertion
+_PASSES = 4  # of reinsertion; each further pass costs a build 2 % and saves rays less
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Tree:
     """A binary tree over items.
 
     items: float8, in the order of the leaves; nodes: 2 count float8; ranges: a heap of the top
-    `levels` levels, whose leaves are subtrees; extents: of those ranges.
+    `levels` levels, whose leaves are subtrees; extents: of the ranges.
     """
 
     count: int
@@ -36,7 +36,7 @@ class Tree:
     levels: int
 
     def reach(self, building: Building) -> float:
-        """Return the largest coordinate of all items; wait for it."""
+        """Wait and return the largest coordinate of all items."""
         bounds = building.read(self.extents, 8, np.float32)
         return float(np.abs(bounds[[0, 1, 2, 4, 5, 6]]).max())
 
@@ -49,7 +49,7 @@ def items_of_triangles(
 
 
 def items_of_boxes(building: Building, count: int, boxes: cl.Buffer) -> tuple[cl.Buffer, cl.Buffer]:
-    """Return the same of boxes with a low and a high corner."""
+    """Return boxes with a low and a high corner as items, and their bounds in parts."""
     return _items(building, "items_of_boxes", count, boxes=boxes)
 
 
@@ -73,20 +73,20 @@ def over(
     at_once: int = 1,
     depth: int = _DEPTH,
 ) -> Tree:
-    """Build over items by the surface area heuristic; they are put in the order of the leaves.
+    """Build over items by the surface area heuristic; items move to the order of the leaves.
 
-    leaf_size: items of a leaf, at most; at_once: items that are tested in the time of one, a
-    power of two; depth: most levels of a leaf below the root, enough for a balanced tree.
+    leaf_size: the most items of a leaf; at_once: items that a traversal tests at once, a power of
+    two; depth: the most levels below the root, enough for a balanced tree.
     """
     cut = {"leaf_size": leaf_size, "at_once": at_once.bit_length() - 1, "runs": 0, "depth": depth}
     return _divided(building, count, items, parts, cut)
 
 
 def reinserted(building: Building, tree: Tree) -> Tree:
-    """Put the large nodes of a tree where the sum of areas is the least.
+    """Reinsert large nodes where the sum of areas is least.
 
-    The tree that is returned has the same buffers, but for `ranges`. It is for
-    kernels/bvh/collapse.cl: an inner node's count is that of the levels below it.
+    The result shares all buffers except `ranges`. It is for kernels/bvh/collapse.cl: an inner
+    node's count is the number of levels below it.
     """
     subtrees = 1 << tree.levels
     begin = subtrees - 1
@@ -108,7 +108,7 @@ def reinserted(building: Building, tree: Tree) -> Tree:
 def over_runs(
     building: Building, count: int, items: cl.Buffer, parts: cl.Buffer, leaf_size: int
 ) -> Tree:
-    """As `over`, by the same heuristic over leaves that are runs of a space-filling curve."""
+    """Build like `over`, with runs of a space-filling curve as leaves."""
     n, ordered, runs, parts = curve.runs(building, count, items, parts, leaf_size)
     cut = {"leaf_size": 1, "at_once": 0, "runs": 1, "depth": _DEPTH}
     tree = _divided(building, n, runs, parts, cut)
@@ -118,7 +118,7 @@ def over_runs(
 def _divided(
     building: Building, count: int, items: cl.Buffer, parts: cl.Buffer, cut: dict[str, int]
 ) -> Tree:
-    """Build over items; cut: the arguments of kernels/bvh/build.cl that say where they are cut."""
+    """Build over items; cut: the arguments of kernels/bvh/build.cl for splits."""
     info = building.device.info
     wanted = _SUBTREES * (_CPU_UNITS if info.is_cpu else info.compute_units)
     levels = int(math.log2(max(1, min(wanted, count // cut["leaf_size"]))))

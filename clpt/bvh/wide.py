@@ -1,4 +1,4 @@
-"""A binary tree made 8 wide, by kernels/bvh/collapse.cl."""
+"""Collapse of a binary tree to 8-wide nodes, by kernels/bvh/collapse.cl."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _DEEPEST = TREE_SIZES["depth"]
 
 @dataclass(frozen=True)
 class Collapse:
-    """A choice of the binary nodes that become wide nodes and leaves, on the device.
+    """The binary nodes that become wide nodes and leaves, on the device.
 
-    costs, occlusion: of the binary nodes; roots: the binary nodes that become wide ones; firsts: a
-    wide node's first child and first leaf; leaf_roots: the binary nodes that become wide leaves;
-    totals: how many of both there are, and more.
+    costs, occlusion: of the binary nodes; roots: binary nodes that become wide nodes; firsts: a
+    wide node's first child and first leaf; leaf_roots: binary nodes that become wide leaves;
+    totals: the numbers of both, and the wide tree's figures.
     """
 
     built: Tree
@@ -36,8 +36,10 @@ class Collapse:
 
 @dataclass(frozen=True)
 class Figures:
-    """The numbers of a wide tree's nodes and leaves; steps: (begin, count) of the nodes of each
-    level, the lowest first; stats: those of Bvh."""
+    """The numbers of a wide tree's nodes and leaves.
+
+    steps: (begin, count) of the nodes of each level, the lowest first; stats: see `Bvh`.
+    """
 
     nodes: int
     leaves: int
@@ -46,7 +48,7 @@ class Figures:
 
 
 def collapse(building: Building, built: Tree) -> Collapse:
-    """Enqueue that wide nodes are chosen and numbered; the host waits for nothing."""
+    """Enqueue the choice and numbering of wide nodes; the host does not wait."""
     n = built.count
     costs, occlusion = building.allocate(64 * n), building.allocate(8 * n)
     below = {"nodes": built.nodes, "costs": costs, "occlusion": occlusion}
@@ -66,7 +68,7 @@ def collapse(building: Building, built: Tree) -> Collapse:
 
 
 def figures(building: Building, chosen: Collapse) -> Figures:
-    """Return what a wide tree has; wait for it."""
+    """Wait and return the figures of a wide tree."""
     words = building.read(chosen.totals, 4 + _DEEPEST, np.uint32)
     n_nodes, n_leaves, levels = words[:3].tolist()
     starts = [*words[4 : 4 + levels].tolist(), n_nodes]
@@ -77,7 +79,7 @@ def figures(building: Building, chosen: Collapse) -> Figures:
 
 
 def write_nodes(building: Building, chosen: Collapse, nodes: cl.Buffer) -> None:
-    """Enqueue that wide nodes are written, as many as there are, or as the buffer has room for."""
+    """Enqueue writing of all wide nodes, or as many as the buffer holds."""
     building.run_each(
         _ROOT, "collapse_nodes", nodes.size // 256, nodes=chosen.built.nodes, costs=chosen.costs,
         occlusion=chosen.occlusion, roots=chosen.roots, firsts=chosen.firsts,
@@ -86,7 +88,7 @@ def write_nodes(building: Building, chosen: Collapse, nodes: cl.Buffer) -> None:
 
 
 def write_indices(building: Building, chosen: Collapse, indices: cl.Buffer) -> None:
-    """Enqueue the boxes of leaves that hold one each; the binary leaves come to name them so."""
+    """Enqueue the boxes of leaves with a box each; binary leaves get these numbers."""
     built = chosen.built
     leaves = {"nodes": built.nodes, "items": built.items, "leaf_roots": chosen.leaf_roots}
     building.run_each(_ROOT, "collapse_indices", built.count, indices=indices, **leaves)

@@ -29,7 +29,7 @@ def devices(json_wanted: bool, verbose: int) -> None:
 
     listed = device.devices()
     if not listed:
-        raise DeviceError(f"no OpenCL device: {runtimes.ADVICE}")
+        raise DeviceError(f"no OpenCL device: {runtimes.advice()}")
     failures = {info.index: trial(info) for info in listed}
     if json_wanted:
         terminal.write(json.dumps(as_json(listed, failures), indent=2))

@@ -4,14 +4,35 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..formats import locate
+from ..errors import SceneError, one_line
+from ..formats import errors_of, load, locate
 from .options.loading_options import loading_options
 from .options.scene_path import ScenePath
 from .process import terminal
+
+if TYPE_CHECKING:
+    from ..scene import Scene
+
+
+def read(scene: Path, variables: dict[str, Any]) -> Scene:
+    """Return the scene of a file. Raises SceneError behind the list of all its errors."""
+    try:
+        return load(scene, **variables)
+    except SceneError as error:
+        raise all_of(error, errors_of(locate(scene), **variables)) from None
+
+
+def all_of(first: SceneError, errors: list[SceneError]) -> SceneError:
+    """Print all errors of a file, if there are several; return the error to end with."""
+    if len(errors) < 2:
+        return first
+    for error in errors:
+        click.echo(one_line(str(error)), err=True)
+    return SceneError(f"{len(errors)} things above keep it from being read", file=first.file)
 
 
 @click.command()
@@ -21,11 +42,11 @@ from .process import terminal
 def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
     """Show what the file or folder SCENE holds, without rendering it.
 
+    Of a scene of Mitsuba or PBRT that cannot be read, all reasons are listed, with file and line.
     Of a film, a checkpoint or an image, what it says of itself: see `clpt inspect` for its values.
     """
     locate(scene)
     # Imported where they are needed: help needs none of them, and some bring OpenCL.
-    from ..formats import load
     from ..images import READERS
     from .files.targets import is_film
 
@@ -39,7 +60,7 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
 
         contents = dict(read_contents(scene).facts)
     else:
-        loaded = load(scene, **variables)
+        loaded = read(scene, variables)
         from .files.scene_contents import summary, tidy
 
         contents = summary(loaded)

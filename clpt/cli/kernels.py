@@ -113,10 +113,10 @@ def _opened(scene: Path, mode: str | None, variables: dict[str, Any]) -> Scene:
     if not own:
         locate(scene)
     from clpt.bench.picture_scenes import PICTURES  # here: help needs no OpenCL
-    from clpt.bench.scenes import in_mode, made
+    from clpt.bench.scenes import build_scene, in_mode
 
     if own:
-        return in_mode(made(str(scene)), mode or PICTURES[str(scene)].mode)
+        return in_mode(build_scene(str(scene)), mode or PICTURES[str(scene)].mode)
     return in_mode(load(scene, **variables), mode)
 
 
@@ -129,12 +129,12 @@ def _reproduce(plan: Scene, scene: Path, folder: Path, stage: str, which: str | 
     on = device.choose(which)
     witness = agreement.witness_of(on)
     only = () if stage == FIRST else (stage,)
-    for one in agreement.checked(on, plan, witness, only):
-        if only or one.told:
+    for result in agreement.checked(on, plan, witness, only):
+        if only or result.problem:
             break
     else:
         raise SceneError(f"no stage is wrong beside {witness.name}", file=scene)
-    told = one.told or "right"
-    repro.write(folder, one.launch, str(scene), on.info, witness.name, told)
-    terminal.say(f"{one.launch.stage} on {on.info.label}: {told}, beside {witness.name}", err=False)
+    verdict, launch = result.problem or "right", result.launch
+    repro.write(folder, launch, str(scene), on.info, witness.name, verdict)
+    terminal.say(f"{launch.stage} on {on.info.label}: {verdict}, beside {witness.name}", err=False)
     terminal.say(f"{folder / 'README.txt'} says how to run it without clpt", err=False)

@@ -4,7 +4,7 @@ from typing import Any
 
 
 def __getattr__(name: str) -> Any:
-    """Import `ClusterRenderer` when it is used, not with clpt."""
+    """Import `ClusterRenderer` on its first use, not with clpt."""
     if name == "ClusterRenderer":
         from clpt.cluster.cluster_renderer import ClusterRenderer
 

@@ -1,4 +1,4 @@
-"""Which workers of a cluster take part in a render: those that can, and compute what others do."""
+"""Admission of workers to a render: each must open the job and compute equal bits."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from clpt.scene.fingerprint import Plain
 
 log = logging.getLogger(__name__)
 
-LOOK_SECONDS = 0.5  # between looks at which workers there are
-ANSWER_SECONDS = 30.0  # in which a scheduler answers
+LOOK_SECONDS = 0.5  # between two queries of the scheduler for its workers
+ANSWER_SECONDS = 30.0  # timeout of a scheduler's answer
 GONE = "the scheduler is gone"
 
 
 @dataclass(frozen=True)
 class Job:
-    """A render's work as workers are told it.
+    """A render job as it is sent to workers.
 
     text: from `tasks.describe_job`; bundle: of the scene; folder: holds the files of the bundle.
     """
@@ -38,16 +38,16 @@ class Job:
 
     @cached_property
     def digest(self) -> str:
-        """The SHA-256 by which workers know it: of scene, options, kernels and version."""
+        """The job's SHA-256 for workers: of scene, options, kernels and version."""
         return tasks.digest_of(self.text)
 
 
 @dataclass
 class Agreed:
-    """State that is shared by renderers which render side by side.
+    """State that parallel renderers of a cluster share.
 
-    kind: the class of device that takes part, that of the first worker; "" before there is one.
-    checked: workers whose sample was that of another one.
+    kind: the device class that may take part, set by the first worker; "" before the first.
+    checked: workers whose trial sample equalled another worker's.
     """
 
     kind: str = ""
@@ -56,11 +56,11 @@ class Agreed:
 
 @dataclass
 class Known:
-    """A record of workers that is kept from one run of a render to the next.
+    """The workers of a cluster, remembered between the runs of a render.
 
-    mixed: whether several classes of devices take part; patience: seconds without a worker, until
-    the render ends. records: of the workers that take part, by address; refused: why others do not;
-    lost: how many are gone; classes: of devices that take part, by what they are called.
+    mixed: whether several device classes take part; patience: seconds without a worker until the
+    render fails. records: of participating workers, by address; refused: reasons, by address;
+    lost: the number of workers that left; classes: of participating devices, by their text.
     """
 
     mixed: bool
@@ -75,8 +75,8 @@ class Known:
 class Admission:
     """The workers that may render in one run.
 
-    fit: their classes, by address, with the job open; opening: calls of those that get ready;
-    there: all that the scheduler knows.
+    fit: device classes by address, of workers with the job open; opening: calls of workers that
+    prepare; there: addresses of all workers of the scheduler.
     """
 
     def __init__(self, calls: Calls, job: Job, known: Known):
@@ -84,23 +84,23 @@ class Admission:
         self.fit: dict[str, str] = {}
         self.opening: dict[Call, str] = {}
         self.there: set[str] = set()
-        self._trials: dict[str, tuple[str, str]] = {}  # class, and film of one sample
+        self._trials: dict[str, tuple[str, str]] = {}  # device class, and digest of a trial film
         self._looked, self._seen = -LOOK_SECONDS, time.monotonic()
 
     def admit(self) -> None:
-        """Take in workers that have got ready."""
+        """Admit workers that have opened the job."""
         for call in [call for call in self.opening if call.done()]:
             self._admit(self.opening.pop(call), reply_of(call))
 
     def reopen(self, address: str) -> None:
-        """Note that a worker has the job no longer."""
+        """Note that a worker has closed the job."""
         self.fit.pop(address, None)
         self._trials.pop(address, None)
 
     def follow(self) -> None:
-        """Open the job at workers that came; forget those that went.
+        """Open the job at new workers; forget workers that left.
 
-        Raises ClusterError without a scheduler, and where nobody renders and nobody will.
+        Raises ClusterError without a scheduler, and where no worker renders or can be expected to.
         """
         if time.monotonic() < self._looked + LOOK_SECONDS:
             return
@@ -128,10 +128,10 @@ class Admission:
             raise ClusterError(f"for {known.patience:.0f} s there was no worker")
 
     def look(self) -> set[str]:
-        """The workers that the scheduler knows. Raises ClusterError without a scheduler."""
+        """Return the addresses of all workers. Raises ClusterError without a scheduler."""
         try:
-            asked = self.calls.begin(self.calls.client.scheduler.ncores())
-            addresses = set(asked.result(ANSWER_SECONDS))
+            answer = self.calls.begin(self.calls.client.scheduler.ncores())
+            addresses = set(answer.result(ANSWER_SECONDS))
         except (OSError, TimeoutError, concurrent.futures.TimeoutError, AttributeError) as error:
             raise ClusterError(f"{GONE}; what was rendered so far is kept") from error
         self._looked, self.there = time.monotonic(), addresses
@@ -139,7 +139,7 @@ class Admission:
         return addresses
 
     async def _open(self, address: str) -> tasks.Reply:
-        """Open the job at a worker, with one sample of one that was not checked; its answer."""
+        """Open the job at a worker and return its answer; an unchecked worker renders a trial."""
         at = [address]
         reply = await self.calls.at(at, tasks.open_job, self.job.text, {})
         if "lacks" in reply:
@@ -153,14 +153,14 @@ class Admission:
         return reply if address in self.known.agreed.checked else await self._try(address, reply)
 
     async def _try(self, address: str, opened: tasks.Reply) -> tasks.Reply:
-        """Let a worker render one sample, and tell only the digest of its film."""
+        """Let a worker render a single sample and answer with the digest of its film."""
         reply = await self.calls.at([address], tasks.render_trial, self.job.digest)
         if "error" in reply:
             return reply
         return {**opened, "trial": reply.get("sha256"), "took": reply.get("seconds")}
 
     def _files(self, digests: list[str]) -> dict[str, Any]:
-        """Tasks whose results are files of the bundle; workers get them from each other."""
+        """Return Dask tasks that give files of the bundle; workers share their results."""
         named = self.job.bundle.files.items()
         paths = {digest: self.job.folder / name for name, digest in named}
         return {
@@ -172,7 +172,7 @@ class Admission:
         }
 
     def _admit(self, address: str, reply: tasks.Reply) -> None:
-        """Let a worker render that has the job open, if it may, and its sample is right."""
+        """Admit a worker with the job open, if its device class and its sample agree."""
         agreed, kind = self.known.agreed, str(reply.get("kind", ""))
         reason = reply.get("refused") or reply.get("error")
         if reason is not None:
@@ -195,16 +195,16 @@ class Admission:
             self.fit[address] = kind
 
     def _judge(self) -> None:
-        """Compare the samples of workers of each class, and refuse those whose sample is wrong.
+        """Compare trial samples within each device class; refuse workers with a wrong sample.
 
-        Of two equal ones both are right; a worker without an equal is believed. Raises ClusterError
-        where it cannot be told whose is wrong, and nobody comes who might.
+        Two equal samples count as right; a lone worker is trusted. Raises ClusterError where no
+        majority decides and no other worker is preparing.
         """
         checked = self.known.agreed.checked
         for kind in {kind for kind, _ in self._trials.values()}:
-            films = {name: film for name, (of, film) in self._trials.items() if of == kind}
-            peers = [name for name, of in self.fit.items() if of == kind and name not in films]
-            if len(films) == 1 and peers:  # what do those have that were checked before it came?
+            films = {name: film for name, (k, film) in self._trials.items() if k == kind}
+            peers = [name for name, k in self.fit.items() if k == kind and name not in films]
+            if len(films) == 1 and peers:  # compare with a worker that was checked earlier
                 if peers[0] not in self.opening.values():
                     opened = {"kind": kind, "class": self.known.classes[kind]}
                     self.opening[self.calls.begin(self._try(peers[0], opened))] = peers[0]
@@ -214,7 +214,7 @@ class Admission:
                 votes[film] += 2 if name in checked else 1
             (best, most), (_, second) = [*votes.most_common(2), ("", 0)][:2]
             if self.opening and (most < 2 or most == second):
-                continue  # for another one that gets ready
+                continue  # another worker is preparing
             if most == second:
                 raise ClusterError(
                     f"{' and '.join(films)} have different films of a sample, though they are of "
@@ -229,7 +229,7 @@ class Admission:
                     checked.add(name)
 
     def refuse(self, address: str, reason: str) -> None:
-        """Take nothing more from a worker."""
+        """Exclude a worker from this render."""
         log.warning("the worker %s is refused: %s", address, reason)
         self.known.refused[address] = reason
         self.known.records.pop(address, None)

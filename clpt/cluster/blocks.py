@@ -1,23 +1,49 @@
-"""Which device renders which samples: pure bookkeeping, see `clpt.cluster.crew`.
+"""Bookkeeping of sample ranges and of the blocks that devices render, for `clpt.cluster.crew`.
 
-A block is a range of sample numbers, of all pixels. Films add to the bit, so any device may do any
-block. The clock is the caller's: a test gives its own.
+A block is a range of sample numbers, of all pixels. Films add to the bit, so any device may render
+any block. The caller measures the time.
 """
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-from clpt.cluster.sample_ranges import gaps, with_range
 from clpt.render.film.state import Ranges
 
-GROWTH = 3  # times the size of a worker's last block
-LEAST = 0.1  # of the seconds that a block should take: a smaller one costs more than it helps
-LAST_SHARE = 0.5  # of what a worker's rate lets it do of all that is left: blocks shrink at the end
-MEMORY = 0.5  # part of the last block in a worker's rate
+GROWTH = 3  # at most, over the size of a worker's last block
+LEAST = 0.1  # share of a block's intended seconds, below which overhead dominates
+LAST_SHARE = 0.5  # of the remaining samples by a worker's rate: blocks shrink at the end
+MEMORY = 0.5  # weight of the last block in a worker's rate
 
 Worker = Hashable
+
+
+def with_range(taken: Ranges, first: int, end: int) -> Ranges:
+    """Return ranges and a disjoint range; adjacent ranges become a single range."""
+    before = after = bisect(taken, (first, end))
+    if before and taken[before - 1][1] == first:
+        before -= 1
+        first = taken[before][0]
+    if after < len(taken) and taken[after][0] == end:
+        end = taken[after][1]
+        after += 1
+    return (*taken[:before], (first, end), *taken[after:])
+
+
+def gaps(taken: Ranges, first: int, end: int) -> list[tuple[int, int]]:
+    """Return the ranges of [first, end) that are not taken."""
+    missing = []
+    for start, stop in taken:
+        if start > first:
+            missing.append((first, min(start, end)))
+        first = max(first, stop)
+        if first >= end:
+            break
+    if first < end:
+        missing.append((first, end))
+    return [(a, b) for a, b in missing if a < b]
 
 
 @dataclass(frozen=True)
@@ -34,10 +60,11 @@ class Block:
 
 @dataclass
 class WorkerRecord:
-    """A record of one worker; samples are of the whole picture.
+    """A worker's record; samples are of the whole picture.
 
-    kind: its class of device; workers of one kind have the same bits. rate: [samples/s], 0 when not
-    known; blocks, samples: that it added; size: of its last block [samples]; failures: that it had.
+    kind: device class; workers of a class render the same bits. rate: [samples/s], 0 while
+    unknown; blocks, samples: the number added; size: of the last block [samples]; failures: their
+    number.
     """
 
     kind: str = ""
@@ -48,7 +75,7 @@ class WorkerRecord:
     failures: int = 0
 
     def note(self, samples: float, seconds: float) -> None:
-        """Note a block, and how fast it was."""
+        """Note a finished block and update the rate."""
         self.blocks += 1
         self.samples += samples
         if seconds > 0.0:
@@ -57,10 +84,10 @@ class WorkerRecord:
 
 
 class Blocks:
-    """The samples of a render: done, handed out, and left.
+    """The samples of a render: done, handed out, and free.
 
-    taken: ranges that are done; end: the number after the last sample; seconds: what a block should
-    take. workers: those that are here.
+    taken: ranges that are done; end: the number after the last sample; seconds: intended time of a
+    block. workers: records of the workers that joined.
     """
 
     def __init__(self, end: int, taken: Ranges = (), *, seconds: float = 1.0):
@@ -71,12 +98,12 @@ class Blocks:
 
     @property
     def done(self) -> bool:
-        """Whether all samples are taken."""
+        """Whether all samples are done."""
         return not self._flights and not self._free
 
     @property
     def left(self) -> int:
-        """The number of samples that no worker has been given."""
+        """The number of samples that were not handed out."""
         return sum(end - first for first, end in self._free)
 
     @property
@@ -85,18 +112,18 @@ class Blocks:
         return sum(record.rate for record in self.workers.values())
 
     def join(self, worker: Worker, record: WorkerRecord) -> None:
-        """A worker is there."""
+        """Add a worker."""
         self.workers[worker] = record
 
     def lose(self, worker: Worker) -> None:
-        """A worker is gone: others get its block."""
+        """Remove a worker; its block becomes free."""
         self.workers.pop(worker, None)
         block = self._flights.pop(worker, None)
         if block is not None:
             self._free.insert(0, (block.first, block.end))
 
     def take(self, worker: Worker) -> Block | None:
-        """Return what a worker does next; None where there is nothing for it now.
+        """Return the next block of a worker; None where no block is free or others are faster.
 
         Raises KeyError for a worker that did not join.
         """
@@ -111,18 +138,17 @@ class Blocks:
         return block
 
     def finish(self, worker: Worker, seconds: float) -> None:
-        """A worker has done its block, in some seconds."""
+        """Note that a worker has finished its block, and how long it took."""
         block = self._flights.pop(worker)
         self.taken = with_range(self.taken, block.first, block.end)
         self.workers[worker].note(block.samples, seconds)
 
     def _leaves_to_others(self, record: WorkerRecord) -> bool:
-        """Whether the fastest does all that is left before this worker does one sample."""
+        """Whether the fastest worker finishes all samples before this worker finishes one."""
         fastest = max(other.rate for other in self.workers.values())
         return record.rate > 0.0 and self.left * record.rate < fastest
 
     def _size(self, record: WorkerRecord) -> int:
-        """Return the number of samples for the next block of a worker."""
         if not record.rate:
             return 1
         usual = self.seconds * record.rate

@@ -1,7 +1,7 @@
-"""Scenes that travel: files by the SHA-256 of their content, and a list of their names.
+"""Scenes for other machines: files by the SHA-256 of their content, and a list of their names.
 
-A bundle is bytes and JSON; nothing in it is executed. Whoever receives it keeps its files in the
-cache folder, so that a file comes once, and reads a file only if its digest is right.
+A bundle is bytes and JSON; nothing in it is executed. A receiver keeps the files in the cache
+folder, so that a file travels once, and reads a file only if its digest is right.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from clpt.formats import native
 from clpt.scene import Scene
 
 VERSION = 1
-LIMIT = 8 * 2**30  # bytes of files that are kept
+LIMIT = 8 * 2**30  # bytes of kept files
 SCENE = "scene.json"
 FOLDER = "bundles"  # in clpt's cache folder
-_OPENED = "opened-"  # begins the name of the folder of a scene that is open
-_STALE = 86400.0  # [s] after which it belongs to a process that has died
+_OPENED = "opened-"  # prefix of the folder of an open scene
+_STALE = 86400.0  # [s] after which the folder counts as abandoned
 _NAME = re.compile(r"[A-Za-z0-9_][\w.-]{0,199}", re.ASCII)
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 
 
 @dataclass(frozen=True)
 class Bundle:
-    """The files of a scene: digests by name, one of which is that of scene.json."""
+    """The files of a scene: digests by name, including scene.json."""
 
     files: dict[str, str]
 
@@ -52,8 +52,8 @@ class Bundle:
     def from_json(cls, document: object) -> Bundle:
         """Read a bundle's list.
 
-        Raises ClusterError for a version that is not known, a name that is no plain file name, and
-        what is no digest.
+        Raises ClusterError for an unknown version, a name that is no plain file name, and a text
+        that is no digest.
         """
         if not isinstance(document, dict) or document.get("format") != "clpt bundle":
             raise ClusterError("this is no bundle of a scene")
@@ -70,10 +70,10 @@ class Bundle:
 
 
 def pack(scene: Scene, folder: Path) -> Bundle:
-    """Write a scene and all that it needs into a folder; return its bundle.
+    """Write a scene and all its files into a folder; return its bundle.
 
-    Raises SceneError for what cannot be written, and for materials that are not clpt's own:
-    workers run nothing but clpt.
+    Raises SceneError for a scene that cannot be written, and for custom materials: workers run
+    nothing but clpt.
     """
     native.save(scene, folder / SCENE, copies=True)
     return Bundle({path.name: file_digest(path) for path in sorted(folder.iterdir())})
@@ -89,23 +89,23 @@ class Store:
         self.folder, self.limit = folder or disk_cache.folder() / FOLDER, limit
 
     def lacks(self, bundle: Bundle) -> list[str]:
-        """Return the digests of the files that are not here; one that is damaged goes."""
+        """Return the digests of missing files; damaged files are deleted."""
         return sorted(digest for digest in bundle.digests if not self._holds(digest))
 
     def add(self, digest: str, content: bytes) -> None:
-        """Keep a file. Raises ClusterError if it is not what the digest says, OSError."""
+        """Keep a file. Raises ClusterError if its digest is another, OSError."""
         check_digest(digest)
-        found = hashlib.sha256(content).hexdigest()
-        if found != digest:
-            raise ClusterError(f"a file of the bundle is damaged: {found[:12]} for {digest[:12]}")
+        actual = hashlib.sha256(content).hexdigest()
+        if actual != digest:
+            raise ClusterError(f"a file of the bundle is damaged: {actual[:12]} for {digest[:12]}")
         disk_cache.write(self.folder / digest, content)
         disk_cache.prune(self.folder.parent, self.limit, parts=(self.folder.name,))
 
     @contextmanager
     def opened(self, bundle: Bundle) -> Iterator[Scene]:
-        """Yield the scene of a bundle, whose files are there until the end of the context.
+        """Yield the scene of a bundle, whose files exist until the end of the context.
 
-        Raises ClusterError if a file is missing, SceneError for what cannot be read.
+        Raises ClusterError if a file is missing, SceneError for a file that cannot be read.
         """
         self._clear_old()
         with tempfile.TemporaryDirectory(prefix=_OPENED, dir=self.folder) as folder:
@@ -118,7 +118,7 @@ class Store:
             yield native.load(Path(folder) / SCENE, confined=True)
 
     def _clear_old(self) -> None:
-        """Delete the folders of scenes that processes had open which have died."""
+        """Delete the folders of scenes that dead processes had open."""
         for path in self.folder.glob(f"{_OPENED}*"):
             with suppress(OSError):
                 if time.time() - path.stat().st_mtime > _STALE:
@@ -128,7 +128,7 @@ class Store:
         path = self.folder / digest
         try:
             if file_digest(path) == digest:
-                os.utime(path)  # it is used now
+                os.utime(path)  # marks the last use
                 return True
             path.unlink()
         except OSError:
@@ -137,7 +137,7 @@ class Store:
 
 
 def check_digest(digest: object) -> None:
-    """Raise ClusterError for what is no SHA-256 in hexadecimal."""
+    """Raise ClusterError unless this is a SHA-256 in hexadecimal."""
     if not isinstance(digest, str) or not _DIGEST.fullmatch(digest):
         raise ClusterError(f"this is no digest: {str(digest)[:80]!r}")
 

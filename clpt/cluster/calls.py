@@ -1,4 +1,4 @@
-"""Functions that are run at workers, in the event loop of Dask's client."""
+"""Calls of workers' functions, in the event loop of Dask's client."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from clpt.cluster import tasks
 if TYPE_CHECKING:
     from distributed import Client
 
-MOST_HELD = 4  # films that come in at a time; further ones stay at their workers
+MOST_HELD = 4  # films that are received at a time; others wait at their workers
 
 Call = concurrent.futures.Future[tasks.Reply]
 
@@ -22,8 +22,7 @@ Call = concurrent.futures.Future[tasks.Reply]
 class Calls:
     """Calls of a run to its workers.
 
-    priority: among other renders of the same cluster. film_seconds: in which a film comes in,
-    beside others.
+    priority: among other renders of the same cluster. film_seconds: mean time to receive a film.
     """
 
     def __init__(self, client: Client, priority: Callable[[], float]):
@@ -31,20 +30,20 @@ class Calls:
         self._priority, self._gathering = priority, asyncio.Semaphore(MOST_HELD)
 
     def begin(self, call: Coroutine[Any, Any, Any]) -> concurrent.futures.Future[Any]:
-        """Let Dask's event loop do something. From any thread."""
+        """Run a coroutine in Dask's event loop, from any thread."""
         return asyncio.run_coroutine_threadsafe(call, self.client.loop.asyncio_loop)
 
     def hang_up(self, address: str) -> None:
-        """Wait no longer for what a worker sends that is gone: it may be stopped, and silent."""
+        """Stop waiting for a lost worker's answers: a stopped process stays silent."""
         self.client.loop.add_callback(self.client.rpc.remove, address)
 
     async def at(
         self, addresses: Collection[str], function: Callable[..., Any], *arguments: object
     ) -> tasks.Reply:
-        """Run a function at one of some workers and return what it returns, or an "error"."""
+        """Run a function at a worker of `addresses`; return its reply, or an "error"."""
         from distributed import KilledWorker
 
-        before = 0.0 if function is tasks.render_block else 0.5  # what gets workers ready
+        before = 0.0 if function is tasks.render_block else 0.5  # preparation goes first
         future = self.client.submit(
             function, *arguments, key=f"clpt-{function.__name__}-{secrets.token_hex(8)}",
             workers=[*addresses], priority=self._priority() + before,
@@ -54,13 +53,13 @@ class Calls:
             await future._state.wait()
             async with self._gathering:
                 began = time.monotonic()
-                # Dask gathers for several calls at once: to cancel one would cancel all of them.
+                # Dask gathers for several calls at once: a cancelled call would cancel the others.
                 getting = asyncio.ensure_future(self.client.gather(future, direct=True))
                 reply = await asyncio.shield(getting)
                 if function is tasks.render_block:
                     self.film_seconds = (time.monotonic() - began) / MOST_HELD
         except asyncio.CancelledError as error:
-            if future.status != "cancelled":  # it is this call that is not wanted any more
+            if future.status != "cancelled":  # the client cancelled this call
                 raise
             return {"error": f"the scheduler cancelled a task {error}"}
         except Exception as error:
@@ -75,10 +74,10 @@ class Calls:
 
 
 def reply_of(call: Call) -> tasks.Reply:
-    """Return what a call has come to that is done."""
+    """Return the reply of a finished call."""
     return {"error": "it was cancelled"} if call.cancelled() else call.result()
 
 
 def _outcome(done: asyncio.Future[Any]) -> BaseException | None:
-    """Return what a call has raised that nobody waits for: else asyncio logs it."""
+    """Read the exception of an abandoned call, which asyncio logs otherwise."""
     return None if done.cancelled() else done.exception()

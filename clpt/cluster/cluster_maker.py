@@ -1,4 +1,4 @@
-"""The workers of a cluster that take the samples of one film."""
+"""Rendering of a film by the workers of a cluster."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from clpt.scene.integrators import Integrator
 
 @dataclass(frozen=True, eq=False)
 class FilmSum:
-    """The sum of films, None before there is one; counts: of what all of them took."""
+    """The sum of films, None before the first; counts: of all films together."""
 
     film: FilmState | None = None
     counts: Counts = Counts()
 
     def plus(self, film: Film, *, merged: bool) -> FilmSum:
-        """Return the sum with one film more; merged: whether samples of all pixels are added."""
+        """Return the sum with another film; merged: whether samples of all pixels are added."""
         total = film.state
         if self.film is not None:
             total = self.film.merged(total) if merged else self.film.plus(total)
@@ -51,8 +51,8 @@ class FilmSum:
 class ClusterMaker(HostMaker):
     """Workers of a cluster, whose films are added as they come.
 
-    farm: the workers; device: of this machine, where the film is shown and its noise is measured,
-    once that is asked for; options: see `ClusterRenderer`.
+    farm: the workers; device: of this machine, opened on first use, for pictures and noise;
+    options: see `ClusterRenderer`.
     """
 
     adds_films = True
@@ -67,8 +67,8 @@ class ClusterMaker(HostMaker):
         self.start = time.perf_counter()
         self.farm, self._device, self._options = farm, device, options
         self._home: DeviceFilm | None = None
-        self._sum = self._whole = FilmSum()  # of all films, and of those of whole blocks
-        self._shown: FilmState | None = None  # that the home has
+        self._sum = self._whole = FilmSum()  # of all films; of films of whole blocks only
+        self._shown: FilmState | None = None  # the film on the home device
         self._pack(scene)
 
     @property
@@ -77,7 +77,7 @@ class ClusterMaker(HostMaker):
         return self._scene
 
     def _pack(self, scene: Scene) -> None:
-        """Write the scene as workers get it."""
+        """Write the scene's bundle, which workers read."""
         denoise = self._options.get("denoise")
         self._scene = scene = needs.prepared(scene, denoise)
         self._folder = tempfile.TemporaryDirectory(prefix="clpt-bundle-")
@@ -88,7 +88,7 @@ class ClusterMaker(HostMaker):
             options["halves"] = True
         self.job = Job(tasks.describe_job(bundle, options), bundle, folder)
 
-    # ---- what there is
+    # ---- state
 
     @property
     def home(self) -> DeviceFilm:
@@ -105,12 +105,12 @@ class ClusterMaker(HostMaker):
 
     @property
     def warnings(self) -> list[str]:
-        """None: workers are told of by `refused` and `lost`."""
+        """Empty: `refused` and `lost` report workers."""
         return []
 
     @property
     def counts(self) -> Counts:
-        """Counts of all blocks that were added."""
+        """Counts of all added blocks."""
         return self._sum.counts
 
     @property
@@ -121,10 +121,10 @@ class ClusterMaker(HostMaker):
     # ---- samples
 
     def prepare(self) -> None:
-        """Leave it to the workers, who do so by themselves."""
+        """Do nothing: workers prepare themselves."""
 
     def begin(self, call: Call, now: Contents, more: Contents) -> Settle:
-        """Return what makes the film whole; see `Maker`. It keeps all that came."""
+        """Return a function that completes the film; see `Maker`. It keeps every film."""
 
         def settle(error: BaseException | None) -> Contents:
             if more.adaptive is None:
@@ -138,13 +138,13 @@ class ClusterMaker(HostMaker):
         return settle
 
     def run(self, call: Call, adaptive: Adaptive | None, tick: Callable[[], bool]) -> bool:
-        """Add samples to all pixels, which fill gaps, or to those with noise; see `Farm.run`."""
+        """Add samples to all pixels, filling gaps, or to noisy pixels; see `Farm.run`."""
         if adaptive is not None and call.noise is not None:
             return adaptive.run(call.end, call.noise, lambda _: tick())
         if adaptive is None:
             return self._take(Selection("all", 1), 1, self._range(call), self._sum.taken, tick)
         finished = self.add(Selection("all", self._pixels), call.first, call.end, tick)
-        adaptive.skip(call.end)  # after a stop too: numbers are not used again
+        adaptive.skip(call.end)  # after a stop too: sample numbers are not reused
         return finished
 
     @property
@@ -152,7 +152,7 @@ class ClusterMaker(HostMaker):
         return self.home.wavefront.paths.pixels
 
     def _range(self, call: Call) -> tuple[int, int]:
-        """Return the range in which as many samples are missing as a call wants."""
+        """Return a range with as many missing samples as the call asks for."""
         taken = self._sum.taken
         left = call.end - call.first
         first = end = call.first - sum(after - before for before, after in taken)
@@ -164,14 +164,14 @@ class ClusterMaker(HostMaker):
         return first, end + left
 
     def add(self, selection: Selection, first: int, end: int, tick: Callable[[], bool]) -> bool:
-        """Add samples first to end - 1 of a selection; return whether it was not stopped."""
+        """Add samples first to end - 1 of a selection; return False after a stop."""
         return self._take(selection, self._pixels, (first, end), None, tick)
 
     def _take(
         self, selection: Selection, pixels: int, samples: tuple[int, int], taken: Ranges | None,
         tick: Callable[[], bool],
     ) -> bool:  # fmt: skip
-        """Add samples, see `Farm.run`; taken: None where pixels differ in what they have."""
+        """Add samples, see `Farm.run`; taken: None where pixels have different samples."""
         merged = taken is not None
 
         def add(film: Film) -> None:
@@ -186,29 +186,29 @@ class ClusterMaker(HostMaker):
 
     @property
     def film(self) -> FilmState | None:  # type: ignore[override]
-        """The film of all that has come."""
+        """The sum of all films."""
         return self._sum.film
 
     def put(self, state: FilmState, counts: Counts | None = None) -> None:
-        """Let the film be another one."""
+        """Replace the film."""
         self._sum = self._whole = FilmSum(state, self.counts if counts is None else counts)
 
     def shown(self) -> DeviceFilm:
-        """Return the device of this machine, whose own film is now the whole one."""
+        """Return the device of this machine after it received the whole film."""
         home, film = self.home, self.film
         if self._shown is not film:
-            self._shown = None  # wherever an error comes
+            self._shown = None  # valid after an error at any line
             home.put(home.no_words if film is None else film)
             self._shown = film
         return home
 
     def hold(self, taken: Ranges) -> Held:
-        """Keep the film of whole blocks: those that a stop cut are in the picture alone."""
+        """Keep the film of whole blocks; blocks that a stop cut are in the picture only."""
         film, counts = self._whole.film, self._whole.counts
         return Held(lambda: self.home.no_words if film is None else film, counts, taken)
 
     def empty(self, *, seed: int | None = None, recover: bool = False) -> None:
-        """Let the film be empty; workers open the scene with another seed at the next call."""
+        """Empty the film; workers open the scene with another seed at the next call."""
         if seed is not None:
             self._take_scene(replace(self.scene, seed=seed))
         self._sum = self._whole = FilmSum()
@@ -216,8 +216,8 @@ class ClusterMaker(HostMaker):
     def update(self, changes: Changes, events: dev.Events, apply: Apply) -> None:
         """Render another scene from now on; workers open it at the next call.
 
-        What is known of the workers stays. Raises SceneError for a scene that cannot be written, or
-        has materials that are not clpt's own, and for changes of a part alone.
+        Records of workers stay. Raises SceneError for a scene that cannot be written, for custom
+        materials, and for changes of a part of the scene.
         """
         if changes.by_key:
             raise SceneError("give the whole scene", where=min(changes.by_key))
@@ -242,10 +242,10 @@ class ClusterMaker(HostMaker):
             self._home.empty()
 
     def follow(self, way: Integrator, apply: Apply) -> None:
-        """Leave it to the workers, which agree on a way."""
+        """Do nothing: workers agree on an integrator."""
 
     def close(self) -> None:
-        """Give back what this machine holds; workers keep the scene until another needs room."""
+        """Free this machine's resources; workers keep the scene until another needs room."""
         self._folder.cleanup()
         if self._home is not None:
             self._home.close()

@@ -16,26 +16,28 @@ from clpt.scene import Scene
 if TYPE_CHECKING:
     from distributed import Client
 
-NO_WORKER_SECONDS = 300.0  # without any worker, until the render ends
+NO_WORKER_SECONDS = 300.0  # without any worker, until the render fails
 
 
 class ClusterRenderer(DevicePictures):
     """Renders a scene on the workers of a cluster, with the methods of `Renderer`.
 
-    client: of Dask, of any cluster whose workers have clpt installed. mixed: whether workers of
-    different classes of device may take part; the last bits of the picture then depend on who
-    rendered what. first_sample: the number of the first sample. device: where pictures are made of
-    the film, and its noise is measured, on this machine. beside: a renderer of the same cluster, at
-    whose side this one renders, by devices of one class.
-    options: halves, layout, queued, looped, slots, texture_budget, tree_quality, denoise, as of
+    client: a Dask client of any cluster whose workers have clpt installed. mixed: whether workers
+    of different device classes may take part; the last bits of the picture then depend on the
+    distribution of samples. patience: seconds without any worker until the render fails.
+    first_sample: the number of the first sample. device: of this machine, for pictures and noise
+    measurements. beside: a renderer of the same cluster that renders at the same time; both use
+    the same device class.
+    options: halves, layout, queued, looped, slots, texture_budget, tree_quality, denoise, see
     `Renderer`.
 
-    The film is added up here, and is kept whatever happens to the cluster. At a stop workers send
-    what they have; the next run renders what is missing, but with noise no number is used again. It
-    may be used by one thread; `cancel` from any. warnings: for people.
+    This process adds the films up and keeps the sum whatever happens to the cluster. At a stop
+    workers send partial films; the next run renders the missing samples, but with a noise limit no
+    sample number is reused. A single thread may use the renderer; `cancel` works from any thread.
+    warnings: for people.
 
-    Raises TypeError for what is no scene or option, SceneError for a scene that cannot be written,
-    or has materials that are not clpt's own.
+    Raises TypeError for an unknown option or anything but a scene, SceneError for a scene that
+    cannot be written and for custom materials.
     """
 
     _maker: ClusterMaker
@@ -66,26 +68,25 @@ class ClusterRenderer(DevicePictures):
 
     @property
     def digest(self) -> str:
-        """The SHA-256 by which workers know the job: of scene, options, kernels and version."""
+        """The job's SHA-256 for workers: of scene, options, kernels and version."""
         return self._maker.job.digest
 
     @property
     def workers(self) -> dict[str, WorkerRecord]:
-        """A record of each worker, by its address: its rate, blocks, samples, failures."""
+        """Records of workers by address: rate, blocks, samples, failures."""
         return dict(self.farm.known.records)
 
     @property
     def _device_text(self) -> str:
-        """The classes of the workers' devices, for people."""
         kinds = {record.kind for record in self.workers.values()}
         return "; ".join(sorted(kinds)) or super()._device_text
 
     @property
     def refused(self) -> dict[str, str]:
-        """The reasons why workers take no part, by their addresses."""
+        """The reasons why workers were refused, by address."""
         return dict(self.farm.known.refused)
 
     @property
     def lost(self) -> int:
-        """The number of workers that are gone."""
+        """The number of workers that left."""
         return self.farm.known.lost

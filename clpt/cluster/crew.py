@@ -1,7 +1,7 @@
-"""Devices that share the samples of a picture: a thread each, which takes blocks while it is free.
+"""Devices that share the samples of a picture: each has a thread that takes blocks.
 
 Each device adds its blocks to its own film, so that a block costs nothing beside its samples. A
-device that fails is dropped, and what only its film held is done again by the others.
+device that fails is dropped, and the others render again the samples of its film.
 """
 
 from __future__ import annotations
@@ -14,9 +14,8 @@ from dataclasses import replace
 from functools import partial
 from typing import NoReturn
 
-from clpt.cluster.blocks import Block, Blocks, WorkerRecord
+from clpt.cluster.blocks import Block, Blocks, WorkerRecord, gaps
 from clpt.cluster.device_worker import DeviceWorker
-from clpt.cluster.sample_ranges import gaps
 from clpt.cluster.threads import TICK, Threads
 from clpt.errors import ClusterError
 from clpt.render.film.state import FilmState, Ranges, join_ranges
@@ -26,16 +25,16 @@ from clpt.render.wavefront.wavefront import Counts
 
 log = logging.getLogger(__name__)
 
-BLOCK_SECONDS = 1.0  # that a block should take
-SAVE_SECONDS = 60.0  # of a device's work, after which its film goes to the host: no more is lost
+BLOCK_SECONDS = 1.0  # intended time of a block
+SAVE_SECONDS = 60.0  # of work, after which a film goes to the host: a failure loses no more
 
 
 class Crew:
     """Devices that work together.
 
-    workers: those that have not failed; failed: the names and errors of the others. saved: the film
-    on the host of what they took, None for an empty one. lost: selections and ranges of samples
-    that no film holds any more.
+    workers: devices that work; failed: failed devices with their errors. saved: the film on the
+    host, None while it is empty. lost: selections and ranges of samples that no film holds any
+    more.
     """
 
     def __init__(self, workers: Iterable[DeviceWorker]):
@@ -44,20 +43,20 @@ class Crew:
         self.saved: FilmState | None = None
         self.lost: list[tuple[Selection, int, int]] = []
         self._lock = threading.RLock()
-        self._changed = threading.Condition(self._lock)  # only threads of devices wait for it
+        self._changed = threading.Condition(self._lock)  # only devices' threads wait for it
         self._threads = Threads()
-        self._past = Counts()  # of devices that failed
+        self._past = Counts()  # of failed devices
 
     @property
     def first(self) -> DeviceWorker:
-        """The first device that has not failed. Raises ClusterError if all have."""
+        """The first working device. Raises ClusterError if all have failed."""
         if not self.workers:
             self._give_up()
         return self.workers[0]
 
     @property
     def counts(self) -> Counts:
-        """Counts of all devices together, those that were dropped included."""
+        """Counts of all devices together, including failed devices."""
         total = self._past
         for worker in self.workers:
             total = total.plus(worker.counts)
@@ -65,7 +64,7 @@ class Crew:
 
     @property
     def ranges(self) -> Ranges:
-        """The samples of all pixels that are in a film."""
+        """The sample ranges of all pixels, over all films."""
         ranges = () if self.saved is None else self.saved.taken
         for worker in self.workers:
             ranges = join_ranges(ranges, worker.ranges)
@@ -77,10 +76,10 @@ class Crew:
         return Selection("all", self.first.film.wavefront.paths.pixels)
 
     def run(self, selection: Selection, ranges: Ranges, tick: Callable[[], bool]) -> bool:
-        """Add ranges of a selection's samples; return whether it was not stopped.
+        """Add ranges of a selection's samples; return False after a stop.
 
-        tick: called all the while; if it returns False, devices stop. What it raises is raised when
-        they have. Raises ClusterError when no device is left.
+        tick: called repeatedly; if it returns False, devices stop. Its exceptions pass on after
+        devices have stopped. Raises ClusterError when no device is left.
         """
         finished = self._share(selection, ranges, tick)
         while finished and self.lost:
@@ -88,7 +87,7 @@ class Crew:
         return finished
 
     def repeat(self, tick: Callable[[], bool]) -> bool:
-        """Do again what was lost, as `run` does it."""
+        """Render lost samples again, see `run`."""
         selection = self.lost[0][0]
         again: Ranges = ()
         for other, first, end in self.lost:
@@ -98,7 +97,7 @@ class Crew:
         return self._share(selection, again, tick)
 
     def save(self) -> None:
-        """Bring to the host what only films on devices hold; do again what cannot be read."""
+        """Add devices' films to the host's; render again the samples of unreadable films."""
         while True:
             for worker in [w for w in self.workers if w.unsaved]:
                 try:
@@ -111,23 +110,23 @@ class Crew:
                 self.lost.clear()
 
     def use_all_pixels(self) -> None:
-        """Let later renders sample every pixel, after selections of some."""
+        """Let later renders sample every pixel, after selections of some pixels."""
         self._on_each(DeviceWorker.use_all_pixels)
 
     def count_from(self, counts: Counts) -> None:
-        """Count from these, when films on devices are empty."""
+        """Start counting from these counts, when devices' films are empty."""
         self._past = counts
         for worker in self.workers:
             worker.past = Counts()
 
     def put(self, film: FilmState | None) -> None:
-        """Let a film be that of all devices."""
+        """Replace the film of all devices."""
         self._on_each(DeviceWorker.clear)
         self.lost.clear()
         self.saved = film
 
     def hold(self, taken: Ranges) -> Held:
-        """Keep copies of films on their devices. Raises ClusterError where one has failed."""
+        """Keep copies of films on their devices. Raises ClusterError after a device's failure."""
         if self.lost:
             raise ClusterError("a device has failed: others do its part first")
         workers, saved = [worker for worker in self.workers if worker.unsaved], self.saved
@@ -145,7 +144,7 @@ class Crew:
         return Held(read, self.counts, taken)
 
     def drop(self, worker: DeviceWorker, error: BaseException) -> None:
-        """Leave a device out from now on."""
+        """Remove a failed device."""
         with self._lock:
             if worker not in self.workers:
                 return
@@ -158,7 +157,7 @@ class Crew:
         log.warning("%s failed and is left out, %s: %s", worker.name, others, error)
 
     def _on_each(self, action: Callable[[DeviceWorker], None]) -> None:
-        """Do something on every device; drop those that fail."""
+        """Run an action on every device; drop devices that fail."""
         for worker in list(self.workers):
             try:
                 action(worker)
@@ -171,7 +170,7 @@ class Crew:
         raise ClusterError(message) from error
 
     def _share(self, selection: Selection, ranges: Ranges, tick: Callable[[], bool]) -> bool:
-        """Add ranges of a selection's samples once, perhaps with losses."""
+        """Add ranges of a selection's samples; failures may leave `lost` samples."""
         end = ranges[-1][1]
         others = tuple(gaps(ranges, 0, end))
         blocks = Blocks(end, others, seconds=BLOCK_SECONDS)
@@ -197,18 +196,18 @@ class Crew:
         return self._threads.over or blocks.done or not self.workers
 
     def rest(self) -> None:
-        """Let devices end what they do, and wait for them."""
+        """Stop all devices' threads and wait for them."""
         self._threads.end()
 
     def _tell(self) -> None:
-        """Wake up all who wait for a change."""
+        """Wake up all waiting threads."""
         self._changed.notify_all()
         self._threads.tell()
 
     def _work(
         self, worker: DeviceWorker, blocks: Blocks, selection: Selection, threads: Threads
     ) -> None:
-        """Take blocks until none is left: a device's thread, one of these."""
+        """Render blocks until none is left, in a device's thread."""
 
         def goes_on(_: object = None) -> bool:
             return not threads.over
@@ -232,13 +231,13 @@ class Crew:
     def _next(
         self, worker: DeviceWorker, blocks: Blocks, goes_on: Callable[[], bool]
     ) -> Block | None:
-        """Wait for a block; return None when there is nothing more to do."""
+        """Wait for a block; return None at the end."""
         with self._changed:
             while goes_on() and not blocks.done:
                 block = blocks.take(worker)
                 if block is not None:
                     return block
-                self._changed.wait(TICK)  # the main thread tells nobody that they are over
+                self._changed.wait(TICK)  # the main thread does not notify at a stop
         return None
 
     def _note(
@@ -250,7 +249,7 @@ class Crew:
         seconds: float,
         finished: bool,
     ) -> None:
-        """Note that a block is in a device's film, wholly or, where it was stopped, in part."""
+        """Note that a device's film has a block, or a part of it after a stop."""
         with self._changed:
             worker.unsaved.append((selection, block.first, block.end))
             worker.unsaved_seconds += seconds
@@ -261,9 +260,9 @@ class Crew:
             self._tell()
 
     def _save(self, worker: DeviceWorker) -> None:
-        """Add a device's film to the one on the host."""
+        """Add a device's film to the host's."""
         ranges = worker.ranges
         state = worker.take()
         with self._lock:
-            given = replace(state, taken=ranges)
-            self.saved = given if self.saved is None else self.saved.merged(given)
+            film = replace(state, taken=ranges)
+            self.saved = film if self.saved is None else self.saved.merged(film)

@@ -1,4 +1,4 @@
-"""A device that works on a picture with others: its maker, and what only its own film holds."""
+"""A device that shares a picture with others: its film and the samples that only it holds."""
 
 from __future__ import annotations
 
@@ -14,36 +14,35 @@ from clpt.render.makers.device_film import DeviceFilm
 from clpt.render.wavefront.tracer import OnBatch, Selection, use_all_pixels
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 
-_Made = TypeVar("_Made")
+_Value = TypeVar("_Value")
 
 
 class Once:
-    """Things that several devices share: each is made for the first that asks, and kept."""
+    """Values that several devices share: the first request computes a value."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._made: dict[Any, Any] = {}
+        self._values: dict[Any, Any] = {}
 
-    def __call__(self, key: object, make: Callable[[], _Made]) -> _Made:
-        """Return what was made for a key. Raises what `make` raised."""
+    def __call__(self, key: object, make: Callable[[], _Value]) -> _Value:
+        """Return the value of a key. Repeats a SceneError of `make`."""
         with self._lock:
-            if key not in self._made:
+            if key not in self._values:
                 try:
-                    self._made[key] = make()
+                    self._values[key] = make()
                 except SceneError as error:
-                    self._made[key] = error
-            if isinstance(self._made[key], SceneError):
-                raise self._made[key]
-            return self._made[key]
+                    self._values[key] = error
+            if isinstance(self._values[key], SceneError):
+                raise self._values[key]
+            return self._values[key]
 
 
 class DeviceWorker:
     """A device that works with others.
 
-    name: for people; film: its own; unsaved: the selections and ranges of samples that it holds,
-    and nothing else does; shown: the film that it was made to be, if any; is_other: whether it may
-    be another one than that of `unsaved`; paths: that it traced; rate: of paths [1/s], 0 when not
-    known.
+    name: for people; film: of this device; unsaved: selections and ranges of samples that only
+    this film holds; shown: the film that `show` wrote, if any; is_other: whether the film may
+    differ from `unsaved`; paths: the number traced; rate: of paths [1/s], 0 while unknown.
     """
 
     def __init__(self, name: str, film: DeviceFilm):
@@ -58,12 +57,12 @@ class DeviceWorker:
 
     @property
     def counts(self) -> Counts:
-        """Counts of what the device has rendered so far."""
+        """Counts of all samples of this device."""
         return self.past.plus(self.film.wavefront.counts)
 
     @property
     def ranges(self) -> Ranges:
-        """The samples of all pixels that only its film holds."""
+        """The sample ranges of all pixels that only this film holds."""
         ranges: Ranges = ()
         for selection, first, end in self.unsaved:
             if selection.paths == "all":
@@ -71,7 +70,7 @@ class DeviceWorker:
         return ranges
 
     def do(self, selection: Selection, first: int, end: int, on_batch: OnBatch) -> bool:
-        """Add samples first to end - 1 to the film; return whether it was not stopped."""
+        """Add samples first to end - 1 to the film; return False after a stop."""
         wavefront = self.film.wavefront
         former, by = self._selected or (None, None)
         if selection is not former or by is not wavefront:
@@ -93,20 +92,20 @@ class DeviceWorker:
         self.is_other = False
 
     def use_all_pixels(self) -> None:
-        """Let later samples be of every pixel."""
+        """Let later calls sample every pixel."""
         self._selected = None
         use_all_pixels(self.film.wavefront)
 
     def show(self, state: FilmState) -> None:
-        """Let the film be another one."""
+        """Replace the film, for pictures."""
         if self.shown is not state:
-            self.is_other, self.shown = True, None  # wherever an error comes
+            self.is_other, self.shown = True, None  # valid after an error at any line
             self.film.put(state)
             self.shown = state
 
 
 def device_names(devices: list[Device]) -> list[str]:
-    """Return what devices are called: those with one label get a number."""
+    """Return names of devices: devices with equal labels get numbers."""
     labels = [device.info.label for device in devices]
     return [
         f"{label} #{labels[: i + 1].count(label)}" if labels.count(label) > 1 else label
@@ -114,10 +113,10 @@ def device_names(devices: list[Device]) -> list[str]:
     ]
 
 
-def where_it_works(action: Callable[[Any], Any], items: list[Any]) -> list[Any]:
-    """Do something with every item at once; return the results, for some of them exceptions.
+def results_where_possible(action: Callable[[Any], Any], items: list[Any]) -> list[Any]:
+    """Run an action for all items in parallel; return results, exceptions for failed items.
 
-    Raises what was raised for the first item, if it is bad input or if all failed.
+    Raises the first SceneError or TypeError, and the first exception where all items failed.
     """
     results = on_all(action, items)
     errors = [result for result in results if isinstance(result, BaseException)]

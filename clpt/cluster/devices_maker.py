@@ -1,4 +1,4 @@
-"""Several devices of this machine that take the samples of one film."""
+"""Rendering of a film by several devices of this machine."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from clpt import device as dev
 from clpt.cluster.crew import Crew
-from clpt.cluster.device_worker import DeviceWorker, Once, device_names, where_it_works
+from clpt.cluster.device_worker import DeviceWorker, Once, device_names, results_where_possible
 from clpt.cluster.host_maker import HostMaker
 from clpt.errors import SceneError
 from clpt.render.film.state import FilmState, Ranges
@@ -30,9 +30,9 @@ from clpt.scene.integrators import Integrator
 class DevicesMaker(HostMaker):
     """Devices that share the samples, each with a film of its own.
 
-    options: see `RenderOptions`. The first device that has not failed is the home. What it knows of
-    noise is kept on the host after each call, by `Adaptive.keep`: where it fails, the call begins
-    again on the next one, which takes the same samples and comes to the same decisions.
+    options: see `RenderOptions`. The first working device is the home. `Adaptive.keep` copies its
+    noise estimates to the host after each call: after its failure the call starts again on the
+    next device, which takes the same samples and makes the same decisions.
     """
 
     def __init__(self, scene: Scene, devices: Sequence[dev.Device], options: RenderOptions):
@@ -40,30 +40,32 @@ class DevicesMaker(HostMaker):
         if options.get("texture_budget") is None:
             options["texture_budget"] = min(texture_budget_of(device) for device in devices)
         share = Once()
-        made = where_it_works(lambda on: DeviceFilm(scene, on, options, share), list(devices))
+        films = results_where_possible(
+            lambda on: DeviceFilm(scene, on, options, share), list(devices)
+        )
         workers, self._lost_at_first = [], list[str]()
-        for name, result in zip(device_names(list(devices)), made, strict=True):
+        for name, result in zip(device_names(list(devices)), films, strict=True):
             if isinstance(result, DeviceFilm):
                 workers.append(DeviceWorker(name, result))
             else:
                 self._lost_at_first.append(f"{name} failed and is left out: {result}")
         self.crew = Crew(workers)
 
-    # ---- what there is
+    # ---- state
 
     @property
     def home(self) -> DeviceFilm:
-        """The first device that has not failed. Raises ClusterError if all have."""
+        """The first working device. Raises ClusterError if all have failed."""
         return self.crew.first.film
 
     @property
     def devices(self) -> tuple[dev.Device, ...]:
-        """The devices that have not failed."""
+        """The working devices."""
         return tuple(worker.film.device for worker in self.crew.workers)
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of the scene, and one of each device that failed."""
+        """Warnings of the scene and of failed devices."""
         crew = self.crew
         failed = [f"{worker.name} failed and is left out: {error}" for worker, error in crew.failed]
         of_scene = crew.workers[0].film.warnings if crew.workers else []
@@ -71,16 +73,16 @@ class DevicesMaker(HostMaker):
 
     @property
     def counts(self) -> Counts:
-        """Counts of all devices so far."""
+        """Counts of all devices together."""
         return self.crew.counts
 
     @property
     def classes(self) -> tuple[Mapping[str, Plain], ...]:
-        """The class of all devices together."""
+        """The common class of all devices."""
         each = [worker.film.device_class() for worker in self.crew.workers]
         together = dict(self.home.device_class())
         for name in together:
-            values = list(dict.fromkeys(str(one[name]) for one in each))
+            values = list(dict.fromkeys(str(properties[name]) for properties in each))
             if len(values) > 1:
                 together[name] = " and ".join(values)
         return (together,)
@@ -89,12 +91,13 @@ class DevicesMaker(HostMaker):
 
     def prepare(self) -> None:
         """Run every kernel of `run` once on each device."""
-        self._on_each(lambda one: one.wavefront.render_samples(0, 0))
+        self._on_each(lambda film: film.wavefront.render_samples(0, 0))
 
     def begin(self, call: Call, now: Contents, more: Contents) -> Settle:
-        """Return what makes the film whole; see `Maker`.
+        """Return a function that completes the film; see `Maker`.
 
-        The film holds what devices took. With adaptive sampling an error leaves it as it was.
+        The film holds the samples of all devices. With adaptive sampling an error leaves it as it
+        was.
         """
         film, adaptive = self.crew.saved, more.adaptive
         state = {} if adaptive is None else adaptive.arrays()
@@ -115,7 +118,7 @@ class DevicesMaker(HostMaker):
     def run(self, call: Call, adaptive: Adaptive | None, tick: Callable[[], bool]) -> bool:
         """Add samples to the film; return whether all were added.
 
-        Raises ClusterError when the last device has failed: the film has what was saved of it.
+        Raises ClusterError when the last device has failed: the film then holds the saved samples.
         """
         if adaptive is None:
             return self.add(self.crew.whole, call.first, call.end, tick)
@@ -138,11 +141,11 @@ class DevicesMaker(HostMaker):
         if call.noise is not None:
             return adaptive.run(call.end, call.noise, lambda _: tick())
         finished = self.add(self.crew.whole, call.first, call.end, tick)
-        adaptive.skip(call.end)  # after a stop too: numbers are not used again
+        adaptive.skip(call.end)  # after a stop too: sample numbers are not reused
         return finished
 
     def add(self, selection: Selection, first: int, end: int, tick: Callable[[], bool]) -> bool:
-        """Add samples first to end - 1 of a selection; return whether it was not stopped."""
+        """Add samples first to end - 1 of a selection; return False after a stop."""
         return self.crew.run(selection, ((first, end),), tick)
 
     def use_all_pixels(self) -> None:
@@ -150,13 +153,13 @@ class DevicesMaker(HostMaker):
         self.crew.use_all_pixels()
 
     def adaptively(self, arrays: Mapping[str, NDArray[Any]], first: int) -> Adaptive:
-        """Return adaptive sampling of the film, on the first device where it works."""
+        """Return adaptive sampling of the film, on the first working device."""
         while True:
             home = self.home
             try:
-                begun = super().adaptively(arrays, first)
-                begun.keep()
-                return begun
+                adaptive = super().adaptively(arrays, first)
+                adaptive.keep()
+                return adaptive
             except SceneError:
                 raise
             except Exception as error:
@@ -166,20 +169,20 @@ class DevicesMaker(HostMaker):
 
     @property
     def film(self) -> FilmState | None:  # type: ignore[override]
-        """The film of all that has come to the host."""
+        """The film on the host."""
         return self.crew.saved
 
     @property
     def is_scattered(self) -> bool:
-        """Whether devices have samples that the host has not."""
+        """Whether devices hold samples that the host lacks."""
         return any(worker.unsaved for worker in self.crew.workers)
 
     def gather(self) -> None:
-        """Bring what devices have to the host; others do again what cannot be read."""
+        """Add devices' films to the host's; samples of unreadable films are rendered again."""
         self.crew.save()
 
     def words(self, *names: str) -> FilmState:
-        """Return the film, whose parts are together."""
+        """Return the film after `gather`."""
         while True:
             if self.film is not None:
                 return self.film
@@ -190,13 +193,13 @@ class DevicesMaker(HostMaker):
                 self._drop(home.wavefront, error)
 
     def put(self, state: FilmState | None, counts: Counts | None = None) -> None:
-        """Let the film be another one."""
+        """Replace the film."""
         self.crew.put(state)
         if counts is not None:
             self.crew.count_from(counts)
 
     def shown(self) -> DeviceFilm:
-        """Return the first device, whose own film is now the whole one."""
+        """Return the first device after it received the whole film."""
         while True:
             first, film = self.crew.first, self.film
             try:
@@ -207,16 +210,16 @@ class DevicesMaker(HostMaker):
                 self.crew.drop(first, error)
 
     def hold(self, taken: Ranges) -> Held:
-        """Let each device keep a copy of what only it has. Raises MemoryBudgetError."""
+        """Let each device keep a copy of its film. Raises MemoryBudgetError."""
         if self.film is None and not self.is_scattered:
             return Held(lambda: self.words(), self.counts, taken)
         return self.crew.hold(taken)
 
     def empty(self, *, seed: int | None = None, recover: bool = False) -> None:
-        """Let all films be empty; an error at any line may have left them as they are."""
+        """Empty all films; an error at any line may have left them in any state."""
         crew = self.crew
         crew.rest()
-        self._on_each(lambda one: one.empty(seed=seed, recover=True))
+        self._on_each(lambda film: film.empty(seed=seed, recover=True))
         crew.put(None)
         crew.use_all_pixels()
         crew.count_from(Counts())
@@ -224,26 +227,26 @@ class DevicesMaker(HostMaker):
     def update(self, changes: Changes, events: dev.Events, apply: Apply) -> None:
         """Render another scene from now on, which is lowered once for all devices."""
         share = Once()
-        self._write(lambda one: one.update(changes, events, _written, share), apply)
+        self._write(lambda film: film.update(changes, events, _written, share), apply)
 
     def follow(self, way: Integrator, apply: Apply) -> None:
-        """Render in another way, which made a film that is gone on with."""
+        """Change to the integrator of a film that is continued."""
         share = Once()
-        self._write(lambda one: one.follow(way, _written, share), apply)
+        self._write(lambda film: film.follow(way, _written, share), apply)
 
     def _write(self, action: Callable[[DeviceFilm], None], apply: Apply) -> None:
         """Change the scene on every device at once."""
         apply(lambda: self._on_each(action), refusals=(Exception,))
 
     def close(self) -> None:
-        """Give the memory of all devices back."""
+        """Free the memory of all devices."""
         for worker in [*self.crew.workers, *(worker for worker, _ in self.crew.failed)]:
             worker.film.close()
 
     # ---- inside
 
     def _drop(self, wavefront: Wavefront, error: BaseException) -> None:
-        """Leave a device out from now on. Raises the error where no other is left."""
+        """Remove a failed device. Raises the error where no other device works."""
         for worker in list(self.crew.workers):
             if worker.film.wavefront is wavefront:
                 self.crew.drop(worker, error)
@@ -251,18 +254,18 @@ class DevicesMaker(HostMaker):
             raise error
 
     def _on_each(self, action: Callable[[DeviceFilm], Any]) -> None:
-        """Do something on every device at once; drop those that fail, unless all do.
+        """Run an action on all devices in parallel; drop devices that fail, unless all fail.
 
-        Raises SceneError, TypeError as the first device does.
+        Raises the first SceneError or TypeError.
         """
         workers = list(self.crew.workers)
-        results = where_it_works(lambda worker: action(worker.film), workers)
+        results = results_where_possible(lambda worker: action(worker.film), workers)
         for worker, result in zip(workers, results, strict=True):
             if isinstance(result, BaseException):
-                worker.unsaved.clear()  # of the picture that ends
+                worker.unsaved.clear()  # they belong to the former picture
                 self.crew.drop(worker, result)
 
 
 def _written(write: Callable[[], None], *, again: bool = False) -> None:
-    """Write what changes on a device, within the change of all devices."""
+    """Write a device's changes at once: `_write` guards the change of all devices."""
     write()

@@ -1,7 +1,7 @@
-"""Runs in which the workers of a cluster take samples.
+"""Runs of a render on the workers of a cluster.
 
-A block is a range of sample numbers. Dask's scheduler decides who renders it, and lets another
-worker do so when one is gone; here blocks are cut and films are counted.
+A block is a range of sample numbers. Dask's scheduler assigns it to a worker, and to another after
+a loss. This module cuts blocks and collects films.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 from clpt.cluster import tasks
 from clpt.cluster.admission import Admission, Job, Known
+from clpt.cluster.blocks import gaps
 from clpt.cluster.calls import Call, Calls, reply_of
-from clpt.cluster.sample_ranges import gaps
 from clpt.errors import ClusterError
 from clpt.render.film.state import FilmState, Ranges
 from clpt.render.wavefront.tracer import Selection
@@ -30,22 +30,22 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 TICK = 0.1  # seconds, at most, between two calls of `tick`
-LAST_SECONDS = 10.0  # in which workers send what they have, after a stop
-FIRST_SECONDS, MOST_SECONDS = 2.0, 30.0  # that a block takes, at first and after some minutes
-LEAST_SECONDS = 0.3  # of the last blocks, beside which the way to a worker is short
-SHARE = 0.1  # of the time so far that a block takes, between these
-CLIENT_SHARE = 0.5  # of the time, at most, in which this client gets and adds films
-LAST_SHARE = 0.5  # of all that is left, that all workers together get: blocks shrink at the end
-SLOTS = 2  # blocks of a worker: one is rendered, one waits
-MOST_FAILURES = 3  # of a block, before the render ends; of a worker in a row, before it is refused
+LAST_SECONDS = 10.0  # for partial films after a stop
+FIRST_SECONDS, MOST_SECONDS = 2.0, 30.0  # of a block, at first and after some minutes
+LEAST_SECONDS = 0.3  # of the last blocks; longer than a call takes
+SHARE = 0.1  # of the elapsed time that a block takes, between these bounds
+CLIENT_SHARE = 0.5  # of the time, at most, for receiving and adding films
+LAST_SHARE = 0.5  # of the remaining samples for all workers together: blocks shrink at the end
+SLOTS = 2  # blocks a worker: the first is rendered, the second waits
+MOST_FAILURES = 3  # of a block before the render fails; in a row, of a worker before it is refused
 
 
 @dataclass(frozen=True)
 class Film:
     """A film that a worker sent.
 
-    counts: of what the worker did, `closest` has rays of both kinds; whole: whether all pixels have
-    the samples of its ranges, as they have unless a stop cut the block.
+    counts: of the worker's samples and rays, `closest` has rays of both kinds; whole: whether all
+    pixels have all samples of its ranges; False if a stop cut the block.
     """
 
     state: FilmState
@@ -55,7 +55,7 @@ class Film:
 
 @dataclass
 class _Block:
-    """Samples first to end - 1; workers that may take them now, and where and why they failed."""
+    """Samples first to end - 1; addresses of allowed workers, and failures so far."""
 
     first: int
     end: int
@@ -68,11 +68,11 @@ class _Block:
 
 
 def block_seconds(workers: int, elapsed: float, film_seconds: float) -> tuple[float, float]:
-    """Return how long blocks should take, and the last ones, `elapsed` [s] after the beginning.
+    """Return the intended time of blocks and of the last blocks, `elapsed` [s] after the start.
 
-    film_seconds: in which a film comes in and is added. With many workers blocks are long enough
-    that all of their films take at most CLIENT_SHARE of the time, and at the end not so short that
-    workers wait for each other's films.
+    film_seconds: time to receive and add a film. With many workers blocks are long enough that all
+    films take at most CLIENT_SHARE of the time, and at the end long enough that workers do not
+    wait for each other's films.
     """
     all_films = workers * film_seconds
     usual = min(max(FIRST_SECONDS, SHARE * elapsed), MOST_SECONDS)
@@ -80,10 +80,10 @@ def block_seconds(workers: int, elapsed: float, film_seconds: float) -> tuple[fl
 
 
 class Farm:
-    """The workers of a cluster: what is known of them stays from one run to the next.
+    """The workers of a cluster, whose records stay between runs.
 
-    client, mixed, patience: see `ClusterRenderer`. priority: of the blocks of this render, beside
-    others of the same cluster; seconds: in which it rendered.
+    client, mixed, patience: see `ClusterRenderer`. priority: of this render's blocks among other
+    renders of the cluster; seconds: rendering time so far.
     """
 
     def __init__(self, client: Client, *, mixed: bool, patience: float):
@@ -94,14 +94,14 @@ class Farm:
         self, job: Job, selection: Selection, pixels: int, samples: tuple[int, int], taken: Ranges,
         add: Callable[[Film], None], tick: Callable[[], bool],
     ) -> bool:  # fmt: skip
-        """Let workers take samples of a selection; return whether all were taken.
+        """Let workers render samples of a selection; return whether all were rendered.
 
-        pixels: of the picture; samples: first and end, of which `taken` are there already. add: is
-        called with each film, at a stop with films that were cut too; tick: all the while; if it
+        pixels: of the picture; samples: first and end; `taken`: ranges that are done. add: called
+        with each film, including partial films after a stop; tick: called repeatedly; if it
         returns False the workers stop soon.
 
         Raises ClusterError when the scheduler is gone, no worker is left or fit, or a block fails
-        again and again.
+        repeatedly.
         """
         run = _Run(self, job, selection, selection.pixels / pixels, gaps(taken, *samples))
         before, began = self.seconds, time.perf_counter()
@@ -121,10 +121,10 @@ class Farm:
 
 
 class _Run:
-    """Blocks of one selection of samples.
+    """Blocks of a selection of samples.
 
-    share: of the pixels that have these samples; left: ranges that nobody has. complete: whether
-    all samples are taken; add_seconds: in which a film is added.
+    share: the selection's part of all pixels; left: free ranges. complete: whether all samples are
+    rendered; add_seconds: time to add a film.
     """
 
     def __init__(self, farm: Farm, job: Job, selection: Selection, share: float, left: Any):
@@ -133,9 +133,9 @@ class _Run:
         self.workers = Admission(self.calls, job, self.known)
         self.add_seconds = 0.0
         self._selection, self._left = tasks.pack_selection(selection), list(left)
-        self._again: list[_Block] = []  # that came back
+        self._again: list[_Block] = []  # to be handed out again
         self._flights: dict[Call, _Block] = {}
-        self._in_a_row: Counter[str] = Counter()  # failures
+        self._in_a_row: Counter[str] = Counter()  # failures by address
         self._deadline: float | None = None  # after a stop
         self._cut = False
 
@@ -145,13 +145,13 @@ class _Run:
 
     @property
     def over(self) -> bool:
-        """Whether nothing is left to do, or it was stopped and nothing more is waited for."""
+        """Whether the run is complete, or stopped with no partial films to wait for."""
         if self._deadline is not None:
             return not self._flights or time.monotonic() > self._deadline
         return self.complete
 
     def stop(self) -> None:
-        """Hand out nothing more, and let workers send what they have."""
+        """Hand out no more blocks, and let workers send partial films."""
         if self._deadline is not None:
             return
         if self.workers.fit:
@@ -160,7 +160,7 @@ class _Run:
         self._deadline = time.monotonic() + seconds
 
     async def _tell_to_stop(self, addresses: list[str]) -> None:
-        """Let blocks end with what they have, beside which workers answer."""
+        """Ask workers to end their blocks early."""
         digest, how = self.job.digest, {"workers": addresses, "on_error": "ignore"}
         try:
             await asyncio.wait_for(
@@ -170,42 +170,42 @@ class _Run:
             log.warning("workers could not be told to stop: %s", error)
 
     def end(self) -> None:
-        """Want nothing more of what is on its way."""
+        """Cancel all calls."""
         for call in [*self._flights, *self.workers.opening]:
             call.cancel()
 
     # ---- blocks
 
     def hand_out(self) -> None:
-        """Let Dask have blocks, two for each worker that may render.
+        """Submit blocks to Dask, SLOTS for each admitted worker.
 
-        Raises ClusterError without a scheduler, and where nobody renders and nobody will.
+        Raises ClusterError without a scheduler, and where no worker renders or can be expected to.
         """
         if self._deadline is None:
             self.workers.follow()
         for call, block in list(self._flights.items()):
             if not block.at & self.workers.there:
-                call.cancel()  # Dask would wait for one of these workers
+                call.cancel()  # Dask would wait for these workers
                 self._again.append(self._flights.pop(call))
         while self._deadline is None and (self._left or self._again):
             if len(self._flights) >= SLOTS * len(self.workers.fit):
                 return
             block = self._again.pop(0) if self._again else self._next()
             block.at = self.workers.fit.keys() - block.failed_at or set(self.workers.fit)
-            asked = self.calls.at(
+            call_of_block = self.calls.at(
                 block.at, tasks.render_block, self.job.digest, block.first, block.end,
                 self._selection,
             )  # fmt: skip
-            self._flights[self.calls.begin(asked)] = block
+            self._flights[self.calls.begin(call_of_block)] = block
 
     def _next(self) -> _Block:
-        """Cut a block off what is left."""
+        """Cut the next block off the free ranges."""
         first, end = self._left[0]
         rates = [self.known.records[address].rate for address in self.workers.fit]
         seconds, least = block_seconds(
             len(rates), self.farm.seconds, max(self.add_seconds, self.calls.film_seconds)
         )
-        mean = sum(rates) / len(rates) / self.share  # samples of these pixels, a second
+        mean = sum(rates) / len(rates) / self.share  # samples of these pixels [1/s]
         left = sum(after - before for before, after in self._left)
         last = max(LAST_SHARE * left / (len(rates) + len(self.workers.opening)), least * mean)
         size = min(max(1, int(min(seconds * mean, last))), end - first)
@@ -213,9 +213,9 @@ class _Run:
         return _Block(first, first + size)
 
     def films(self) -> Iterator[Film]:
-        """Yield the films that are there, after waiting for a moment if there is none.
+        """Wait for a moment, then yield the films that have arrived.
 
-        Raises ClusterError for a block that fails again and again.
+        Raises ClusterError for a block that fails repeatedly.
         """
         calls = [*self._flights, *self.workers.opening]
         if not calls:
@@ -229,12 +229,12 @@ class _Run:
                 yield film
 
     def _take_in(self, block: _Block, reply: tasks.Reply) -> Film | None:
-        """Return a block's film, or note what went wrong instead."""
+        """Return a block's film, or None after noting the failure."""
         address = str(reply.get("worker", ""))
         if "error" in reply:
             self._fail(block, address, reply)
             return None
-        if "closed" in reply:  # of a worker that was started anew, or is stopped
+        if "closed" in reply:  # the worker was restarted or stopped
             self.workers.reopen(address)
             self._again.append(block)
             return None
@@ -244,7 +244,7 @@ class _Run:
                 raise ClusterError(f"it sent samples {state.taken} for {block}")
         except ClusterError as error:
             self.workers.refuse(address, str(error))
-        cut = not reply["whole"] and self._deadline is None  # its worker ends
+        cut = not reply["whole"] and self._deadline is None  # the worker is ending
         if cut or address not in self.workers.fit:
             self._again.append(block)
             return None
@@ -257,8 +257,8 @@ class _Run:
         return Film(state, counts, bool(reply["whole"]))
 
     def _fail(self, block: _Block, address: str, reply: tasks.Reply) -> None:
-        """Note that a block was not done, and refuse a worker that cannot do any."""
-        self.workers.look()  # which raises if it is the scheduler that is gone
+        """Note a block's failure, and refuse a worker that fails repeatedly."""
+        self.workers.look()  # raises if the scheduler is gone
         reason = f"{address}: {reply['error']}" if address else str(reply["error"])
         log.warning("%s: %s", block, reason)
         block.failures += [reason] * (MOST_FAILURES if reply.get("killed") else 1)

@@ -1,4 +1,4 @@
-"""Keys of a cluster: who has them may use it, and nobody else gets an answer from it."""
+"""Keys of a cluster: only processes with its keys can connect."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ FILE = "clpt-cluster.pem"
 
 
 def default_folder() -> Path:
-    """Return the folder that the commands of one user find on one machine without being told."""
+    """Return the default folder of a user's keys on a machine."""
     return platformdirs.user_state_path("clpt", appauthor=False) / "cluster"
 
 
 def make(folder: Path) -> None:
-    """Make the keys of a cluster, unless the folder has them: a file that only this user can read.
+    """Write the keys of a cluster, unless the folder has them: a file that only this user can read.
 
-    The file holds a certificate, its key, and the authority that signed it; the key of the
-    authority is not kept, so nobody can make a second certificate. Copy the folder to the machines
-    of the cluster, by ssh or alike. Raises ClusterError.
+    The file holds a certificate, its key, and the authority that signed it. The authority's key is
+    not kept, so nobody can issue a second certificate. Copy the folder to the machines of the
+    cluster, by ssh for example. Raises ClusterError.
     """
     if (folder / FILE).exists():
         return
@@ -36,25 +36,26 @@ def make(folder: Path) -> None:
     except ImportError:
         raise ClusterError("a cluster needs keys: pip install 'clpt[cluster]'") from None
     authority = trustme.CA(organization_name="clpt cluster")
-    own = authority.issue_cert("cluster.clpt")
+    certificate = authority.issue_cert("cluster.clpt")
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        descriptor, made = tempfile.mkstemp(dir=folder)  # only this user can read it
+        descriptor, temporary = tempfile.mkstemp(dir=folder)  # only this user can read it
         try:
             with open(descriptor, "wb") as file:
-                file.write(own.private_key_and_cert_chain_pem.bytes() + authority.cert_pem.bytes())
-            os.rename(made, folder / FILE)
+                pem = certificate.private_key_and_cert_chain_pem.bytes()
+                file.write(pem + authority.cert_pem.bytes())
+            os.rename(temporary, folder / FILE)
         except BaseException:
-            os.unlink(made)
+            os.unlink(temporary)
             raise
     except OSError as error:
         raise ClusterError(f"{folder}: keys cannot be written: {error.strerror}") from None
 
 
 def security(folder: Path | None = None) -> Security:
-    """Return what Dask needs to use the keys of a folder, by default that of this user.
+    """Return Dask's security object for the keys of a folder, by default this user's.
 
-    Raises ClusterError where there are none, or others can read or replace them.
+    Raises ClusterError without keys, and where other users can read or replace them.
     """
     from distributed.security import Security
 
@@ -66,18 +67,18 @@ def security(folder: Path | None = None) -> Security:
             "give its folder by --keys on other machines"
         )
     if os.name == "posix":
-        for one, others in ((path, 0o077), (folder, 0o022)):
-            if one.stat().st_uid not in (os.getuid(), 0):
-                raise ClusterError(f"{one} belongs to another user")
-            if one.stat().st_mode & others:
-                raise ClusterError(f"{one} is open to others (see: chmod go= {one})")
+        for checked, others in ((path, 0o077), (folder, 0o022)):
+            if checked.stat().st_uid not in (os.getuid(), 0):
+                raise ClusterError(f"{checked} belongs to another user")
+            if checked.stat().st_mode & others:
+                raise ClusterError(f"{checked} is open to others (see: chmod go= {checked})")
     roles = ("client", "scheduler", "worker")
     try:
-        found = Security(
+        keys = Security(
             require_encryption=True, tls_ca_file=str(path),
             **{f"tls_{role}_cert": str(path) for role in roles},
         )  # fmt: skip
-        found.get_listen_args("scheduler")
+        keys.get_listen_args("scheduler")
     except OSError as error:
         raise ClusterError(f"{path} holds no keys of a cluster: {error}") from None
-    return found
+    return keys

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 class DeviceShare:
     """A device's part in a picture.
 
-    name: of the device; share: of all paths, 0 to 1; rate: of paths [1/s]; failure: why it was left
-    out, None where it was not.
+    name: of the device; share: of all paths, 0 to 1; rate: of paths [1/s]; failure: the error of a
+    failed device, None otherwise.
     """
 
     name: str
@@ -35,17 +35,17 @@ class MultiRenderer(DevicePictures):
     """Renders a scene on several devices; its picture so far is available between runs.
 
     devices: "all", "gpu", or names or indexes as `clpt.device.choose_all` takes them, and
-    clpt.device.Device objects. options: see `RenderOptions`, without `queue`; `threads` are of each
-    CPU. The film is that of one `Renderer` to the bit, where all devices are of one class, as two
-    equal GPUs are: the samples are the same, whoever takes them.
+    clpt.device.Device objects. options: see `RenderOptions`, without `queue`; `threads` counts for
+    each CPU. If all devices have the same class, as two equal GPUs do, the film equals that of a
+    `Renderer` to the bit: the samples are the same on every device.
 
     A device that fails is left out, with a warning in `warnings` and in the log, and the others
-    take its samples. It has the methods of `Renderer` but for `step`, which waits for nothing:
-    which device takes a sample is known only while they run. For the same reason `film` is memory
-    of the first device, which holds the picture until the next run.
+    render its samples. The class has the methods of `Renderer` except `step`, which returns before
+    devices have shared out samples. `film` is memory of the first device, which holds the picture
+    until the next run.
 
-    Raises as `Renderer` does; DeviceError also if a device is named twice, SceneError for arrays in
-    the memory of a device.
+    Raises like `Renderer`; also DeviceError if a device is named twice, and SceneError for arrays
+    in a device's memory.
     """
 
     _maker: DevicesMaker
@@ -67,12 +67,12 @@ class MultiRenderer(DevicePictures):
 
     @property
     def shares(self) -> tuple[DeviceShare, ...]:
-        """The part of each device in the picture so far, those that failed last."""
+        """The part of each device in the picture so far, failed devices last."""
         crew = self._maker.crew
         failed = {id(worker): str(error) for worker, error in crew.failed}
         workers = [*crew.workers, *(worker for worker, _ in crew.failed)]
         paths = max(sum(worker.paths for worker in workers), 1)
         return tuple(
-            DeviceShare(one.name, one.paths / paths, one.rate, failed.get(id(one)))
-            for one in workers
+            DeviceShare(worker.name, worker.paths / paths, worker.rate, failed.get(id(worker)))
+            for worker in workers
         )

@@ -1,7 +1,7 @@
 """The processes of a cluster: a scheduler, workers, and both on this machine.
 
-Dask trusts whoever can connect, so nobody connects without the keys: every socket that listens asks
-for a certificate. Dask's web servers do not, and are left out.
+Dask trusts every peer that can connect, so every listening socket asks for a certificate. Dask's
+web servers ask for none, and are left out.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 LOOPBACK = "127.0.0.1"
 SETTINGS = {
-    "distributed.scheduler.worker-ttl": "30 s",  # of a worker that is silent
-    "distributed.scheduler.allowed-failures": 10,  # workers that die with a block, at most
+    "distributed.scheduler.worker-ttl": "30 s",  # of a silent worker
+    "distributed.scheduler.allowed-failures": 10,  # workers that may die with a block
     "distributed.scheduler.active-memory-manager.start": False,
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
@@ -46,8 +46,8 @@ SETTINGS = {
     "distributed.comm.timeouts.connect": "10 s",
     "distributed.comm.timeouts.tcp": "30 s",
 }
-START_SECONDS = 60.0  # in which a worker finds its scheduler
-END_SECONDS = 5.0  # in which a process ends by itself
+START_SECONDS = 60.0  # for a worker to find its scheduler
+END_SECONDS = 5.0  # for a process to end by itself
 
 
 def configure() -> None:
@@ -58,17 +58,23 @@ def configure() -> None:
     except ImportError:
         raise ClusterError("a cluster needs Dask: pip install 'clpt[cluster]'") from None
     dask.config.set(SETTINGS)
-    for name in ("distributed", "tornado", "asyncio"):  # clpt says what there is to know
+    for name in ("distributed", "tornado", "asyncio"):  # clpt reports the rest
         logging.getLogger(name).setLevel(max(logging.WARNING, logging.getLogger().level))
-    logging.getLogger("asyncio").addFilter(_is_no_left_over)
+    logging.getLogger("asyncio").addFilter(_is_relevant)
+    logging.getLogger("distributed.worker").addFilter(_is_no_end)
 
 
-def _is_no_left_over(record: logging.LogRecord) -> bool:
-    """Return whether a record is of something else than a wait that Dask leaves behind.
-
-    Dask does so when a film is no longer wanted whose worker has gone.
-    """
+def _is_relevant(record: logging.LogRecord) -> bool:
+    """Return False for a wait that Dask abandons when a cancelled film's worker is gone."""
     return not (record.exc_info and getattr(record.exc_info[0], "__name__", "") == "AllExit")
+
+
+def _is_no_end(record: logging.LogRecord) -> bool:
+    """Return whether a record is of something else than a scheduler that has ended.
+
+    A worker ends by itself then, and says so.
+    """
+    return not record.getMessage().startswith("Failed to communicate with scheduler")
 
 
 def run_worker(
@@ -79,10 +85,10 @@ def run_worker(
     name: str | None = None,
     tell: Callable[[str], None] = lambda text: None,
 ) -> int:
-    """Render for a scheduler until it ends, or a signal comes; return the exit status.
+    """Render for a scheduler until it ends or a signal arrives; return the exit status.
 
-    host: the address of this machine at which others reach it; folder: of the keys, by default that
-    of this user. Raises ClusterError without keys, and where there is no scheduler.
+    host: this machine's address for others; folder: of the keys, by default this user's. Raises
+    ClusterError without keys and without a scheduler.
     """
     if not address.startswith("tls://"):
         raise ClusterError(f"{address} is no tls://HOST:PORT, as clpt cluster start prints it")
@@ -116,7 +122,7 @@ async def _worker(
 
 
 def new_worker(address: str, folder: Path | None, scratch: str, **options: Any) -> Worker:
-    """Return a worker that the keys of a folder are needed for; scratch: its own folder."""
+    """Return a worker that requires the keys of a folder; scratch: its temporary folder."""
     import distributed
 
     return _without_web_server(distributed.Worker)(
@@ -126,7 +132,7 @@ def new_worker(address: str, folder: Path | None, scratch: str, **options: Any) 
 
 
 def _without_web_server(node: Any) -> Any:
-    """Return Dask's scheduler or worker without its web server, which asks nobody for keys."""
+    """Return a subclass of Dask's scheduler or worker without a web server."""
     return type(node.__name__, (node,), {"start_http_server": lambda *_, **__: None})
 
 
@@ -134,14 +140,15 @@ def _without_web_server(node: Any) -> Any:
 def _scratch() -> Iterator[str]:
     """Yield a new folder that only this user can enter.
 
-    By default Dask takes a folder in the temporary one, whoever has made it, and imports from it.
+    By default Dask imports from a folder below the temporary directory, even if another user
+    created it.
     """
     with tempfile.TemporaryDirectory(prefix="clpt-cluster-", ignore_cleanup_errors=True) as folder:
         yield folder
 
 
 class _Signals:
-    """Signals that end a process, in an event loop."""
+    """Signals that end a process, for an event loop."""
 
     def __init__(self) -> None:
         self.number: int | None = None
@@ -156,17 +163,17 @@ class _Signals:
 
 
 def _signals() -> _Signals:
-    found, loop = _Signals(), asyncio.get_running_loop()
+    signals, loop = _Signals(), asyncio.get_running_loop()
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
             with contextlib.suppress(NotImplementedError):  # Windows
-                loop.add_signal_handler(number, found.note, number)
-    return found
+                loop.add_signal_handler(number, signals.note, number)
+    return signals
 
 
 def _leave_soon() -> None:
-    """End this process in some seconds, whatever a driver is doing then."""
+    """End this process after some seconds, even inside a driver's call."""
     timer = threading.Timer(END_SECONDS, os._exit, (1,))
     timer.daemon = True
     timer.start()
@@ -179,11 +186,10 @@ def run_scheduler(
     folder: Path | None = None,
     tell: Callable[[str], None] = lambda text: None,
 ) -> int:
-    """Run a scheduler until a signal comes; return the exit status.
+    """Run a scheduler until a signal arrives; return the exit status.
 
-    folder: of the keys, which are made where they are missing; by default that of this user. tell:
-    is called with the address. Raises ClusterError where keys cannot be made, and where the port is
-    not free.
+    folder: of the keys, which are written if missing; by default this user's. tell: called with
+    the address. Raises ClusterError where keys cannot be written and where the port is in use.
     """
     configure()
     folder = keys.default_folder() if folder is None else folder
@@ -207,7 +213,7 @@ async def _scheduler(host: str, port: int, folder: Path, tell: Callable[[str], o
 
 
 def new_scheduler(host: str, port: int, folder: Path, scratch: str) -> Scheduler:
-    """Return a scheduler that the keys of a folder are needed for; scratch: its own folder."""
+    """Return a scheduler that requires the keys of a folder; scratch: its temporary folder."""
     import distributed
 
     return _without_web_server(distributed.Scheduler)(
@@ -217,7 +223,7 @@ def new_scheduler(host: str, port: int, folder: Path, scratch: str) -> Scheduler
 
 
 def is_loopback(address: str) -> bool:
-    """Whether an address, perhaps with scheme and port, is of this machine alone."""
+    """Whether an address, with or without scheme and port, is a loopback address."""
     host = address.rpartition("://")[2]
     host = host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]
     try:
@@ -232,8 +238,8 @@ def local_cluster(
 ) -> Iterator[tuple[Client, list[subprocess.Popen[bytes]]]]:
     """Yield a client of a scheduler in this process, and its workers on this machine.
 
-    threads: of each worker; by default the cores are divided. All of it listens on the loopback
-    interface alone, to those who have keys that are made here and are gone at the end.
+    threads: of each worker; by default the cores are divided. All sockets listen on the loopback
+    interface only, and ask for temporary keys.
     """
     each = threads or max(1, child_processes.cores() // workers)
     options = ["--threads", str(each)] + (["--device", device] if device else [])
@@ -249,7 +255,7 @@ def local_cluster(
 
 @contextmanager
 def local_scheduler() -> Iterator[tuple[Client, Path]]:
-    """Yield a client of a scheduler in this process, and the folder of its keys, made for it."""
+    """Yield a client of a scheduler in this process, and the folder of its temporary keys."""
     configure()
     from distributed import Client, SpecCluster
 
@@ -266,14 +272,14 @@ def local_scheduler() -> Iterator[tuple[Client, Path]]:
 
 
 def start_worker(address: str, keys: Path, *options: str, **more: Any) -> subprocess.Popen[bytes]:
-    """Start a process that works for a scheduler; keys: the folder of its keys."""
+    """Start a worker process for a scheduler; keys: the folder of its keys."""
     words = ["worker", address, "--keys", str(keys), *options, "--quiet"]
     main = "from clpt.__main__ import main; main()"
     return subprocess.Popen(child_processes.command(main, *words), **more)
 
 
 def end(processes: list[subprocess.Popen[bytes]]) -> None:
-    """End processes: asked first, then made to."""
+    """Terminate processes; kill them after END_SECONDS."""
     for process in processes:
         with contextlib.suppress(OSError):
             process.terminate()

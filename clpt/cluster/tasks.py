@@ -1,7 +1,7 @@
-"""Functions of a worker that a client calls by their names, one process a worker.
+"""Functions that a client calls in a worker's process.
 
-They take and return numbers, texts, bytes and arrays, and keep what was opened for the next call.
-What goes wrong comes back as a text: a worker outlives whatever it is asked.
+They take and return numbers, texts, bytes and arrays. Open jobs stay open for the next call. Errors
+return as texts, so that a worker survives every call.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ from clpt.version import VERSION as VERSION_OF_CLPT
 
 log = logging.getLogger(__name__)
 
-VERSION = 3  # of what client and worker say to each other
+VERSION = 3  # of the protocol between client and worker
 OPTIONS = ("halves", "layout", "queued", "looped", "slots", "texture_budget", "tree_quality")
-MOST_OPEN = 2  # jobs of a worker, each with its memory on the device
-COUNTED = ("samples", "rays", "rejected", "full")  # of what was done
-ENDS = np.dtype("<u4")  # of cells, where they travel
+MOST_OPEN = 2  # open jobs of a worker, each with device memory
+COUNTED = ("samples", "rays", "rejected", "full")  # counts in a reply
+ENDS = np.dtype("<u4")  # dtype of a packed selection's ends
 
 Reply = dict[str, Any]
 
-_device: dict[str, Any] = {"which": None, "threads": None}  # where this worker renders
-_open: dict[str, _Job] = {}  # by digest, the last used at the end
-_stopped: set[str] = set()  # jobs that are to end soon
+_device: dict[str, Any] = {"which": None, "threads": None}  # this worker's choice
+_open: dict[str, _Job] = {}  # by digest, in the order of their last use
+_stopped: set[str] = set()  # digests of jobs that must end soon
 
 
 class _Job:
-    """A renderer of a job's scene, kept between tasks; kind: what decides its last bits."""
+    """A renderer of a job's scene, kept between tasks; kind: see `device_class`."""
 
     kind = ""
 
@@ -57,11 +57,11 @@ class _Job:
             else Renderer(scene, devices[0], **options)
         )
         self.options, self._tracer = options, maker_of(self.renderer).tracer()
-        self._packed: Reply | None = None  # the selection that was taken last
+        self._packed: Reply | None = None  # the last selection
         self._selection: Selection | None = None
 
-    def shows(self, scene: Scene) -> bool:
-        """Let the renderer take another scene; return whether it could."""
+    def try_scene(self, scene: Scene) -> bool:
+        """Update the renderer to another scene; return whether this succeeded."""
         try:
             self.renderer.update(scene=scene)
             self.renderer.prepare()
@@ -74,9 +74,9 @@ class _Job:
     def block(
         self, first: int, end: int, packed: Reply | None, wanted: Callable[[], bool]
     ) -> Reply:
-        """Render samples first to end - 1; return a film and what it took.
+        """Render samples first to end - 1; return the film with its time and counts.
 
-        packed: which ones, see `pack_selection`; None: those of every pixel.
+        packed: a selection from `pack_selection`; None selects every pixel.
         """
         began, renderer = time.perf_counter(), self.renderer
         renderer.reset(first_sample=0 if packed else first)
@@ -101,7 +101,7 @@ class _Job:
 
 
 def choose_devices(which: str | None, threads: int | None = None) -> list[dev.Device]:
-    """Settle where this worker renders; return its devices. Raises DeviceError."""
+    """Choose this worker's devices and return them. Raises DeviceError."""
     _device.update(which=which, threads=threads)
     return _devices()
 
@@ -114,7 +114,7 @@ def _devices() -> list[dev.Device]:
 
 
 def describe_job(bundle: Bundle, options: dict[str, Any]) -> str:
-    """Return what workers need to open a job, as JSON; its SHA-256 is the job's digest."""
+    """Return a job's description as JSON; its SHA-256 is the job's digest."""
     return canonical({
         "format": "clpt job", "version": VERSION, "clpt": VERSION_OF_CLPT,
         "kernels": kernels_digest(), "bundle": bundle.to_json(), "options": options,
@@ -122,36 +122,36 @@ def describe_job(bundle: Bundle, options: dict[str, Any]) -> str:
 
 
 def digest_of(job: str) -> str:
-    """Return the digest by which a job is known."""
+    """Return the SHA-256 of a job's description."""
     return hashlib.sha256(job.encode()).hexdigest()
 
 
 def give(content: bytes) -> bytes:
-    """Return a file of a bundle: workers that lack it get the result."""
+    """Return a file of a bundle, as the result of a Dask task that workers share."""
     return content
 
 
 def open_job(job: str, files: dict[str, bytes]) -> Reply:
-    """Open a job's scene, so that its blocks can be rendered.
+    """Open a job's scene for rendering.
 
-    job: from `describe_job`; files: contents by digest, to keep. Returns "lacks", digests of files
-    that are needed; or "kind", the class of this device, "class", the same by names, "device", what
-    it is called, and the seconds that it took; or "refused", why this worker cannot take part.
+    job: from `describe_job`; files: contents by digest, to keep. Returns "lacks", digests of
+    missing files; or "kind", the device class as text, "class", the class by property, "device",
+    the device's name, and "seconds"; or "refused", the reason why this worker cannot take part.
     """
     try:
         return _open_job(job, files)
     except OSError as error:
         return {"refused": f"its disk: {error.strerror or error}"}
     except Exception as error:
-        return {"refused": _told(error)}
+        return {"refused": _error_text(error)}
 
 
 def _open_job(job: str, files: dict[str, bytes]) -> Reply:
     began, document = time.perf_counter(), _parsed(job)
-    for what, own in (("clpt", VERSION_OF_CLPT), ("kernels", kernels_digest())):
-        if document.get(what) != own:
-            theirs, ours = (str(v)[:12] for v in (document.get(what), own))
-            raise ClusterError(f"it has {what} {ours}, the client {theirs}")
+    for part, version in (("clpt", VERSION_OF_CLPT), ("kernels", kernels_digest())):
+        if document.get(part) != version:
+            theirs, ours = (str(v)[:12] for v in (document.get(part), version))
+            raise ClusterError(f"it has {part} {ours}, the client {theirs}")
     bundle, store = Bundle.from_json(document.get("bundle")), Store()
     options = document.get("options")
     if not isinstance(options, dict) or not options.keys() <= set(OPTIONS):
@@ -159,20 +159,20 @@ def _open_job(job: str, files: dict[str, bytes]) -> Reply:
     digest = digest_of(job)
     _stopped.discard(digest)
     if digest not in _open:
-        for one in files:
-            store.add(one, files[one])
+        for file_digest, content in files.items():
+            store.add(file_digest, content)
         lacks = store.lacks(bundle)
         if lacks:
             return {"lacks": lacks}
         with store.opened(bundle) as scene:
             _open_renderer(digest, scene, _devices(), options)
-            _open[digest].kind = device_class(_open[digest].renderer)  # which reads files
+            _open[digest].kind = device_class(_open[digest].renderer)  # it reads files
     _open[digest] = _open.pop(digest)
     renderer = _open[digest].renderer
     return {
         "kind": _open[digest].kind,
         "class": renderer._device_class(),
-        "device": " and ".join(on.info.label for on in renderer.devices),
+        "device": " and ".join(device.info.label for device in renderer.devices),
         "seconds": time.perf_counter() - began,
     }
 
@@ -180,14 +180,14 @@ def _open_job(job: str, files: dict[str, bytes]) -> Reply:
 def _open_renderer(
     digest: str, scene: Scene, devices: list[dev.Device], options: dict[str, Any]
 ) -> None:
-    """Make a job's renderer; the jobs that were used longest ago make room for it.
+    """Create a job's renderer; least recently used jobs are closed.
 
-    The renderer of one with the same options takes the scene, if it can: so frames of an animation
-    keep the tables and kernels that they share.
+    If possible, the renderer of a job with the same options is updated to the scene, so that frames
+    of an animation share tables and kernels.
     """
     while len(_open) >= MOST_OPEN:
         oldest = _open.pop(next(iter(_open)))
-        if oldest.options == options and oldest.shows(scene):
+        if oldest.options == options and oldest.try_scene(scene):
             _open[digest] = oldest
             return
         oldest.renderer.close()
@@ -203,8 +203,8 @@ def _open_renderer(
             _close_oldest()
             continue
         finally:
-            for on in devices:
-                on.compilers = None
+            for device in devices:
+                device.compilers = None
         _open[digest] = job
         return
 
@@ -216,10 +216,10 @@ def _close_oldest() -> None:
 def render_block(digest: str, first: int, end: int, selection: Reply | None = None) -> Reply:
     """Render samples first to end - 1 of a job that `open_job` opened.
 
-    selection: which ones, from `pack_selection`; None: those of every pixel. Returns "worker", the
-    address of this one, and the arrays of `state_to_arrays`; "whole", whether it came to its end;
-    "seconds" and counts of samples, rays, and of what the film refused. Or "closed": the job is not
-    open here; or "error": what went wrong.
+    selection: from `pack_selection`; None selects every pixel. Returns "worker", this worker's
+    address, and the arrays of `state_to_arrays`; "whole", whether all samples were rendered;
+    "seconds"; counts of samples, rays, and samples that the film refused. Or "closed": the job is
+    not open here; or "error": a text.
     """
     wanted, address = _wanted()
     try:
@@ -230,22 +230,22 @@ def render_block(digest: str, first: int, end: int, selection: Reply | None = No
         block = job.block(first, end, selection, lambda: digest not in _stopped and wanted())
         return {"worker": address, **block}
     except Exception as error:
-        return {"worker": address, "error": _told(error)}
+        return {"worker": address, "error": _error_text(error)}
 
 
 def render_trial(digest: str) -> Reply:
-    """Render the first sample of a job; return what `render_block` does but for the film."""
+    """Render the first sample of a job; return the reply of `render_block` without its film."""
     reply = render_block(digest, 0, 1)
     return {name: value for name, value in reply.items() if name not in DIMENSIONS}
 
 
 def stop_job(digest: str) -> None:
-    """Let a job's block end soon with the film that it has; called beside it."""
+    """Let a job's block end soon with a partial film; called from another thread."""
     _stopped.add(digest)
 
 
 def close_job(digest: str) -> None:
-    """Give back a job's memory, once it is not in use; called beside it."""
+    """Stop a job and free its memory after its last use; called from another thread."""
     _stopped.add(digest)
     job = _open.pop(digest, None)
     if job is not None:
@@ -253,7 +253,7 @@ def close_job(digest: str) -> None:
 
 
 def pack_selection(selection: Selection) -> Reply | None:
-    """Return what `unpack_selection` reads; None for samples of every pixel."""
+    """Return a selection for `unpack_selection`; None for samples of every pixel."""
     if selection.paths == "all":
         return None
     ends = b"" if selection.ends is None else selection.ends.astype(ENDS).tobytes()
@@ -261,7 +261,7 @@ def pack_selection(selection: Selection) -> Reply | None:
 
 
 def unpack_selection(packed: Reply) -> Selection:
-    """Return a selection. Raises ClusterError for what is none."""
+    """Return a selection. Raises ClusterError for invalid data."""
     try:
         paths, pixels = packed["paths"], int(packed["pixels"])
         ends = np.frombuffer(packed["ends"], ENDS).astype(np.int64)
@@ -273,14 +273,14 @@ def unpack_selection(packed: Reply) -> Selection:
 
 
 def state_to_arrays(state: FilmState) -> Reply:
-    """Return a film as arrays, with a checksum of all of it."""
+    """Return a film as arrays with a checksum."""
     taken = [list(pair) for pair in state.taken]
     parts: Reply = {**state.arrays, "scale": state.scale, "taken": taken}
     return {**parts, "sha256": film_digest(state)}
 
 
 def state_from_arrays(reply: Reply) -> FilmState:
-    """Return the film of a reply. Raises ClusterError if it is not what its worker sent."""
+    """Return the film of a reply. Raises ClusterError if it is damaged."""
     try:
         arrays = {name: np.asarray(reply[name]) for name in DIMENSIONS}
         taken = tuple((int(first), int(end)) for first, end in reply["taken"])
@@ -296,7 +296,7 @@ def state_from_arrays(reply: Reply) -> FilmState:
 
 
 def film_digest(state: FilmState) -> str:
-    """Return the SHA-256 of all that a film holds."""
+    """Return the SHA-256 of a film's content."""
     hashed = hashlib.sha256(f"{state.taken} {state.scale} ".encode())
     for array in state.arrays.values():
         hashed.update(f"{array.shape} ".encode())
@@ -306,17 +306,16 @@ def film_digest(state: FilmState) -> str:
 
 
 def device_class(renderer: Renderer | MultiRenderer) -> str:
-    """Return what decides the last bits of a film beside its scene.
+    """Return the properties that decide a film's last bits, besides its scene, as text.
 
-    Device, driver, lanes and trees; and what was chosen to suit the device, such as how many texels
-    its memory lets images have.
+    They are device, driver, lanes, trees, and settings that depend on the device, such as the
+    number of texels that its memory allows.
     """
-    found = {**renderer._device_class(), **renderer._origin().settings}
-    return ", ".join(f"{name} {value}" for name, value in found.items())
+    properties = {**renderer._device_class(), **renderer._origin().settings}
+    return ", ".join(f"{name} {value}" for name, value in properties.items())
 
 
 def _parsed(job: str) -> dict[str, Any]:
-    """The JSON of a job. Raises ClusterError."""
     try:
         document = json.loads(job)
     except (TypeError, ValueError):
@@ -331,10 +330,7 @@ def _parsed(job: str) -> dict[str, Any]:
 
 
 def _wanted() -> tuple[Callable[[], bool], str]:
-    """Return a function that tells whether somebody waits for a task, and the worker's address.
-
-    The task is that of this thread.
-    """
+    """Return a function that tells whether the task is wanted, and the worker's address."""
     from distributed.core import Status
     from distributed.worker import get_worker, thread_state
 
@@ -352,8 +348,8 @@ def _wanted() -> tuple[Callable[[], bool], str]:
     return wanted, worker.address
 
 
-def _told(error: Exception) -> str:
-    """Return what went wrong, in a line for the client; a fault of clpt's is logged in full."""
+def _error_text(error: Exception) -> str:
+    """Return an error as a line for the client; an unexpected error is logged in full."""
     if isinstance(error, ClptError):
         return str(error)
     log.error("a task failed", exc_info=error)

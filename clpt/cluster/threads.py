@@ -1,4 +1,4 @@
-"""Threads that the main thread starts and waits for, though Ctrl-C may come at any line of it."""
+"""Threads that the main thread starts and awaits, safe against Ctrl-C at any line."""
 
 from __future__ import annotations
 
@@ -9,29 +9,27 @@ from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import Any
 
-TICK = 0.05  # seconds between two looks at what may have changed untold
+TICK = 0.05  # seconds between two polls for changes without notice
 
 
 class Threads:
-    """Threads that work together until they are over.
+    """Threads that work together until `over` is set.
 
-    Who starts a thread may be interrupted before it knows of it. So the threads themselves say that
-    they have begun, and one that begins too late does nothing.
-
-    over: whether they are to end.
+    The main thread may be interrupted between starting a thread and noting it. So threads register
+    themselves, and a thread that starts too late does nothing.
     """
 
     def __init__(self) -> None:
-        # Ctrl-C may come while the main thread uses a Condition, as threading.Thread does when it
-        # starts, and leaves it taken for ever or given back twice. What the interpreter itself has
-        # of locks, queues and threads knows no such moment.
+        # Ctrl-C may interrupt the main thread inside a Condition, which threading.Thread.start
+        # uses, and leave it locked for ever or released twice. The interpreter's built-in locks,
+        # queues and threads have no such moment.
         self._lock = threading.RLock()
         self._news: SimpleQueue[None] = SimpleQueue()
         self._at_work = 0
         self.over = False
 
     def start(self, action: Callable[[], Any]) -> None:
-        """Do something in a thread of its own."""
+        """Run an action in a new thread."""
 
         def work() -> None:
             with self._lock:
@@ -48,16 +46,16 @@ class Threads:
         _thread.start_new_thread(work, ())
 
     def tell(self) -> None:
-        """Wake up who waits for news."""
+        """Wake up a waiting thread."""
         self._news.put(None)
 
     def wait(self) -> None:
-        """Wait for news, but not for long."""
+        """Wait for news, at most TICK."""
         with suppress(Empty):
             self._news.get(timeout=TICK)
 
     def end(self) -> None:
-        """Let the threads know that they are over, and wait for them."""
+        """Set `over` and wait for the threads."""
         with self._lock:
             self.over = True
         while self._at_work:
@@ -65,9 +63,9 @@ class Threads:
 
 
 def on_all(action: Callable[[Any], Any], items: list[Any]) -> list[Any]:
-    """Do something with every item at once, in threads; return the results or what was raised.
+    """Run an action for all items in parallel; return results, exceptions for failed items.
 
-    None is at work any more when this ends, however it does.
+    All threads have ended when this returns or raises.
     """
     results: dict[int, Any] = {}
 

@@ -27,7 +27,7 @@ def check_method(method: str) -> str:
 
 
 def prepared(scene: Scene, method: str | None) -> Scene:
-    """Return the scene with what denoisers want: layers, and pixels with samples of their own.
+    """Return the scene with the layers that denoisers read, and pixels that share no samples.
 
     method: of denoising; None: the scene stays as it is.
 
@@ -60,24 +60,24 @@ def remarks(
     a limit of noise is for the picture before it is denoised.
     """
     advice = "denoisers keep noise that neighbouring pixels share"
-    found = []
+    causes = []
     if splats:
-        found.append(
+        causes.append(
             f"the film splats, so neighbouring pixels share samples; {advice}: set "
             "film.filtering to importance"
         )
     if isinstance(integrator, Vcm) and integrator.merging:
-        found.append("the noise of vcm is blotchy, and may stay; try the integrator path")
+        causes.append("the noise of vcm is blotchy, and may stay; try the integrator path")
     if not isinstance(sampler, PIXELWISE):
-        found.append(
+        causes.append(
             f"with the sampler {sampler.kind} neighbouring pixels err together; {advice}: "
             "choose sobol"
         )
     if noise_before:
-        found.append(
+        causes.append(
             "with light paths the limit of noise is for the picture before it is denoised; with "
             "light_paths 0 (--light-paths 0) it is for the denoised picture"
         )
     if isinstance(integrator, ParticleTracer):
-        found.append("particle_tracer has no layers, so edges in the picture are less sharp")
-    return found
+        causes.append("particle_tracer has no layers, so edges in the picture are less sharp")
+    return causes

@@ -53,13 +53,13 @@ class Oidn:
         return self._signed(image, scale_of(image @ LUMINANCE))
 
     def bands(self, image: Image) -> Image:
-        """Return a picture (h, w, n) float32 without noise: three bands at a time, at one scale."""
+        """Return a picture (h, w, n) float32 without noise: three bands at a time."""
         scale, count = scale_of(image.mean(axis=2)), image.shape[2]
-        made = np.empty_like(image)
+        clean = np.empty_like(image)
         for first in range(0, count, 3):
-            three = np.minimum(np.arange(first, first + 3), count - 1)  # the last one again
-            made[..., three] = self._signed(image[..., three], scale)
-        return made
+            three = np.minimum(np.arange(first, first + 3), count - 1)  # the last band fills up
+            clean[..., three] = self._signed(image[..., three], scale)
+        return clean
 
     def _signed(self, image: Image, scale: float) -> Image:
         """A picture whose values may be below 0, as colours outside of a space are.
@@ -68,10 +68,10 @@ class Oidn:
         their difference has the mean of the picture.
         """
         known = np.where(np.isnan(image), np.float32(0.0), image)
-        made = self._colour(np.maximum(known, 0.0), scale)
+        clean = self._colour(np.maximum(known, 0.0), scale)
         if known.min() < 0.0:
-            made -= self._colour(np.maximum(-known, 0.0), scale)
-        return made
+            clean -= self._colour(np.maximum(-known, 0.0), scale)
+        return clean
 
     def _colour(self, image: Image, scale: float) -> Image:
         flags = {"hdr": True, "cleanAux": bool(self._beside)}
@@ -81,10 +81,10 @@ class Oidn:
         self, images: Mapping[str, Image], flags: Mapping[str, bool], scale: float | None = None
     ) -> Image:
         package = self._package
-        given = {name: np.ascontiguousarray(image, np.float32) for name, image in images.items()}
-        made = np.empty_like(next(iter(given.values())))
+        inputs = {name: np.ascontiguousarray(image, np.float32) for name, image in images.items()}
+        clean = np.empty_like(next(iter(inputs.values())))
         with package.Filter(self._device, "RT") as chosen:
-            for name, image in (*given.items(), ("output", made)):
+            for name, image in (*inputs.items(), ("output", clean)):
                 chosen.set_image(name, image, package.OIDN_FORMAT_FLOAT3)
             for name, flag in flags.items():
                 chosen.set_bool(name, flag)
@@ -95,7 +95,7 @@ class Oidn:
         error = self._device.get_error()
         if error is not None:
             raise DeviceError(f"Open Image Denoise: {error}")
-        return made
+        return clean
 
 
 def scale_of(luminance: Image) -> float:

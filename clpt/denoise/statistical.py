@@ -20,8 +20,8 @@ from clpt import device
 from clpt.arrays import Image
 
 # bench/notes/denoising.md has the alternatives.
-SCALE = 0.2  # of the mean light, from which statistics are those of logarithms
-NOISE_RADIUS = 3  # pixels around one whose variance tells its own
+SCALE = 0.2  # of the mean light: above it, statistics are of logarithms
+NOISE_RADIUS = 3  # of the window around a pixel that tells its variance
 ERROR_RADIUS = 4  # likewise of errors
 LEAST_VARIANCES = (1e-4, 3e-4)  # of transformed light: what the eye does not see
 LIMITS, SHARPNESS = (1.3, 2.5), (3, 2)  # of both averages, see `likeness`
@@ -66,12 +66,12 @@ class Statistical:
         )
         self._features = tuple(0.5 / width**2 for width in widths)
         both = np.stack([_padded(half) for half in halves], axis=2)
-        given = self._upload(both)
+        uploaded = self._upload(both)
         self._guides = [self._guide(both, 0)]
-        once = self._average(0, given, 2)
+        once = self._average(0, uploaded, 2)
         self._guides.append(self._guide(self._download(once, both.shape), 1))
-        twice = self._average(1, given, 2)
-        self._shares = self._decide(given, once, twice)
+        twice = self._average(1, uploaded, 2)
+        self._shares = self._decide(uploaded, once, twice)
         pairs = self._download(once, both.shape), self._download(twice, both.shape), both
         first, second, noisy = (pair.mean(axis=2)[..., :3] for pair in pairs)
         self.colours = self._mixed(first, second, noisy)
@@ -80,8 +80,8 @@ class Statistical:
     def halves(self) -> tuple[Image, Image]:
         """Return both halves without most of their noise, (h, w, 3) float32 each.
 
-        The values of one half alone decide which of its pixels are alike, and of both halves only
-        how much noise there is around: so the noise of a denoised half is its own.
+        The values of a half alone decide which of its pixels are alike. Both halves tell only how
+        much noise there is. So the noise of a denoised half is independent of the other.
         """
         even, odd = (self._half(self._both[:, :, i]) for i in range(2))
         return even, odd
@@ -92,8 +92,8 @@ class Statistical:
         for which in (0, 1):
             guide, _ = self._guide(twice_over, which)
             variance = self._download(self._guides[which][1], noisy.shape)
-            made = self._average(which, values, 1, (guide, self._upload(2.0 * variance)))
-            averages.append(self._download(made, noisy.shape))
+            average = self._average(which, values, 1, (guide, self._upload(2.0 * variance)))
+            averages.append(self._download(average, noisy.shape))
             twice_over = np.stack([averages[0], averages[0]], axis=2)
         return self._mixed(*(image[..., :3] for image in (*averages, noisy)))
 
@@ -165,31 +165,31 @@ class Statistical:
         by: a guide and its variance, in the place of those of both halves.
         """
         guide, variance = (self._planes(image, 1) for image in by or self._guides[which])
-        (albedo, normal), made = self._surfaces, self._allocate(count)
+        (albedo, normal), averaged = self._surfaces, self._allocate(count)
         bound = self._program.kernel("denoise_average").bind(
             guide=guide, variance=variance, albedo=albedo, normal=normal,
-            values=self._planes(values, count), averaged=made, size=self._size,
+            values=self._planes(values, count), averaged=averaged, size=self._size,
             extent=self._extent, count=count, features=self._features, limit=LIMITS[which],
             sharpness=SHARPNESS[which],
         )  # fmt: skip
         columns, rows = -(-self._width // self._lanes), -(-self._height // self._rows)
-        # drivers of CPUs keep the private arrays of a whole work-group on one stack
+        # drivers of CPUs keep the private arrays of a whole work-group on the same stack
         self._stream.run(bound, (columns, rows), None if self._lanes == 1 else (1, 1))
-        return made
+        return averaged
 
     def _planes(self, image: object, count: int) -> Any:
         """Planes of a picture of `count` vectors a pixel, see denoise_planes."""
         width, height = self._extent
         nbytes = 16 * count * width * height
-        made = self._buffers.allocate("a picture to denoise", nbytes, ADVICE)
+        planes = self._buffers.allocate("a picture to denoise", nbytes, ADVICE)
         bound = self._program.kernel("denoise_planes").bind(
-            **{"from": image}, planes=made, size=self._size, extent=self._extent, count=count
+            **{"from": image}, planes=planes, size=self._size, extent=self._extent, count=count
         )
         self._stream.run(bound, (width, height, 4 * count))
-        return made
+        return planes
 
     def _decide(self, halves: object, once: object, twice: object) -> Image:
-        """Return the share of each picture in the result, (h, w, 4); the last one is 0."""
+        """Return the share of each picture in the result, (h, w, 4); the last is 0."""
         errors, shares = self._allocate(1), self._allocate(1)
         self._run(
             "denoise_errors", flat=True, halves=halves, once=once, twice=twice, errors=errors,
@@ -201,18 +201,18 @@ class Statistical:
 
     def _blurred(self, image: Any, radius: int, least: float) -> Any:
         """The mean over a square; least: is added."""
-        across, made = self._allocate(1), self._allocate(1)
-        rows, columns = (image, across, (1, 0), 0.0), (across, made, (0, 1), least)
+        across, mean = self._allocate(1), self._allocate(1)
+        rows, columns = (image, across, (1, 0), 0.0), (across, mean, (0, 1), least)
         for source, into, step, more in (rows, columns):
             self._run(
                 "denoise_blur", **{"from": source}, into=into, size=self._size, step=step,
                 radius=radius, least=more,
             )  # fmt: skip
-        return made
+        return mean
 
     @property
     def _extent(self) -> tuple[int, int]:
-        """The size of a plane: borders, and whole rows and columns of what a work-item has."""
+        """The size of a plane: borders, and whole blocks of the rows and columns of a work-item."""
         width = -(-self._width // self._lanes) * self._lanes
         height = -(-self._height // self._rows) * self._rows
         return width + 2 * BORDER, height + 2 * BORDER
@@ -249,6 +249,6 @@ def noise_of(image: Image) -> float:
 
 def _padded(image: Image) -> Image:
     """A picture (h, w, 3) with a fourth channel of 0."""
-    made = np.zeros((*image.shape[:2], 4), np.float32)
-    made[..., :3] = image
-    return made
+    padded = np.zeros((*image.shape[:2], 4), np.float32)
+    padded[..., :3] = image
+    return padded

@@ -1,7 +1,7 @@
-"""Devices of OpenCL: choosing one, building programs, buffers and timing. Knows no scenes."""
+"""OpenCL devices, programs, buffers and times of kernels. Knows no scenes."""
 
 from .array import DeviceArray, supersede
-from .buffers import Buffers, host_buffer
+from .buffers import Buffers, Flag, host_buffer
 from .building import build, build_all, compile_ahead, link
 from .compilers import Compilers, kill_compilers, spare_cores
 from .context import (
@@ -13,12 +13,10 @@ from .context import (
     names_several,
     share_compilers,
 )
-from .flag import Flag
 from .program import Argument, BoundKernel, Kernel, Program
 from .refusals import refused, wait
 from .source import Part, Source, Virtual, assemble, kernels_folder
-from .stream import Events, Rows, Stream, tiles
-from .timing import Timing, Timings
+from .stream import Events, Rows, Stream, Timing, Timings, tiles
 
 __all__ = [
     "Argument",

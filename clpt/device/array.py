@@ -13,11 +13,11 @@ from pyopencl.array import Array
 from . import dlpack, forking
 from .refusals import refused, wait
 
-_changing = forking.renewed(threading.Lock())  # held while a list of events is changed
+_changing = forking.renewed(threading.Lock())  # held while a list of events changes
 
 
 class EventsCopy(list[cl.Event]):
-    """The events of an array as they were; shared: the list that it and its views have."""
+    """A copy of an array's events; shared: the list of the array and its views."""
 
     def __init__(self, shared: list[cl.Event]):
         super().__init__(shared)
@@ -33,11 +33,11 @@ class DeviceArray(Array):
     host if they ask for the CPU, as numpy.from_dlpack(array, device="cpu") does.
     """
 
-    # PyOpenCL hands this list to the driver and lets other threads run meanwhile: an event that one
-    # of them takes out of it is gone before the driver has read it. So each use has its own copy.
+    # PyOpenCL passes this list to the driver while other threads run. If a thread removed an event,
+    # it could be freed before the driver has read it. So each use has a copy of the list.
     @property
     def events(self) -> list[cl.Event]:
-        """The events that the content depends on, a copy of the list: `add_event` adds to it."""
+        """A copy of the events that the content depends on; `add_event` adds an event."""
         return EventsCopy(self._events)
 
     @events.setter
@@ -45,21 +45,21 @@ class DeviceArray(Array):
         self._events = events.shared if isinstance(events, EventsCopy) else events
 
     def add_event(self, evt: cl.Event) -> None:
-        """Let what changes the array wait for an event too."""
+        """Let later commands on the array wait for an event too."""
         with _changing:
-            before = list(self._events)  # what is dropped ends after the lock
+            before = list(self._events)  # dropped events are freed after the lock
             self._events[:] = [*unfinished(before), evt]
 
     def get(self, *args: Any, **named: Any) -> Any:
-        """Return a copy on the host, as `pyopencl.array.Array.get` does. Raises DeviceError."""
+        """Return a copy on the host, see `pyopencl.array.Array.get`. Raises DeviceError."""
         if self.queue is not None:
             forking.check(self.queue)
         return super().get(*args, **named)
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
-        """Return a copy on the host; wait for it. Raises ValueError if no copy may be made."""
+        """Wait and return a copy on the host. Raises ValueError for copy=False."""
         if copy is not None and not copy:
-            raise ValueError("an array on an OpenCL device becomes one of numpy only by a copy")
+            raise ValueError("an array on an OpenCL device becomes numpy's only by a copy")
         host = self.get()
         return host if dtype is None else host.astype(dtype, copy=False)
 
@@ -77,9 +77,9 @@ class DeviceArray(Array):
     ) -> Any:
         """Return a DLPack capsule; wait until the array is valid.
 
-        dl_device: (1, 0) for host memory; (4, number) for the cl_mem itself, on a CPU too; None for
-        that of `__dlpack_device__`. copy: False for the memory itself. On a CPU it is mapped until
-        the consumer releases it, and OpenCL forbids that the device writes to it meanwhile.
+        dl_device: (1, 0) for host memory; (4, number) for the cl_mem, on a CPU too; None for
+        `__dlpack_device__`. copy: False for the array's memory. On a CPU it is mapped until the
+        consumer releases it, and OpenCL forbids the device to write to it meanwhile.
 
         Raises BufferError for another device, or where `copy` is not possible.
         """
@@ -99,7 +99,6 @@ class DeviceArray(Array):
 
     @property
     def _in_host_memory(self) -> bool:
-        """Whether the device's memory is the host's."""
         return bool(self.queue.device.type & cl.device_type.CPU)
 
     @property
@@ -116,20 +115,20 @@ class DeviceArray(Array):
 
 
 def unfinished(events: Iterable[cl.Event]) -> list[cl.Event]:
-    """Return those events that have not ended."""
+    """Return the events that have not ended."""
     done = cl.command_execution_status.COMPLETE
     return [event for event in events if event.command_execution_status > done]
 
 
 def supersede(array: Array, event: cl.Event) -> None:
-    """Replace an array's events by one that came after them.
+    """Replace an array's events by a later event.
 
-    Events of copies to the host that have not ended stay: PyOpenCL waits where it drops one.
+    Unfinished events of copies to the host stay: PyOpenCL waits when it frees such an event.
     """
     with _changing:
         before = array.events
         shared = before.shared if isinstance(before, EventsCopy) else before
         copies = [e for e in before if isinstance(e, cl.NannyEvent)]
-        dropped = list(shared)  # what is dropped ends after the lock
+        dropped = list(shared)  # dropped events are freed after the lock
         shared[:] = [*unfinished(copies), event]
     del dropped

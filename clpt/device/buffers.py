@@ -1,9 +1,10 @@
-"""Device memory, counted, so that an error comes before a driver fails in its own way."""
+"""Device memory within a budget, and a flag that kernels read while they run."""
 
 from __future__ import annotations
 
 import weakref
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pyopencl as cl
@@ -13,18 +14,17 @@ from ..errors import MemoryBudgetError
 from .context import Device
 from .refusals import MEMORY_ADVICE, refused
 
-_SMALLEST = 64  # [bytes] OpenCL has no empty buffer, and kernels want something to point at
+_SMALLEST = 64  # [bytes] OpenCL has no empty buffers
 
 
 class CountedBuffer(cl.Buffer):
-    """A buffer that takes weak references, as PyOpenCL's own does not."""
+    """A buffer with weak references, which `pyopencl.Buffer` lacks."""
 
 
 def host_buffer(context: cl.Context, flags: int, array: NDArray) -> cl.Buffer:
-    """Return a buffer of an array of the host, which is C-contiguous and not empty.
+    """Return a buffer of a C-contiguous array of the host that is not empty.
 
-    flags: of `pyopencl.mem_flags`; they tell whether it is a copy. Raises MemoryBudgetError,
-    DeviceError.
+    flags: of `pyopencl.mem_flags`; they decide on a copy. Raises MemoryBudgetError, DeviceError.
     """
     try:
         return cl.Buffer(context, flags, hostbuf=array)
@@ -35,7 +35,7 @@ def host_buffer(context: cl.Context, flags: int, array: NDArray) -> cl.Buffer:
 class AllOrNothing:
     """See `Buffers.all_or_nothing`.
 
-    It is no generator: one that an interrupt leaves in the middle would go on when it is freed.
+    A class, since a generator that an interrupt suspends would continue when it is freed.
     """
 
     def __init__(self, buffers: Buffers):
@@ -52,8 +52,8 @@ class AllOrNothing:
 class Buffers:
     """Buffers on one device within a budget.
 
-    limit: bytes that all of them together may take; by default what the device has free now.
-    A buffer lives, and counts, as long as it is referred to; `release` frees it at once.
+    limit: bytes of all buffers together; by default the device's free memory.
+    A buffer counts until its last reference is gone; `release` frees it at once.
     """
 
     def __init__(self, device: Device, limit: int | None = None):
@@ -63,7 +63,7 @@ class Buffers:
 
     @property
     def used(self) -> int:
-        """The size of all buffers that live [bytes]."""
+        """The size of all live buffers [bytes]."""
         return sum(buffer.size for buffer in self._live)
 
     @property
@@ -71,30 +71,30 @@ class Buffers:
         """The size of the largest buffer that can be allocated now [bytes]."""
         return max(0, min(self.limit - self.used, self.device.info.max_alloc))
 
-    def allocate(self, what: str, nbytes: int, advice: str = MEMORY_ADVICE) -> cl.Buffer:
+    def allocate(self, name: str, nbytes: int, advice: str = MEMORY_ADVICE) -> cl.Buffer:
         """Return a buffer whose content is undefined.
 
-        what, advice: for the message of the MemoryBudgetError that is raised if it does not fit.
+        name, advice: for the message of a MemoryBudgetError, raised if the buffer does not fit.
         """
-        return self._create(what, max(nbytes, _SMALLEST), advice, None)
+        return self._create(name, max(nbytes, _SMALLEST), advice, None)
 
     def upload(
         self,
-        what: str,
+        name: str,
         array: ArrayLike,
         dtype: DTypeLike | None = None,
         advice: str = MEMORY_ADVICE,
     ) -> cl.Buffer:
-        """Return a copy of an array, C-contiguous; of an empty one a small buffer of zeros.
+        """Return a buffer with a C-contiguous copy of an array; an empty array gives zeros.
 
-        Raises MemoryBudgetError if it does not fit.
+        Raises MemoryBudgetError if the buffer does not fit.
         """
         host = np.ascontiguousarray(array, dtype)
         if host.nbytes < _SMALLEST:
             padded = np.zeros(_SMALLEST, np.uint8)
             padded[: host.nbytes] = np.frombuffer(host.tobytes(), np.uint8)
             host = padded
-        return self._create(what, host.nbytes, advice, host)
+        return self._create(name, host.nbytes, advice, host)
 
     def download(self, buffer: cl.Buffer, shape: Sequence[int], dtype: DTypeLike) -> NDArray:
         """Return a buffer's content as an array; wait for the device's queue.
@@ -110,22 +110,22 @@ class Buffers:
         return host
 
     def all_or_nothing(self) -> AllOrNothing:
-        """For a `with`: free what is allocated inside, if an error ends it."""
+        """Return a context that frees all buffers allocated inside if an error ends it."""
         return AllOrNothing(self)
 
     def live(self) -> set[CountedBuffer]:
-        """All buffers that live."""
+        """All live buffers."""
         return set(self._live)
 
     def release(self, *buffers: cl.Buffer) -> None:
-        """Free buffers."""
+        """Free buffers at once."""
         for buffer in buffers:
             self._live.discard(buffer)
             buffer.release()
 
-    def _create(self, what: str, nbytes: int, advice: str, host: NDArray | None) -> cl.Buffer:
+    def _create(self, name: str, nbytes: int, advice: str, host: NDArray | None) -> cl.Buffer:
         if nbytes > self.available:
-            raise MemoryBudgetError(what, nbytes, self.available, advice)
+            raise MemoryBudgetError(name, nbytes, self.available, advice)
         access = cl.mem_flags.READ_WRITE
         if host is not None:
             access |= cl.mem_flags.COPY_HOST_PTR
@@ -134,6 +134,36 @@ class Buffers:
                 self.device.context, access, size=0 if host is not None else nbytes, hostbuf=host
             )
         except cl.Error as error:
-            raise refused(what, error, nbytes, self.available, advice) from error
+            raise refused(name, error, nbytes, self.available, advice) from error
         self._live.add(buffer)
         return buffer
+
+
+class Flag:
+    """A word that the host sets and clears, also while kernels run.
+
+    argument: for kernels, a `global const volatile uint *`; None, a null pointer, on devices
+    without fine-grained shared memory. Any thread may call the methods, and a signal handler too:
+    they do not wait.
+    """
+
+    def __init__(self, device: Device):
+        self.argument: Any = None
+        if not device.info.shares_words:
+            return
+        try:
+            self._words = cl.fsvm_empty(device.context, 1, np.uint32)
+        except cl.Error:  # another device of the caller's context cannot share it
+            return
+        self._words[0] = 0
+        self.argument = cl.SVM(self._words)
+
+    def raise_(self) -> None:
+        """Set the word to 1."""
+        if self.argument is not None:
+            self._words[0] = 1
+
+    def lower(self) -> None:
+        """Set the word to 0."""
+        if self.argument is not None:
+            self._words[0] = 0

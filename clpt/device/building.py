@@ -1,4 +1,4 @@
-"""Building and linking programs, with their caches, and errors with our file and line."""
+"""Building and linking of programs, with caches, and errors with clpt's file and line."""
 
 from __future__ import annotations
 
@@ -14,13 +14,7 @@ from functools import partial
 import pyopencl as cl
 from pyopencl.characterize import nv_compute_capability
 
-from clpt.device import (
-    compile_limits,
-    declarations,
-    disk_cache,
-    native_programs,
-    registers,
-)
+from clpt.device import compile_limits, declarations, disk_cache, native_programs
 
 from ..errors import DeviceError, KernelBuildError
 from .compilers import Job
@@ -31,19 +25,19 @@ from .source import Source
 log = logging.getLogger(__name__)
 
 OPTIONS = ("-cl-std=CL1.2", "-cl-kernel-arg-info", "-w")
-_PART = "a part, to be linked"
+_PART = "a part, to be linked"  # in a key, like _LIMIT
 _LIMIT = "the limit of registers that suits it"
 _COUNTED = re.compile(r"^<kernel>:(\d+):")
 
 
 def build(device: Device, source: Source, options: Sequence[str] = ()) -> Program:
-    """Compile a program for the device, or take it from a cache.
+    """Compile a program for the device, or load it from a cache.
 
-    A program that was built in the context before is used again. For drivers that have no cache of
-    their own (all but PoCL and NVIDIA) the binary is written to the user's cache folder. In a
-    context with several devices it is built for this one only.
+    A program is built once a context. For drivers without a program cache (all but PoCL and
+    NVIDIA) the binary is written to the user's cache folder. In a context with several devices the
+    program is built for this device only.
 
-    Raises KernelBuildError with our file and line, the log, and the path of the text.
+    Raises KernelBuildError with clpt's file and line, the log, and the path of the text.
     """
     flags = _flags(device, options)
     on_disk = not has_own_cache(device.info.cl_device)
@@ -57,7 +51,7 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
     start = time.perf_counter()
     with compile_limits.watched(source):
         program = _from_source(device, source, flags)
-        if on_disk:  # a binary is compiled to the end, a program of the driver may not be
+        if on_disk:  # a binary is fully compiled; the driver's program may not be
             binary = native_programs.binary(program.cl_program)
             disk_cache.store(entry, encode(program.signatures), binary)
             program = _from_cache(device, source, flags, entry) or program
@@ -66,9 +60,9 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
 
 
 def has_own_cache(cl_device: cl.Device) -> bool:
-    """Return whether the driver keeps programs by their text: PoCL and NVIDIA do.
+    """Return whether the driver caches programs by their text, as PoCL and NVIDIA do.
 
-    PyOpenCL's own `has_src_build_cache` is not in its older versions.
+    Older versions of PyOpenCL have no `has_src_build_cache`.
     """
     pocl = cl_device.platform.name == "Portable Computing Language"
     return pocl or nv_compute_capability(cl_device) is not None
@@ -77,12 +71,11 @@ def has_own_cache(cl_device: cl.Device) -> bool:
 def link(
     device: Device, sources: Mapping[str, Source], main: str, signatures: Signatures
 ) -> Program:
-    """Compile programs and link them; the kernels are those of the one named `main`.
+    """Compile programs and link them; `main` names the program with the kernels.
 
-    signatures: of its kernels, which OpenCL does not tell of linked ones. The parts are written to
-    the user's cache folder, and so is the result. The device's `compilers`, if it has any, compile
-    parts beside this process. Raises KernelBuildError as `build` does, and where the parts do not
-    fit together.
+    signatures: of these kernels, since OpenCL does not report them for linked programs. Parts and
+    result are written to the user's cache folder. The device's `compilers`, if any, compile parts
+    in other processes. Raises KernelBuildError like `build`, and where parts do not fit together.
     """
     flags, whole = _flags(device, ()), _whole(sources, main)
     compile_ahead(device, sources, main)
@@ -91,14 +84,14 @@ def link(
         return program
     device.builds.on_new()
     entry = _entry(device, whole, flags)
-    with disk_cache.alone(entry):  # another process may have been at it
+    with disk_cache.exclusive(entry):  # another process may have built it meanwhile
         program = _known(device, whole, flags, _has_binaries(device))
         if program is not None:
             _drop_parts(device, sources, flags)
             return program
         start = time.perf_counter()
         with compile_limits.watched(whole):
-            linked = _linked_of_any(device, sources, whole, flags)
+            linked = _linked_with_retry(device, sources, whole, flags)
             program = Program(whole.name, linked, signatures)
             if _has_binaries(device):
                 disk_cache.store(entry, encode(signatures), native_programs.binary(linked))
@@ -106,13 +99,10 @@ def link(
         return _built(device, whole, flags, program, time.perf_counter() - start)
 
 
-def _linked_of_any(
+def _linked_with_retry(
     device: Device, sources: Mapping[str, Source], whole: Source, flags: list[str]
 ) -> cl.Program:
-    """Return a linked program, of parts from anywhere or, if they are refused, of new ones.
-
-    Raises KernelBuildError.
-    """
+    """Link cached parts or, if the driver refuses them, new parts. Raises KernelBuildError."""
     try:
         return _linked(device, sources, flags, _part)
     except cl.Error as refusal:
@@ -124,37 +114,37 @@ def _linked_of_any(
 
 
 def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> None:
-    """Let the device's `compilers` begin with what `link` will need, and do not wait for them."""
+    """Let the device's `compilers` start compiling the parts for `link`; do not wait."""
     flags = _flags(device, ())
     if device.compilers is None or not _has_binaries(device):
         return
     entry = _entry(device, _whole(sources, main), flags)
     if device.programs.find(_key(device, entry)) is not None or disk_cache.holds(entry):
         return
-    if disk_cache.is_being_made(entry):  # by another process
+    if disk_cache.is_being_built(entry):  # by another process
         return
     for source in sources.values():
         part = _entry(device, source, [*flags, _PART])
         if not disk_cache.holds(part):
             text, options = next(declarations.forms(device, source.text, flags))
             seconds = compile_limits.seconds_for(source)
-            told = source.name, seconds, device.info.platform, device.info.name
+            names = device.info.platform, device.info.name
             device.builds.on_compile(part)
-            job = Job(*told, " ".join(options), text)
+            job = Job(source.name, seconds, *names, " ".join(options), text)
             compiled = partial(device.builds.on_compiled, part)
             device.compilers.submit(part, job, first=device.hurries, done=compiled)
     device.builds.on_new()
 
 
 def _drop_parts(device: Device, sources: Mapping[str, Source], flags: list[str]) -> None:
-    """Let the device's `compilers` leave what they have not begun."""
+    """Cancel the parts that the device's `compilers` have not started."""
     if device.compilers is not None:
         for source in sources.values():
             device.compilers.drop(_entry(device, source, [*flags, _PART]))
 
 
 def _whole(sources: Mapping[str, Source], main: str) -> Source:
-    """Join the texts of a linked program into one, for its key and for errors."""
+    """Join the texts of a linked program, for its key and for errors."""
     files = dict.fromkeys(file for source in sources.values() for file in source.files)
     text = "\n".join(source.text for source in sources.values())
     return Source(sources[main].name, text, tuple(files))
@@ -166,16 +156,15 @@ def _linked(
     flags: list[str],
     part: Callable[[Device, Source, list[str]], cl.Program],
 ) -> cl.Program:
-    """Return a linked program whose parts `part` makes. Raises pyopencl.Error."""
+    """Return a linked program of the parts that `part` returns. Raises pyopencl.Error."""
     parts = [part(device, source, flags) for source in reversed(list(sources.values()))]
     return cl.link_program(device.context, parts, [], [device.info.cl_device])
 
 
 def _part(device: Device, source: Source, flags: list[str]) -> cl.Program:
-    """Return a compiled part of a program: of the cache folder, another process, or this one.
+    """Return a compiled part: from the cache folder, another process, or this process.
 
-    Raises pyopencl.Error if the driver refuses a binary that was not made here, at once or when it
-    is linked.
+    Raises pyopencl.Error if the driver refuses a foreign binary, here or during the link.
     """
     entry = _entry(device, source, [*flags, _PART])
     stored = disk_cache.load(entry) if _has_binaries(device) else None
@@ -190,7 +179,7 @@ def _part(device: Device, source: Source, flags: list[str]) -> cl.Program:
 
 
 def _compiled(device: Device, source: Source, flags: list[str]) -> cl.Program:
-    """Return a part of a program that this process compiles. Raises KernelBuildError."""
+    """Compile a part in this process. Raises KernelBuildError."""
     entry = _entry(device, source, [*flags, _PART])
     device.builds.on_compile(entry)
     try:
@@ -205,11 +194,11 @@ def _compiled(device: Device, source: Source, flags: list[str]) -> cl.Program:
 
 
 def _has_binaries(device: Device) -> bool:
-    return not _is_oclgrind(device)  # which has no compiled form
+    return not _is_oclgrind(device)  # it interprets programs
 
 
 def _known(device: Device, source: Source, flags: list[str], on_disk: bool) -> Program | None:
-    """A program of the context's cache or, if `on_disk`, of the folder's; None if it is new."""
+    """Return a program from the context's cache or, if `on_disk`, the folder; else None."""
     entry, start = _entry(device, source, flags), time.perf_counter()
     program: Program | None = device.programs.find(_key(device, entry))
     if program is None and on_disk:
@@ -235,16 +224,16 @@ def _built(
 
 
 def _key(device: Device, entry: str) -> tuple[int, str]:
-    """A program's key in its context, whose devices may be alike."""
+    """Return a program's key in its context, whose devices may have equal names."""
     return device.info.cl_device.int_ptr, entry
 
 
 def build_all(
     device: Device, sources: Mapping[str, Source], options: Sequence[str] = ()
 ) -> dict[str, Program]:
-    """Build several programs at once, each in a thread of its own. Raises as `build` does."""
+    """Build programs in parallel threads. Raises like `build`."""
     start, before = time.perf_counter(), device.builds.programs
-    # Oclgrind's compiler is not safe in threads.
+    # Oclgrind's compiler is not thread-safe.
     threads = 1 if _is_oclgrind(device) else os.cpu_count() or 1
     with ThreadPoolExecutor(max_workers=max(1, min(len(sources), threads))) as pool:
         futures = {name: pool.submit(build, device, s, options) for name, s in sources.items()}
@@ -255,8 +244,7 @@ def build_all(
 
 
 def _flags(device: Device, options: Sequence[str]) -> list[str]:
-    """The compiler's options."""
-    # Oclgrind cannot interpret all that its compiler's optimiser makes.
+    # Oclgrind cannot interpret everything that its compiler's optimiser emits.
     plain = ["-cl-opt-disable", "-DNOT_INLINED"] if _is_oclgrind(device) else []
     return [*OPTIONS, *options, *plain]
 
@@ -267,11 +255,11 @@ def _is_oclgrind(device: Device) -> bool:
 
 def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
     try:
-        built = _natively(device, source, flags)
+        native = _natively(device, source, flags)
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
     try:
-        return Program(source.name, built, read_signatures(built))
+        return Program(source.name, native, read_signatures(native))
     except cl.Error as error:
         raise DeviceError(
             f"{device.info.label} does not tell the arguments of its kernels ({error}); "
@@ -280,27 +268,31 @@ def _from_source(device: Device, source: Source, flags: list[str]) -> Program:
 
 
 def _natively(device: Device, source: Source, flags: list[str]) -> cl.Program:
-    """Return a program that the driver builds of a text. Raises pyopencl.Error."""
+    """Let the driver build a text, within a limit of registers if it takes limits.
+
+    Raises pyopencl.Error.
+    """
     cl_device = device.info.cl_device
     make = partial(native_programs.build, device.context, cl_device)
     if not (source.registers and device.info.limits_registers):
         return declarations.built(device, source.text, flags, make)
     entry = _entry(device, source, [*flags, _LIMIT, *map(str, source.registers)])
     if chosen := disk_cache.load(entry):
-        return make(source.text, [*flags, *registers.option(int(chosen[0]))])
+        options = native_programs.register_options(int(chosen[0]))
+        return make(source.text, [*flags, *options])
 
     def limited(limit: int) -> tuple[cl.Program, tuple[int, int]]:
-        program = make(source.text, [*flags, *registers.option(limit)])
-        return program, registers.told(native_programs.said(program, cl_device))
+        program = make(source.text, [*flags, *native_programs.register_options(limit)])
+        return program, native_programs.registers_used(native_programs.log_of(program, cl_device))
 
-    program, limit = registers.fewest(source.registers, limited)
+    program, limit = native_programs.with_fewest_registers(source.registers, limited)
     if limit is not None:
         disk_cache.store(entry, str(limit), b"")
     return program
 
 
 def _from_cache(device: Device, source: Source, flags: list[str], entry: str) -> Program | None:
-    """The program in the cache folder; None if it is missing, or the driver refuses it."""
+    """Load a program from the cache folder; None if it is missing, or the driver refuses it."""
     stored = disk_cache.load(entry)
     if stored is None:
         return None
@@ -313,14 +305,14 @@ def _from_cache(device: Device, source: Source, flags: list[str], entry: str) ->
 
 
 def _entry(device: Device, source: Source, flags: list[str]) -> str:
-    """The cache's key: a hash of everything that the binary depends on."""
+    """Return the cache's key: a hash of everything that the binary depends on."""
     info = device.info
     parts = (source.text, *flags, info.platform, info.name, info.version, info.driver)
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
 def _build_error(source: Source, log: str) -> KernelBuildError:
-    """The first error of a compiler's log with our file and line; the text is written to disk."""
+    """Return the first error of a log with clpt's file and line; write the text to disk."""
     names = "|".join(rf"(?:kernels/)?{re.escape(name)}" for name in source.files)
     location = re.compile(rf"""(?<![\w/.])({names})["']?(?::|, line |\()(\d+)""")
     rows = [row for row in log.splitlines() if re.search(r"\berror\b", row)]
@@ -330,5 +322,5 @@ def _build_error(source: Source, log: str) -> KernelBuildError:
     if first:
         file, line = first[1], int(first[2])
     elif counted := next(filter(None, map(_COUNTED.search, rows)), None):
-        file, line = source.place(int(counted[1]))  # NVIDIA's compiler reads no `#line`
+        file, line = source.location(int(counted[1]))  # NVIDIA's compiler ignores `#line`
     return KernelBuildError(source.name, file, line, log, disk_cache.keep_failed(source))

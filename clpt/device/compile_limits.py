@@ -1,8 +1,8 @@
-"""Limits of compilation: a compiler that hangs is named, and ended where that can be.
+"""Limits of compilation: a hanging compiler is reported, and ended where possible.
 
-LLVM has passes that never end on some texts. A limit is in seconds of the processor, so that
-neighbours on a machine do not count, and grows with the text. In a process that only compiles the
-system ends it. In this process nobody can stop a driver's compiler: `at_limit` is called.
+LLVM has passes that never end on some texts. A limit is in seconds of processor time, independent
+of other processes, and grows with the text. The system ends a compiler process at its limit. A
+compiler inside this process cannot be stopped: `at_limit` is called.
 """
 
 from __future__ import annotations
@@ -21,32 +21,32 @@ from .source import Source
 log = logging.getLogger(__name__)
 
 VARIABLE = "CLPT_COMPILE_SECONDS"
-LEAST = 60.0  # [s]; a small text takes less than one
-CHARACTERS = 5000  # of a text, for each second more; the largest take a tenth of that
+LEAST = 60.0  # [s]; a small text takes less than 1 s
+CHARACTERS = 5000  # of a text, for each further second; large texts take a tenth of that
 
-# What is done when a compiler in this process reaches its limit, with what there is to say.
+# Called with a message when a compiler in this process reaches its limit.
 at_limit: Callable[[str], None] = log.warning
 
 
 def seconds_for(source: Source) -> float:
-    """Return how long a compiler may be at a text [s of the processor], infinite without a limit.
+    """Return the limit of a text [s of processor time], infinite without a limit.
 
-    Raises DeviceError for a variable that is no number.
+    Raises DeviceError if the variable is no number.
     """
-    given = os.environ.get(VARIABLE)
-    if given is None:
+    text = os.environ.get(VARIABLE)
+    if text is None:
         return LEAST + len(source.text) / CHARACTERS
     try:
-        seconds = float(given)
+        seconds = float(text)
         if not seconds >= 0.0:
             raise ValueError
     except ValueError:
-        raise DeviceError(f"{VARIABLE} is a number of seconds, not {given!r}") from None
+        raise DeviceError(f"{VARIABLE} is a number of seconds, not {text!r}") from None
     return seconds or math.inf
 
 
 def message(name: str, seconds: float) -> str:
-    """Return what to say of a compiler that has reached its limit at a program."""
+    """Return the message for a compiler that has reached its limit."""
     return (
         f"the driver's compiler has been at the program {name!r} for {seconds:.0f} s of the "
         f"processor, and seems to hang; try another driver or device, or {VARIABLE}=N for N "
@@ -55,13 +55,13 @@ def message(name: str, seconds: float) -> str:
 
 
 def failure(name: str, seconds: float) -> KernelBuildError:
-    """Return the error of a compiler that was ended at its limit."""
+    """Return the error for a compiler that was ended at its limit."""
     return KernelBuildError(name, None, None, f"error: {message(name, seconds)}", None)
 
 
 @contextmanager
 def watched(source: Source) -> Iterator[None]:
-    """Call `at_limit` if this process compiles a program for longer than it may."""
+    """Call `at_limit` if this process compiles a program beyond its limit."""
     seconds, done = seconds_for(source), threading.Event()
     if math.isfinite(seconds):
         threading.Thread(target=_watch, args=(source.name, seconds, done), daemon=True).start()

@@ -1,7 +1,7 @@
-"""A process that compiles, see `clpt.device.compilers`.
+"""A compiler process, see `clpt.device.compilers`.
 
-It is run by its path, and imports nothing of clpt, so it begins soon. It reads requests from its
-standard input until that ends, as it does when whoever started it ends.
+It runs by its path and imports nothing of clpt, so it starts quickly. It reads requests from its
+standard input, which ends with the parent process.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ if sys.platform != "win32":
 
 
 def main() -> None:
-    """Answer each (seconds, platform, device, options, text) with a binary, None for a fault.
+    """Answer each (seconds, platform, device, options, text) with a binary, None for an error.
 
-    The system ends the process if one takes more seconds of the processor than it may.
+    The system ends the process if a compilation exceeds its seconds of processor time.
     """
     replies = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what drivers print is no reply
+    os.dup2(2, 1)  # output of drivers goes to standard error
     requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(requests,), daemon=True).start()
     opened: dict[tuple[str, str], cl.Context] = {}
@@ -39,23 +39,23 @@ def main() -> None:
             if (platform, device) not in opened:
                 opened[platform, device] = cl.Context([_device(platform, device)])
             binary = _compile(opened[platform, device], options, text)
-        except Exception:  # the caller compiles it again, and finds the error
+        except Exception:  # the caller compiles again and reports the error
             binary = None
         pickle.dump(binary, replies)
         replies.flush()
 
 
 def _limit(seconds: float) -> None:
-    """Let the system end the process after so many seconds more."""
+    """Let the system end the process after further seconds of processor time."""
     if sys.platform != "win32":
         _, most = resource.getrlimit(resource.RLIMIT_CPU)
         end = math.ceil(time.process_time() + seconds) if math.isfinite(seconds) else most
-        own = end if most == resource.RLIM_INFINITY else min(end, most)
-        resource.setrlimit(resource.RLIMIT_CPU, (own, most))
+        soft = end if most == resource.RLIM_INFINITY else min(end, most)
+        resource.setrlimit(resource.RLIMIT_CPU, (soft, most))
 
 
 def _read(requests: queue.SimpleQueue[Any]) -> None:
-    """Hand requests on; end the process at the end of them, whatever it is at."""
+    """Put requests into the queue; end the process at the end of the input."""
     while True:
         try:
             request = pickle.load(sys.stdin.buffer)
@@ -65,8 +65,8 @@ def _read(requests: queue.SimpleQueue[Any]) -> None:
 
 
 def _device(platform: str, device: str) -> cl.Device:
-    found = (d for p in cl.get_platforms() if p.name.strip() == platform for d in p.get_devices())
-    return next(d for d in found if d.name.strip() == device)
+    matches = (d for p in cl.get_platforms() if p.name.strip() == platform for d in p.get_devices())
+    return next(d for d in matches if d.name.strip() == device)
 
 
 def _compile(context: cl.Context, options: str, text: str) -> bytes:

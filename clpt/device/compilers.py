@@ -1,7 +1,7 @@
-"""Processes that compile beside this one, for drivers that compile one text at a time.
+"""Processes that compile in parallel, for drivers that compile a single text at a time.
 
-PoCL compiles under one lock, so threads do not help. Nothing here is needed: where a process does
-not start, or dies, the caller compiles by itself.
+PoCL compiles under a lock, so threads do not help. If a process does not start, or dies, the caller
+compiles.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from clpt.files import child_processes
 log = logging.getLogger(__name__)
 
 _PROGRAM = Path(__file__).with_name("compiler_process.py")
-_MOST = 4  # processes: more than parts of a loop that take long
+_MOST = 4  # processes; a loop has fewer parts that take long
 
 
 @dataclass(frozen=True)
 class Job:
     """A text that a process compiles to a binary.
 
-    name: of the program; seconds: of the processor that its compiler may take; platform, device:
-    their names; options: of the compiler.
+    name: of the program; seconds: limit of processor time; platform, device: names; options: of
+    the compiler.
     """
 
     name: str
@@ -55,16 +55,16 @@ _running: weakref.WeakSet[Compilers] = weakref.WeakSet()
 
 
 def kill_compilers() -> None:
-    """End all processes that compile for this one, before it ends itself."""
-    for one in _running:
-        one.kill_processes()
+    """Kill all compiler processes of this process."""
+    for compilers in _running:
+        compilers.kill_processes()
 
 
 class Compilers:
-    """Some processes, that start when there is something to do for them.
+    """Compiler processes, which start when jobs arrive.
 
-    count: how many there are at most. With `with` they end after what they are at, or at once where
-    an exception is raised.
+    count: the largest number of processes. At the end of a `with` they finish their jobs, or end at
+    once after an exception.
     """
 
     def __init__(self, count: int):
@@ -85,9 +85,9 @@ class Compilers:
         first: bool = False,
         done: Callable[[], None] = lambda: None,
     ) -> None:
-        """Let a process do a job, if none has the key yet.
+        """Queue a job, unless its key is known.
 
-        first: before all that wait. done: called by a thread when the job has been done.
+        first: before all waiting jobs. done: called by a thread after the job.
         """
         with self._changed:
             if self._closed or key in self._tasks:
@@ -102,10 +102,9 @@ class Compilers:
                 thread.start()
 
     def take(self, key: Hashable) -> bytes | None:
-        """Return a job's binary; None if it has not begun, and never will, or has failed.
+        """Return a job's binary; None if the job failed, or has not started and is cancelled now.
 
-        It waits for a job that has begun. Raises KernelBuildError if its compiler was ended at its
-        limit.
+        Waits for a running job. Raises KernelBuildError if its compiler was ended at its limit.
         """
         with self._changed:
             task = self._tasks.pop(key, None)
@@ -117,14 +116,14 @@ class Compilers:
         return task.result.result()
 
     def drop(self, key: Hashable) -> None:
-        """Forget a job; it is not done if it has not begun."""
+        """Forget a job; cancel it if it has not started."""
         with self._changed:
             task = self._tasks.pop(key, None)
             if task is not None and task in self._waiting:
                 self._waiting.remove(task)
 
     def close(self) -> None:
-        """Let the processes do what was submitted, then end them, and wait for that."""
+        """Wait for all submitted jobs and for the end of the processes."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -132,7 +131,7 @@ class Compilers:
             thread.join()
 
     def kill_processes(self) -> None:
-        """Let the processes end at once; it waits for nothing."""
+        """Kill the processes without waiting for them."""
         with self._changed:
             self._closed = True
             self._waiting.clear()
@@ -140,7 +139,7 @@ class Compilers:
                 process.kill()
 
     def kill(self) -> None:
-        """End the processes at once."""
+        """Kill the processes and wait for them."""
         self.kill_processes()
         self.close()
         for process in self._processes:
@@ -153,7 +152,7 @@ class Compilers:
         self.close() if kind is None else self.kill()
 
     def _serve(self) -> None:
-        """Start a process and give it jobs, one after the other."""
+        """Start a process and send it jobs in turn."""
         try:
             process = subprocess.Popen(
                 _command(),
@@ -161,10 +160,10 @@ class Compilers:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
                 env=runtimes.environment(),
-                start_new_session=True,  # Ctrl-C is for this process
+                start_new_session=True,  # Ctrl-C reaches the parent only
             )
         except OSError as error:
-            log.debug("nothing is compiled in another process: %s", error)
+            log.debug("no compiler process: %s", error)
             return
         with self._changed:
             self._processes.append(process)
@@ -180,8 +179,8 @@ class Compilers:
                     else:
                         task.result.set_result(None)
                     raise
-        except Exception as error:  # a process that died
-            log.debug("nothing is compiled in another process: %s", error)
+        except Exception as error:  # the process died
+            log.debug("no compiler process: %s", error)
         finally:
             _end(process)
 
@@ -195,7 +194,7 @@ class Compilers:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Let a process end, and wait for it."""
+    """Close a process's pipes, which ends it, and wait."""
     for pipe in (process.stdin, process.stdout):
         assert pipe is not None
         with suppress(OSError):
@@ -204,19 +203,18 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def _was_ended_at_limit(process: subprocess.Popen[bytes]) -> bool:
-    """Whether the system has ended a process that no longer answers for its processor time."""
+    """Return whether the system has ended a process at its limit of processor time."""
     with suppress(subprocess.TimeoutExpired):
         process.wait(1.0)
     return sys.platform != "win32" and process.returncode == -signal.SIGXCPU
 
 
 def spare_cores() -> int:
-    """Return how many processes may compile beside this one: a core each."""
+    """Return the number of cores for further compiler processes."""
     return child_processes.cores() - 1
 
 
 def _command() -> list[str]:
-    """The command of a process that compiles."""
     return child_processes.command(f"import runpy; runpy.run_path({str(_PROGRAM)!r})['main']()")
 
 
@@ -226,5 +224,5 @@ def _answer(process: subprocess.Popen[bytes], job: Job) -> bytes | None:
     request = job.seconds, job.platform, job.device, job.options, job.text
     pickle.dump(request, process.stdin)
     process.stdin.flush()
-    binary: bytes | None = pickle.load(process.stdout)  # from our own program
+    binary: bytes | None = pickle.load(process.stdout)  # from compiler_process.py
     return binary

@@ -1,7 +1,7 @@
-"""Conditions of the preprocessor: which branches of `#if` a text takes, as far as it tells itself.
+"""Conditions of the preprocessor: the branches of `#if` that a text takes.
 
-A name that the text does not define is 0, as in C, unless compilers or their options may define it:
-what a condition that depends on such a name comes to is open, and it stays for the compiler.
+A name that the text does not define is 0, as in C, unless compilers or their options may define it.
+A condition with such a name is open, and stays for the compiler.
 """
 
 from __future__ import annotations
@@ -13,18 +13,20 @@ from functools import lru_cache
 
 from .text_rows import Row, renamed
 
-OUTSIDE = re.compile(r"_|cl_|CL_|FP_FAST_|NOT_INLINED$")  # what compilers and their options define
+OUTSIDE = re.compile(
+    r"_|cl_|CL_|FP_FAST_|NOT_INLINED$"
+)  # names that compilers and their options define
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:0[xX][0-9a-fA-F]+|\d+)(?![\w.]))|(?P<name>[A-Za-z_]\w*)"
     r"|(?P<sign>&&|\|\||<<|>>|[<>=!]=|[-+*/%<>!~&|^?:(),]))"
 )
 _NAME = re.compile(r"[A-Za-z_]")
-_DEEPEST = 64  # macros whose values name macros
+_DEEPEST = 64  # nested macros
 
 Tokens = tuple[str, ...]
 Known = int | None  # None: open
 
-_BINARY: tuple[dict[str, Callable[[int, int], int]], ...] = (  # from the loosest to the tightest
+_BINARY: tuple[dict[str, Callable[[int, int], int]], ...] = (  # by rising precedence
     {"|": operator.or_},
     {"^": operator.xor},
     {"&": operator.and_},
@@ -40,17 +42,17 @@ _UNARY: dict[str, Callable[[int], int]] = {
 
 
 class Macros:
-    """The macros of a text up to some row of it: defined, not defined, or open."""
+    """The macros of a text up to a row: defined, undefined, or open."""
 
     def __init__(self, defines: Mapping[str, str]):
-        """Note the defines, each with its value; the name may have arguments."""
-        self._values: dict[str, str | None] = {}  # None: not a value for conditions
+        """Define macros by name, perhaps with arguments, and value."""
+        self._values: dict[str, str | None] = {}  # None: a macro with arguments
         self._open: set[str] = set()
         for name, value in defines.items():
             self.define(name, value, sure=True)
 
     def define(self, head: str, value: str, sure: bool) -> None:
-        """Note a `#define`; head: its name and arguments; sure: whether it is in no open branch."""
+        """Note a `#define`; head: name and arguments; sure: whether no branch around it is open."""
         name, has_arguments, _ = head.partition("(")
         self._note(name, sure)
         self._values[name] = None if has_arguments else value
@@ -67,35 +69,35 @@ class Macros:
             self._open.add(name)
 
     def value(self, directive: str, condition: str) -> Known:
-        """Return what the condition of a directive comes to, None where it is open."""
+        """Return the value of a directive's condition, None if it is open."""
         tokens = _condition(directive, condition)
         if tokens is None:
             return None
-        found: list[str] = []
-        self._expand(tokens, found, 0)
-        return _value(tuple(found))
+        expanded: list[str] = []
+        self._expand(tokens, expanded, 0)
+        return _value(tuple(expanded))
 
-    def _expand(self, tokens: Tokens, found: list[str], depth: int) -> None:
-        """Append tokens with values in the place of names, but for those that are open."""
-        rest = iter(tokens)
-        for token in rest:
+    def _expand(self, tokens: Tokens, expanded: list[str], depth: int) -> None:
+        """Append tokens, with names replaced by values; open names stay."""
+        remaining = iter(tokens)
+        for token in remaining:
             if not _NAME.match(token):
-                found.append(token)
+                expanded.append(token)
             elif token == "defined":
-                name = next(rest, "")
+                name = next(remaining, "")
                 if name == "(":
-                    name = next(rest, "")
-                    next(rest, "")
-                found.append(self._defined(name))
+                    name = next(remaining, "")
+                    next(remaining, "")
+                expanded.append(self._defined(name))
             elif (value := self._known_value(token)) is None:
-                found.append(token)
+                expanded.append(token)
             elif (inner := _tokens(value)) is None or depth == _DEEPEST:
-                found.append("open")
+                expanded.append("open")
             else:
-                self._expand(inner, found, depth + 1)
+                self._expand(inner, expanded, depth + 1)
 
     def _known_value(self, name: str) -> str | None:
-        """The value of a macro, "0" of what is none; None if it is open, or has arguments."""
+        """Return a macro's value, "0" if undefined; None if it is open or has arguments."""
         if name in self._open:
             return None
         if name in self._values:
@@ -113,7 +115,7 @@ class Macros:
 class _Chain:
     """An `#if` with its other branches.
 
-    stays: whether a row of it does, since compilers decide; start: where that is among the kept.
+    stays: whether a directive stays because compilers decide; start: its index in the kept rows.
     """
 
     def __init__(self, lives: bool, sure: bool, start: int):
@@ -121,7 +123,7 @@ class _Chain:
         self._ended = not lives
 
     def branch(self, row: Row, macros: Macros) -> tuple[bool, Row | None]:
-        """Return whether the rows behind this one may be taken, and what stays in its place."""
+        """Return whether the following rows may be taken, and the directive that replaces it."""
         if self._ended:
             return False, None
         known = macros.value(row.directive, row.argument)
@@ -145,11 +147,10 @@ BRANCHING = (*_CONDITIONS, "endif")
 
 
 def taken(rows: Iterable[Row | Sequence[Row]], macros: Macros) -> tuple[Row, ...]:
-    """Return the rows that conditions leave, and note the macros that these define.
+    """Return the rows that conditions keep, and note the macros that they define.
 
-    rows: those that are no directives in groups.
-    What is open stays, without the branches that are not taken in any case; where nothing is left
-    in its branches it goes too. Every `#if` has its end among the rows.
+    rows: directives, and groups of other rows. Open conditions stay, without branches that are
+    never taken; an open `#if` with empty branches goes. Every `#if` has its end among the rows.
     """
     kept: list[Row] = []
     chains: list[_Chain] = []
@@ -163,7 +164,7 @@ def taken(rows: Iterable[Row | Sequence[Row]], macros: Macros) -> tuple[Row, ...
         if directive == "endif" and chains:
             chain = chains.pop()
             lives, sure = chain.outer
-            if all(map(_says_nothing, kept[chain.start :])):
+            if all(map(_is_blank, kept[chain.start :])):
                 del kept[chain.start :]
             elif chain.stays:
                 kept.append(row)
@@ -182,7 +183,7 @@ def taken(rows: Iterable[Row | Sequence[Row]], macros: Macros) -> tuple[Row, ...
     return tuple(kept)
 
 
-def _says_nothing(row: Row) -> bool:
+def _is_blank(row: Row) -> bool:
     return row.directive in BRANCHING or not row.text.strip()
 
 
@@ -193,30 +194,30 @@ def _condition(directive: str, argument: str) -> Tokens | None:
 
 @lru_cache(maxsize=4096)
 def _tokens(text: str) -> Tokens | None:
-    """The tokens of an expression; None if it has others than those of a condition."""
-    found, at, text = [], 0, text.strip()
+    """Return the tokens of an expression; None if a condition cannot contain them."""
+    tokens, at, text = [], 0, text.strip()
     while at < len(text):
         match = _TOKEN.match(text, at)
         if match is None:
             return None
-        found.append(match[match.lastgroup or 0])
+        tokens.append(match[match.lastgroup or 0])
         at = match.end()
-    return tuple(found)
+    return tuple(tokens)
 
 
 @lru_cache(maxsize=4096)
 def _value(tokens: Tokens) -> Known:
-    """Return the value of an expression of numbers and open names; None if it is open or faulty."""
+    """Return the value of numbers and open names; None if it is open or invalid."""
     try:
         reader = _Expression(tokens)
-        found = reader.choice()
-        return found if reader.ended else None
+        value = reader.choice()
+        return value if reader.ended else None
     except (ValueError, ZeroDivisionError, IndexError, OverflowError):
-        return None  # which the compiler tells
+        return None  # the compiler reports it
 
 
 class _Expression:
-    """A reader of an expression, by descent from operator to operator."""
+    """A recursive descent parser of an expression."""
 
     def __init__(self, tokens: Tokens):
         self._tokens, self._at = tokens, 0
@@ -226,7 +227,7 @@ class _Expression:
         return self._at == len(self._tokens)
 
     def choice(self) -> Known:
-        """condition ? a : b, or what stands before the question mark."""
+        """Parse `condition ? a : b`, or an expression without a question mark."""
         condition = self._either()
         if not self._take("?"):
             return condition
@@ -236,30 +237,28 @@ class _Expression:
         return None if condition is None else yes if condition else no
 
     def _either(self) -> Known:
-        found = self._both()
+        value = self._both()
         while self._take("||"):
-            other = self._both()
-            known = (found, other)
-            found = 1 if any(known) else None if None in known else 0
-        return found
+            pair = (value, self._both())
+            value = 1 if any(pair) else None if None in pair else 0
+        return value
 
     def _both(self) -> Known:
-        found = self._binary(0)
+        value = self._binary(0)
         while self._take("&&"):
-            other = self._binary(0)
-            known = (found, other)
-            found = 0 if 0 in known else None if None in known else 1
-        return found
+            pair = (value, self._binary(0))
+            value = 0 if 0 in pair else None if None in pair else 1
+        return value
 
     def _binary(self, level: int) -> Known:
         if level == len(_BINARY):
             return self._unary()
-        found = self._binary(level + 1)
+        value = self._binary(level + 1)
         while not self.ended and (apply := _BINARY[level].get(self._tokens[self._at])):
             self._at += 1
             other = self._binary(level + 1)
-            found = None if found is None or other is None else int(apply(found, other))
-        return found
+            value = None if value is None or other is None else int(apply(value, other))
+        return value
 
     def _unary(self) -> Known:
         token = self._tokens[self._at]
@@ -283,9 +282,9 @@ class _Expression:
         return None
 
     def _take(self, token: str) -> bool:
-        found = not self.ended and self._tokens[self._at] == token
-        self._at += found
-        return found
+        matches = not self.ended and self._tokens[self._at] == token
+        self._at += matches
+        return matches
 
     def _expect(self, token: str) -> None:
         if not self._take(token):
@@ -293,7 +292,7 @@ class _Expression:
 
 
 def _quotient(a: int, b: int) -> int:
-    """a / b as C has it: towards 0."""
+    """Return a / b rounded towards 0, as in C."""
     return abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
 
 

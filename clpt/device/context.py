@@ -1,4 +1,4 @@
-"""Devices: listing them, choosing one, or adopting the queue of the caller."""
+"""Devices: their list, a choice by name or speed, or the device of a caller's queue."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ import pyopencl as cl
 from clpt.device import (
     disk_cache,
     forking,
-    memory,
     native_programs,
     program_cache,
     runtimes,
     speed_trial,
 )
+from clpt.files import host_memory
 
 from ..errors import DeviceError
 from ..scalars import is_whole
@@ -35,7 +35,8 @@ log = logging.getLogger(__name__)
 ENVIRONMENT = "CLPT_DEVICE"
 GROUPS = ("all", "gpu")  # of devices, for `choose_all`
 _ORDER = ("gpu", "accelerator", "cpu")
-_CLOSE = 1.1  # seconds of a trial over the least, up to which runtimes are as fast
+_CLOSE = 1.1  # over the least seconds of a trial: runtimes count as equally fast
+_GPU_SHARE = 0.85  # a desktop and other programs keep some of a GPU's memory
 _TRIAL = "__kernel void trial(__global uint *out) { out[get_global_id(0)] = 7u; }"
 
 
@@ -66,52 +67,52 @@ class DeviceInfo:
 
     @property
     def lanes(self) -> int:
-        """Paths that one work-item shades: the SIMD width on a CPU, 1 elsewhere."""
+        """Paths that a work-item shades: the SIMD width on a CPU, 1 elsewhere."""
         if not self.is_cpu:
             return 1
         return 16 if self.float_width >= 16 else 8
 
     @property
     def is_pocl(self) -> bool:
-        """Whether the driver is PoCL, which only its version says."""
+        """Whether the driver is PoCL; only its version tells."""
         return "pocl" in self.version.casefold()
 
     @property
     def compiles_singly(self) -> bool:
-        """Whether the driver compiles one text at a time in a process: PoCL has one lock."""
+        """Whether the driver compiles a single text at a time in a process: PoCL has a lock."""
         return self.is_pocl
 
     @property
     def links(self) -> bool:
-        """Whether the driver links what was compiled apart.
+        """Whether the driver links programs that were compiled separately.
 
-        rusticl, of Mesa 22 at least, refuses modules of different versions of SPIR-V, and compiles
-        each to the lowest that it needs.
+        rusticl (Mesa 22) refuses modules of different SPIR-V versions, and compiles each to the
+        lowest version possible.
         """
         return self.platform.casefold() != "rusticl"
 
     @property
     def limits_registers(self) -> bool:
-        """Whether the driver's compiler takes and tells numbers of registers: NVIDIA's."""
+        """Whether the driver's compiler limits and reports registers, as NVIDIA's does."""
         return "cl_nv_compiler_options" in self.cl_device.extensions.split()
 
     @cached_property
     def shares_words(self) -> bool:
-        """Whether kernels that run see what the host writes: fine-grained shared memory."""
+        """Whether running kernels see writes of the host: fine-grained shared memory."""
         try:
-            has = self.cl_device.svm_capabilities
+            capabilities = self.cl_device.svm_capabilities
         except (AttributeError, cl.Error):  # a driver before OpenCL 2.0
             return False
-        return bool(has & cl.device_svm_capabilities.FINE_GRAIN_BUFFER)
+        return bool(capabilities & cl.device_svm_capabilities.FINE_GRAIN_BUFFER)
 
     @cached_property
     def slot(self) -> tuple[int, ...] | None:
-        """Where the device is on the machine's bus, None where the driver does not tell."""
+        """The device's position on the PCI bus, None if the driver does not report it."""
         try:
-            found = self.cl_device.pci_bus_info_khr
+            bus = self.cl_device.pci_bus_info_khr
         except (AttributeError, cl.Error):
             return None
-        return found.pci_domain, found.pci_bus, found.pci_device, found.pci_function
+        return bus.pci_domain, bus.pci_bus, bus.pci_device, bus.pci_function
 
     @property
     def label(self) -> str:
@@ -119,13 +120,21 @@ class DeviceInfo:
         return f"{self.platform} {self.name}"
 
     def free_memory(self) -> int:
-        """Return an estimate of what may be allocated now [bytes]."""
-        return memory.free(self.cl_device, self.is_cpu, self.global_mem)
+        """Return an estimate of the device's free memory [bytes]; OpenCL has no query for it."""
+        if self.is_cpu:
+            return min(self.global_mem, host_memory.available() or self.global_mem)
+        if "cl_amd_device_attribute_query" in self.cl_device.extensions:
+            try:
+                kib = self.cl_device.get_info(cl.device_info.GLOBAL_FREE_MEMORY_AMD)
+                return min(self.global_mem, int(kib[0] if isinstance(kib, list) else kib) * 1024)
+            except cl.Error:
+                pass
+        return int(_GPU_SHARE * self.global_mem)
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A device that was chosen, and the reason for people to read."""
+    """A chosen device, and the reason as text."""
 
     info: DeviceInfo
     reason: str
@@ -133,13 +142,12 @@ class Choice:
 
 @dataclass
 class Builds:
-    """The programs that have been built so far, and the seconds that took (summed over threads).
+    """The number of programs built so far, and their seconds (summed over threads).
 
-    cached: how many of them came from clpt's own cache; drivers do not tell about theirs.
-    on_compile: called with a key when a program, or a part of one, is about to be given to a
-    compiler, and on_compiled with the same key when it has been. on_new: called when a program is
-    in none of clpt's caches, after other processes have got their share. Threads call all three,
-    and wait for them.
+    cached: the number loaded from clpt's cache; drivers do not report their caches.
+    on_compile: called with a key before a program or a part goes to a compiler; on_compiled: with
+    the same key afterwards. on_new: called when a program is in none of clpt's caches, after its
+    parts went to other processes. Building threads call all three.
     """
 
     programs: int = 0
@@ -160,17 +168,17 @@ class Builds:
 class Device:
     """A context with a queue on one device.
 
-    Everything that clpt runs goes through one of these. `Device.adopt` makes one of a queue of the
-    caller, whose context is then used for every buffer and program.
+    clpt enqueues every command through a Device. `Device.adopt` wraps a caller's queue; its context
+    then holds every buffer and program.
     """
 
     def __init__(self, context: cl.Context, queue: cl.CommandQueue, info: DeviceInfo):
         forking.check(queue)
         self.context, self.queue, self.info = context, queue, info
         self.builds = Builds()
-        self.compilers: Compilers | None = None  # in other processes, where the caller gives some
-        self.hurries = False  # whether they compile for it before they do for others
-        self.programs = program_cache.of(queue)
+        self.compilers: Compilers | None = None  # compiler processes, set by the caller
+        self.hurries = False  # whether its jobs precede those of other devices
+        self.programs = program_cache.cache_of(queue)
 
     @classmethod
     def open(
@@ -178,7 +186,7 @@ class Device:
     ) -> Device:
         """Return a device with a new in-order queue. Raises DeviceError.
 
-        context: that of the queue; None for a new one.
+        context: of the queue; None creates a context.
         """
         try:
             context = context or cl.Context([info.cl_device])
@@ -216,13 +224,13 @@ class Device:
         return f"Device({self.info.label!r})"
 
 
-_opened: dict[tuple[int, DeviceInfo], Device] = {}  # by the process, whose contexts these are
+_opened: dict[tuple[int, DeviceInfo], Device] = {}  # by process and device
 
 
 def devices() -> tuple[DeviceInfo, ...]:
     """Return every device of every platform, in the order of the platforms' names.
 
-    A platform that has no devices or fails is left out, with a logged warning.
+    A platform that fails is left out, with a logged warning.
     """
     return tuple(_info(index, device) for index, device in enumerate(_cl_devices()))
 
@@ -230,21 +238,21 @@ def devices() -> tuple[DeviceInfo, ...]:
 def choose(
     which: str | int | None = None, *, profiling: bool = False, threads: int | None = None
 ) -> Device:
-    """Open the device named by an index, or by a part of its names in any case.
+    """Open a device by its index, or by a part of its names in any case.
 
-    Its names are the platform's, its own and that in its version, such as "pocl".
+    The names are the platform's, the device's and its version, such as "pocl".
 
-    It has a queue of its own. Its context is that of the process, in which programs are built once;
-    a process that was forked has another one.
+    The device has a new queue. All devices of a process share a context for each physical device,
+    so that programs are built once; a forked process has other contexts.
 
-    None takes the environment variable CLPT_DEVICE if it is set, and otherwise the first device
-    that works: GPUs, then accelerators, then CPUs; of a CPU's runtimes PoCL, or one that is faster
-    by a tenth in a short trial, which is made once and remembered in clpt's cache folder.
+    None takes the environment variable CLPT_DEVICE if it is set, otherwise the first working
+    device: GPUs, then accelerators, then CPUs. Of a CPU's runtimes it takes PoCL, unless another
+    is faster by a tenth in a short trial, whose result stays in clpt's cache folder.
 
-    threads: how many cores of a CPU take part at most, by default all.
+    threads: the largest number of a CPU's cores, by default all.
 
-    Raises DeviceError, which lists the devices, if none matches or none works, and where threads
-    make no sense.
+    Raises DeviceError, which lists the devices, if no device matches or works, and for threads
+    that are invalid or not for a CPU.
     """
     choice = selection(which)
     log.info("%s: %s", choice.info.label, choice.reason)
@@ -260,48 +268,47 @@ def choose_all(
 ) -> list[Device]:
     """Open several devices.
 
-    which: "all", where of the runtimes of one CPU the fastest is taken, and of a GPU's the first
-    that works; "gpu", all GPUs likewise; or names
-    or indexes as `choose` takes them, a sequence, or a text with commas such as "0,2". Devices that
-    are open already stay as they are. threads: of each of those that are CPUs.
+    which: "all": each CPU by its fastest runtime, each GPU by its first working runtime; "gpu": all
+    GPUs; or names or indexes, see `choose`, as a sequence or a text with commas such as "0,2".
+    Open Device objects stay as they are. threads: of each CPU.
 
-    Raises DeviceError as `choose` does, where a device is named twice, and where there is none.
+    Raises DeviceError like `choose`, if a device is named twice, and without any device.
     """
     if isinstance(which, str) and which.strip().casefold() in GROUPS:
         named: list[Any] = list(_group(which.strip().casefold()))
     else:
         parts = which.split(",") if isinstance(which, str) else which
-        named = [one if isinstance(one, Device) else selection(one).info for one in parts]
+        named = [part if isinstance(part, Device) else selection(part).info for part in parts]
     if not named:
         raise DeviceError("give at least one device")
-    infos = [one for one in named if isinstance(one, DeviceInfo)]
+    infos = [info for info in named if isinstance(info, DeviceInfo)]
     for info in infos:
         if infos.count(info) > 1:
             raise DeviceError(f"{info.label} is named twice")
     if threads is not None and not any(info.is_cpu for info in infos):
-        raise DeviceError("threads are of a CPU that is chosen here, and there is none")
+        raise DeviceError("threads limit a CPU, and none is chosen here")
     opened = []
-    for one in named:
-        if isinstance(one, DeviceInfo):
-            info = _limited(one, threads) if threads is not None and one.is_cpu else one
+    for device in named:
+        if isinstance(device, DeviceInfo):
+            info = _limited(device, threads) if threads is not None and device.is_cpu else device
             log.info("%s: one of several devices", info.label)
-            one = Device.open(info, profiling=profiling, context=_first(info).context)
-        opened.append(one)
+            device = Device.open(info, profiling=profiling, context=_first(info).context)
+        opened.append(device)
     return opened
 
 
 def names_several(which: str | None) -> bool:
-    """Whether a text is for `choose_all`, and not for `choose`."""
+    """Whether a text is for `choose_all` instead of `choose`."""
     return which is not None and ("," in which or which.strip().casefold() in GROUPS)
 
 
 def _group(name: str) -> Iterator[DeviceInfo]:
-    """All devices, or all GPUs, that work. Raises DeviceError where there is none."""
-    found, taken = by_preference(devices()), 0
+    """Yield all working devices, or working GPUs. Raises DeviceError where no device works."""
+    infos, taken = by_preference(devices()), 0
     slots: set[tuple[int, ...]] = set()
-    processors = [info for info in found if info.is_cpu]
+    processors = [info for info in infos if info.is_cpu]
     best = _by_speed(processors)[0][0] if processors and name != "gpu" else None
-    for info in found:
+    for info in infos:
         slower = best is not None and info.platform != best.platform and _same_processor(info, best)
         if slower or info.slot in slots or (name == "gpu" and info.kind != "gpu"):
             continue
@@ -313,88 +320,88 @@ def _group(name: str) -> Iterator[DeviceInfo]:
         else:
             log.warning("%s is passed over: %s", info.label, failure)
     if not taken:
-        what = "GPU" if name == "gpu" else "OpenCL device"
-        raise DeviceError(f"no {what} works; there is {_listing(tuple(found)) or 'none'}")
+        kind = "GPU" if name == "gpu" else "OpenCL device"
+        raise DeviceError(f"no {kind} works; there is {_listing(tuple(infos)) or 'none'}")
 
 
 def selection(which: str | int | None = None) -> Choice:
-    """Return the device that `choose` would open, and why. Raises DeviceError."""
-    found = devices()
-    if not found:
-        raise DeviceError(f"no OpenCL device: {runtimes.ADVICE}")
+    """Return the device that `choose` would open, with the reason. Raises DeviceError."""
+    infos = devices()
+    if not infos:
+        raise DeviceError(f"no OpenCL device: {runtimes.advice()}")
     if which is None and os.environ.get(ENVIRONMENT, "").strip():
         which = os.environ[ENVIRONMENT].strip()
-        asked = f"{ENVIRONMENT}={which}"
+        request = f"{ENVIRONMENT}={which}"
     else:
-        asked = f"device {which!r}"
+        request = f"device {which!r}"
     named = which is not None
     failures: list[str] = []
-    reason = f"asked for by {asked}"
+    reason = f"asked for by {request}"
     if named:
-        order = _matching(which, found)
+        order = _matching(which, infos)
     else:
-        order, seconds = _by_speed(by_preference(found))
+        order, seconds = _by_speed(by_preference(infos))
     for info in order:
         failure = None if _key(info) in _opened else trial(info)
         if failure is None:
-            reason = reason if named else _reason(info, found, seconds)
+            reason = reason if named else _reason(info, infos, seconds)
             return Choice(info, "; ".join([reason, *(f"passed over {f}" for f in failures)]))
         log.warning("%s is passed over: %s", info.label, failure)
         failures.append(f"{info.label} ({failure})")
     if failures:
         raise DeviceError("no OpenCL device works: " + "; ".join(failures))
-    raise DeviceError(f"{asked} is not there; there is " + _listing(found))
+    raise DeviceError(f"{request} is not there; there is " + _listing(infos))
 
 
 def by_preference(infos: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
-    """Return GPUs before accelerators before CPUs; among equals, in the order of the platforms."""
+    """Return GPUs before accelerators before CPUs, otherwise in the order of platforms."""
     return sorted(infos, key=lambda info: _ORDER.index(info.kind))
 
 
 def _by_speed(
     infos: list[DeviceInfo],
 ) -> tuple[list[DeviceInfo], dict[DeviceInfo, float]]:
-    """Put the best one first if the first device is a CPU that others serve too.
+    """Put the best runtime first if the first device is a CPU with several runtimes.
 
-    It is PoCL, unless another one is faster by more than a trial scatters: of two that are as fast,
-    chance would choose, and PoCL reads what it has kept sooner. Their seconds in the trial too,
-    which are empty where there was none, or it failed.
+    The best is PoCL, unless another is faster by more than the scatter of a trial: PoCL loads its
+    cached programs faster. The second result is each runtime's seconds in the trial, empty where
+    no trial ran or it failed.
     """
     peers = [info for info in infos if _same_processor(info, infos[0])]
     if len(peers) < 2:
         return infos, {}
     runtimes = [f"{i.label} {i.version} {i.driver} {i.compute_units}" for i in peers]
-    taken = speed_trial.remembered(runtimes, lambda: _measured(peers))
-    if taken is None:
+    times = speed_trial.remembered(runtimes, lambda: _measured(peers))
+    if times is None:
         return infos, {}
-    seconds = dict(zip(peers, taken, strict=True))
-    close = _CLOSE * min(taken)
+    seconds = dict(zip(peers, times, strict=True))
+    close = _CLOSE * min(times)
     ranked = sorted(peers, key=lambda i: (seconds[i] > close, not i.is_pocl, seconds[i]))
     return ranked + [info for info in infos if info not in ranked], seconds
 
 
-def _same_processor(one: DeviceInfo, other: DeviceInfo) -> bool:
-    """Whether two devices are runtimes of one CPU: PoCL puts words before its name."""
-    a, b = one.name.casefold(), other.name.casefold()
-    return one.is_cpu and other.is_cpu and (a.endswith(b) or b.endswith(a))
+def _same_processor(info: DeviceInfo, other: DeviceInfo) -> bool:
+    """Return whether two devices are runtimes of a CPU: PoCL puts a prefix before its name."""
+    a, b = info.name.casefold(), other.name.casefold()
+    return info.is_cpu and other.is_cpu and (a.endswith(b) or b.endswith(a))
 
 
 def _measured(infos: Sequence[DeviceInfo]) -> list[float]:
-    """Time a trial on devices [s], in the process's own contexts; raises what drivers raise."""
+    """Return the seconds of a trial on each device, in the process's contexts."""
     return speed_trial.measure([(_first(info).queue, info.lanes) for info in infos])
 
 
 def trial(info: DeviceInfo) -> str | None:
-    """Build and run a trivial kernel; return None if it worked, else the error in one line."""
+    """Build and run a trivial kernel; return None on success, else the error as a line."""
     try:
-        # The process's own context: in each one PoCL reads its library anew, which takes a second.
+        # The process's context: in each new context PoCL reads its library, which takes a second.
         device = _opened.get(_key(info)) or Device.open(info)
         program = native_programs.build(device.context, info.cl_device, _TRIAL)
         result = np.zeros(4, np.uint32)
         buffer = cl.Buffer(device.context, cl.mem_flags.WRITE_ONLY, result.nbytes)
         cl.Kernel(program, "trial")(device.queue, result.shape, None, buffer)
         cl.enqueue_copy(device.queue, result, buffer)
-    except Exception as error:  # whatever a broken driver raises, the next one is tried
+    except Exception as error:  # any exception of a broken driver: the next device is tried
         rows = str(error).splitlines() or [type(error).__name__]
         return next((row for row in rows if "error:" in row), rows[0]).strip()[:200]
     if not (result == 7).all():
@@ -408,17 +415,20 @@ def _key(info: DeviceInfo) -> tuple[int, DeviceInfo]:
 
 
 def _limited(info: DeviceInfo, threads: int) -> DeviceInfo:
-    """A part of a CPU that has so many cores, or all of it. Raises DeviceError."""
+    """Return a part of a CPU with `threads` cores, or all of it. Raises DeviceError."""
     if not is_whole(threads) or threads < 1:
         raise DeviceError(f"threads must be a whole number above zero, not {threads!r}")
     if not info.is_cpu:
-        raise DeviceError(f"threads are of a CPU, and {info.label} is none")
+        raise DeviceError(f"threads limit a CPU, and {info.label} is none")
     return info if threads >= info.compute_units else _part(info, int(threads))
 
 
 @functools.cache
 def _part(info: DeviceInfo, threads: int) -> DeviceInfo:
-    """A part of a CPU, the same each time, so that its context is kept. Raises DeviceError."""
+    """Return a part of a CPU, equal at each call, so that its context is kept.
+
+    Raises DeviceError.
+    """
     by_counts = [cl.device_partition_property.BY_COUNTS, threads, 0]
     try:
         part = info.cl_device.create_sub_devices(by_counts)[0]
@@ -430,27 +440,28 @@ def _part(info: DeviceInfo, threads: int) -> DeviceInfo:
 
 
 def _first(info: DeviceInfo) -> Device:
-    """The device in the process's context, which is opened the first time. Raises DeviceError."""
-    # Of two threads at once both open a context, and the first is kept: a lock might be held by
-    # another thread when the process is forked.
+    """Return the device with the process's context, opened on first use. Raises DeviceError."""
+    # Two threads may both open a context, and the first is kept. With a lock, another thread might
+    # hold it when the process is forked.
     return _opened.get(_key(info)) or _opened.setdefault(_key(info), Device.open(info))
 
 
 def share_compilers(devices: Sequence[Device], threads: int | None, resources: ExitStack) -> None:
-    """Let other processes compile for devices whose driver compiles one text at a time.
+    """Start compiler processes for devices whose driver compiles a single text at a time.
 
-    threads: cores of a CPU to use, at most; resources: get these processes.
+    threads: the largest number of a CPU's cores; resources: ends these processes.
     """
-    slow = [on for on in devices if on.info.compiles_singly]
-    spare = min([spare_cores(), *((threads or on.info.compute_units) - 1 for on in slow)])
+    slow = [device for device in devices if device.info.compiles_singly]
+    cores = [threads or device.info.compute_units for device in slow]
+    spare = min([spare_cores(), *(count - 1 for count in cores)])
     if slow and spare > 0:
         compilers = resources.enter_context(Compilers(spare))
-        for on in slow:
-            on.compilers = compilers
+        for device in slow:
+            device.compilers = compilers
 
 
 def _matching(which: str | int | None, infos: tuple[DeviceInfo, ...]) -> list[DeviceInfo]:
-    """The devices with an index or a part of a name, the preferred ones first.
+    """Return devices by an index or a part of a name, in the order of preference.
 
     PoCL calls its platform "Portable Computing Language"; only versions say "PoCL".
     """
@@ -465,8 +476,8 @@ def _reason(
     info: DeviceInfo, infos: tuple[DeviceInfo, ...], seconds: dict[DeviceInfo, float]
 ) -> str:
     if info in seconds:
-        taken = ", ".join(f"{1e3 * s:.2f} ms by {i.platform}" for i, s in seconds.items())
-        return f"in a short trial no runtime of this CPU was faster by a tenth, remembered: {taken}"
+        times = ", ".join(f"{1e3 * s:.2f} ms by {i.platform}" for i, s in seconds.items())
+        return f"in a short trial no runtime of this CPU was faster by a tenth, remembered: {times}"
     if len(infos) == 1:
         return "the only device"
     peers = [other for other in infos if other.kind == info.kind]
@@ -483,17 +494,17 @@ def _cl_devices() -> Iterator[cl.Device]:
     try:
         platforms = runtimes.platforms()
     except cl.Error as error:
-        log.info("no OpenCL platform: %s", error)  # who needs a device says so
+        log.info("no OpenCL platform: %s", error)  # callers report a missing device
         return
     for platform in sorted(platforms, key=lambda platform: platform.name):
         try:
-            found = platform.get_devices()
+            cl_devices = platform.get_devices()
         except cl.Error as error:
             log.warning("platform %s is passed over: %s", platform.name, error)
             continue
-        if not found:
+        if not cl_devices:
             log.debug("platform %s has no devices", platform.name)
-        yield from found
+        yield from cl_devices
 
 
 def _info(index: int, device: cl.Device) -> DeviceInfo:

@@ -1,9 +1,9 @@
-"""Declarations of OpenCL's built-in functions, for a compiler that reads them anew for each text.
+"""Declarations of OpenCL's built-in functions, in place of clang's header.
 
 PoCL puts clang's header before each text: 18,000 lines, which take longer than most of clpt's
-programs. The header guards itself by a macro. With that macro set it is empty, and clpt's own
-declarations (`kernels/core/builtins.cl`) stand before the text. A text that calls something else,
-as one of a user may, does not build so, and is built again with the header.
+programs. With its guard macro defined the header is empty, and clpt's declarations
+(`kernels/core/builtins.cl`) precede the text. A text that calls other functions, such as a user's,
+fails to build, and is built again with the header.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ _Built = TypeVar("_Built")
 
 
 def forms(device: Device, text: str, flags: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
-    """Yield texts and options of a program to try, one after the other."""
+    """Yield the texts and options of a program, in the order of attempts."""
     if device.info.is_pocl:
-        yield declared() + text, [*flags, _GUARD]
+        yield declarations() + text, [*flags, _GUARD]
     yield text, [*flags]
 
 
 def built(
     device: Device, text: str, flags: Sequence[str], build: Callable[[str, list[str]], _Built]
 ) -> _Built:
-    """Return what `build` makes of the first form that builds.
+    """Return the result of `build` for the first form that builds.
 
-    Raises the pyopencl.Error of the last.
+    Raises the pyopencl.Error of the last form.
     """
     *others, last = forms(device, text, flags)
     for form in others:
@@ -46,8 +46,8 @@ def built(
 
 
 @functools.cache
-def declared() -> str:
-    """Return the declarations without comments; of their macros none is left defined."""
+def declarations() -> str:
+    """Return the declarations without comments, followed by #undef of their macros."""
     text = (kernels_folder() / "core" / "builtins.cl").read_text(encoding="utf-8")
     text = re.sub(r"/\*.*?\*/|\\\n\s*|\n(?=\n)", "", text, flags=re.DOTALL)
     macros = dict.fromkeys(re.findall(r"^#define (\w+)", text, re.MULTILINE))

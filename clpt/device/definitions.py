@@ -1,7 +1,7 @@
-"""Definitions of a kernel text: what each names, so that those that nobody names are left out.
+"""Definitions of a kernel text and the names that each uses, to leave out unused definitions.
 
-A definition is a function, a type, a constant or a macro. Everything else stays, and so does what
-it names: kernels, pragmas, and what is not recognised.
+A definition is a function, a type, a constant or a macro. Kernels, pragmas and unrecognised rows
+stay, with all definitions that they use.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from .text_rows import Row, joined, rows_of
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _PASTED_MEMBER = re.compile(r"->(\w*)\s*##\s*(\w*)")
-_PASTED = re.compile(r"(?<![.\w])(?<!->)(\w*)\s*##\s*(\w*)")  # but for members
-_FUNCTION = re.compile(  # types, a name, arguments without brackets, and a body or nothing
+_PASTED = re.compile(r"(?<![.\w])(?<!->)(\w*)\s*##\s*(\w*)")  # without members
+_FUNCTION = re.compile(  # types, a name, flat arguments, perhaps a body
     r"\s*(?:[A-Za-z_]\w*[\s*]+)+?(?P<name>[A-Za-z_]\w*)\s*\([^()]*\)\s*(?:\{.*\}|;)\s*\Z", re.DOTALL
 )
 _TYPE = re.compile(r"\s*typedef\b[^()]*?(?P<name>[A-Za-z_]\w*)\s*;\s*\Z", re.DOTALL)
-_MADE_TYPE = re.compile(r"\s*typedef\s+\w+\([^()]*\)\s+(?P<name>[A-Za-z_]\w*)\s*;\s*\Z")
+_MACRO_TYPE = re.compile(r"\s*typedef\s+\w+\([^()]*\)\s+(?P<name>[A-Za-z_]\w*)\s*;\s*\Z")
 _CONSTANT = re.compile(
     r"\s*(?:static\s+)?(?:constant|__constant)\b[^=;\[\](){}]*?(?P<name>[A-Za-z_]\w*)\s*"
     r"(?:\[[^\]]*\]\s*)*=[^;]*;\s*\Z",
@@ -39,7 +39,7 @@ _KERNEL = re.compile(r"\b(?:__)?kernel\b")
 class Definition:
     """Rows of a text that stay or go together.
 
-    names: what they define, none for what always stays.
+    names: the defined names; empty for rows that always stay.
     """
 
     rows: Sequence[Row]
@@ -52,7 +52,7 @@ class Definition:
 
     @cached_property
     def pasted(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Beginnings and endings of names that macros of the rows paste together."""
+        """Prefixes and suffixes of names that macros of the rows paste together."""
         beginnings, endings = set[str](), set[str]()
         for row in self.rows:
             if "##" in row.code:
@@ -64,7 +64,7 @@ class Definition:
 
     @cached_property
     def printed(self) -> tuple[Row, ...]:
-        """The rows, those that follow one another as one."""
+        """The rows, with consecutive rows joined."""
         return joined(self.rows)
 
 
@@ -72,7 +72,7 @@ class Definition:
 class Paragraph:
     """Definitions without a blank row between them, and the comments in front of them.
 
-    apart: whether a blank row is in front of it.
+    apart: whether a blank row precedes the paragraph.
     """
 
     comments: tuple[Row, ...]
@@ -80,18 +80,18 @@ class Paragraph:
     apart: bool
 
     def left(self, stay: Mapping[Definition, Sequence[Row]]) -> tuple[list[Row], bool]:
-        """Return its rows without definitions that do not stay, and whether it is apart.
+        """Return the paragraph's remaining rows, and whether it is apart.
 
-        stay: the rows of those that do.
+        stay: the rows of definitions that stay.
         """
-        own = [row for one in self.definitions for row in stay.get(one, ())]
-        return [*self.comments, *own] if own else [], self.apart
+        rows = [row for definition in self.definitions for row in stay.get(definition, ())]
+        return [*self.comments, *rows] if rows else [], self.apart
 
 
 @lru_cache(maxsize=2048)
 def paragraphs(rows: tuple[Row, ...]) -> tuple[Paragraph, ...]:
-    """Return the paragraphs of rows between two includes; comments without any are left out."""
-    found: list[Paragraph] = []
+    """Return the paragraphs of rows between two includes, without isolated comments."""
+    result: list[Paragraph] = []
     comments: list[Row] = []
     definitions: list[Definition] = []
     apart, at = False, 0
@@ -101,7 +101,7 @@ def paragraphs(rows: tuple[Row, ...]) -> tuple[Paragraph, ...]:
             definitions.append(definition)
             continue
         if definitions:
-            found.append(Paragraph(tuple(comments), tuple(definitions), apart))
+            result.append(Paragraph(tuple(comments), tuple(definitions), apart))
             comments, definitions, apart = [], [], False
         if rows[at].text.strip():
             comments.append(rows[at])
@@ -109,23 +109,23 @@ def paragraphs(rows: tuple[Row, ...]) -> tuple[Paragraph, ...]:
             apart = True
         at += 1
     if definitions:
-        found.append(Paragraph(tuple(comments), tuple(definitions), apart))
-    return tuple(found)
+        result.append(Paragraph(tuple(comments), tuple(definitions), apart))
+    return tuple(result)
 
 
 @lru_cache(maxsize=2048)
 def whole(rows: tuple[Row, ...]) -> tuple[Paragraph, ...]:
-    """Return rows as one paragraph of which nothing may go."""
+    """Return rows as a single paragraph that stays whole."""
     return (Paragraph((), (Definition(rows, frozenset()),), False),) if rows else ()
 
 
 def macro(head: str, value: str) -> Definition:
-    """Return the definition of a macro; head: its name, and its arguments."""
+    """Return the definition of a macro; head: name and arguments."""
     return _definition(rows_of(f"#define {head} {value}"), 0)[0]
 
 
 def _definition(rows: Sequence[Row], at: int) -> tuple[Definition, int]:
-    """The definition that begins at a row, and the row behind it."""
+    """Return the definition that begins at a row, and the number of the next row."""
     first = rows[at]
     if first.directive in OPENING:
         return _open_conditional(rows, at)
@@ -135,12 +135,12 @@ def _definition(rows: Sequence[Row], at: int) -> tuple[Definition, int]:
             names = frozenset(_WORD.findall(first.argument)[:1])
         return Definition((first,), names), at + 1
     end = _end(rows, at)
-    own = rows[at:end]
-    return Definition(own, _name("\n".join(row.code for row in own))), end
+    body = rows[at:end]
+    return Definition(body, _name("\n".join(row.code for row in body))), end
 
 
 def _end(rows: Sequence[Row], at: int) -> int:
-    """The row behind what begins at a row: where brackets are closed, and a ; or } is the last."""
+    """Return the row after a definition: brackets are closed, and the last sign is ; or }."""
     depth, before = 0, []
     for number in range(at, len(rows)):
         row = rows[number]
@@ -160,7 +160,7 @@ def _end(rows: Sequence[Row], at: int) -> int:
 
 
 def _open_conditional(rows: Sequence[Row], at: int) -> tuple[Definition, int]:
-    """An `#if` that compilers decide, to its `#endif`: one definition of all that is in it."""
+    """Return an open `#if` to its `#endif` as a single definition of all its names."""
     depth, end = 0, at
     while end < len(rows):
         depth += (rows[end].directive in OPENING) - (rows[end].directive == "endif")
@@ -181,48 +181,49 @@ def _open_conditional(rows: Sequence[Row], at: int) -> tuple[Definition, int]:
 
 
 def _name(code: str) -> frozenset[str]:
-    """The name that code defines; none where it is not recognised, or where there are several."""
+    """Return the name that code defines; empty if it is unrecognised or defines several."""
     code = code.strip()
-    for pattern in (_FUNCTION, _TYPE, _MADE_TYPE, _CONSTANT):
+    for pattern in (_FUNCTION, _TYPE, _MACRO_TYPE, _CONSTANT):
         match = pattern.match(code)
-        if match and _is_one(code) and not _KERNEL.search(code, 0, match.start("name")):
+        if match and _is_single(code) and not _KERNEL.search(code, 0, match.start("name")):
             return frozenset((match["name"],))
     return frozenset()
 
 
 def with_gaps(
-    definitions: Set[Definition], made: Iterable[Definition]
+    definitions: Set[Definition], generated: Iterable[Definition]
 ) -> dict[Definition, tuple[Row, ...]]:
-    """Return rows of definitions; of structs in memory without members that nothing names.
+    """Return rows of definitions; structs in memory lose unused members.
 
-    made: those of generated files, which have such structs. In the place of members that follow one
-    another stands one array, so that the others lie where they lay.
+    generated: definitions of generated files, which have such structs. An array replaces
+    consecutive unused members, so that other members keep their offsets.
     """
     structs = {
-        one
-        for one in made
-        if one in definitions and _IN_MEMORY.fullmatch("\n".join(row.code for row in one.rows))
+        struct
+        for struct in generated
+        if struct in definitions
+        and _IN_MEMORY.fullmatch("\n".join(row.code for row in struct.rows))
     }
     others = definitions - structs
-    words = {word for one in others for word in one.words}
-    pasting = [row for one in others for row in one.rows if "##" in row.code]
+    words = {word for other in others for word in other.words}
+    pasting = [row for other in others for row in other.rows if "##" in row.code]
     for struct in structs:
         words |= {name for row in pasting for name in _pasted_members(row, struct.words)}
-    return {one: _gaps(one, words) if one in structs else one.printed for one in definitions}
+    return {d: _gaps(d, words) if d in structs else d.printed for d in definitions}
 
 
 def _pasted_members(row: Row, names: Iterable[str]) -> set[str]:
-    """Return the names, of `names`, that a macro pastes together behind an arrow."""
+    """Return the elements of `names` that a macro pastes together behind an arrow."""
     arguments = {"", *_WORD.findall(row.macro[0])}
-    found: set[str] = set()
+    members: set[str] = set()
     for begin, end in _PASTED_MEMBER.findall(row.code):
         begin, end = ("" if part in arguments else part for part in (begin, end))
-        found |= {name for name in names if name.startswith(begin) and name.endswith(end)}
-    return found
+        members |= {name for name in names if name.startswith(begin) and name.endswith(end)}
+    return members
 
 
 def _gaps(struct: Definition, words: Set[str]) -> tuple[Row, ...]:
-    """Rows of a struct in memory, of which only members in `words` have names."""
+    """Return the rows of a struct in memory, with arrays in place of members not in `words`."""
     rows: list[Row] = []
     gap = count = 0
     for row in struct.rows:
@@ -238,8 +239,8 @@ def _gaps(struct: Definition, words: Set[str]) -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def _is_one(code: str) -> bool:
-    """Whether code ends where its first bracket is closed, or at its first ; outside of one."""
+def _is_single(code: str) -> bool:
+    """Return whether code ends at its first closed bracket, or at its first ; outside."""
     depth = 0
     for match in re.finditer(r"[{};]", code):
         depth += {"{": 1, "}": -1}.get(match[0], 0)
@@ -249,7 +250,7 @@ def _is_one(code: str) -> bool:
 
 
 def named(definitions: Iterable[Definition]) -> set[Definition]:
-    """Return those that stay: what has no name of its own, and what these name in turn."""
+    """Return the definitions that stay: unnamed definitions, and all that they use in turn."""
     by_name: dict[str, list[Definition]] = defaultdict(list)
     pending: list[Definition] = []
     for definition in definitions:
@@ -257,12 +258,12 @@ def named(definitions: Iterable[Definition]) -> set[Definition]:
             by_name[name].append(definition)
         if not definition.names:
             pending.append(definition)
-    unseen, found = set(by_name), set[Definition]()
+    unseen, stay = set(by_name), set[Definition]()
     while pending:
         definition = pending.pop()
-        if definition in found:
+        if definition in stay:
             continue
-        found.add(definition)
+        stay.add(definition)
         new = definition.words & unseen
         beginnings, endings = definition.pasted
         if beginnings or endings:
@@ -270,4 +271,4 @@ def named(definitions: Iterable[Definition]) -> set[Definition]:
         unseen -= new
         for name in new:
             pending += by_name[name]
-    return found
+    return stay

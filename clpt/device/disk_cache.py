@@ -1,9 +1,8 @@
-"""Files in the user's cache folder, all of which may be deleted at any time.
+"""Files in the user's cache folder, which may be deleted at any time.
 
-Several processes may use the folder at once: each file is written whole or not at all, and a file
-that another process has deleted is one that is missing. So is a link, or a file that another user
-has written. The files that were used longest ago are deleted where all together take more than
-LIMIT.
+Several processes may use the folder at once: each file is written whole or not at all. Links and
+files of other users count as missing. The least recently used files are deleted if all together
+take more than LIMIT.
 """
 
 from __future__ import annotations
@@ -34,41 +33,43 @@ if sys.platform != "win32":
 log = logging.getLogger(__name__)
 
 LIMIT = 2**30  # bytes
-_PARTS = ("programs", "failed")  # the folders that are kept within LIMIT
-_TEMPORARY = () if os.name != "posix" else (Path("/tmp"), Path("/var/tmp"))  # beside Python's own
-# Folders in the user's cache folder whose files drivers and libraries run: of PyOpenCL, of PoCL,
+_PARTS = ("programs", "failed")  # the folders within LIMIT
+_TEMPORARY = (
+    () if os.name != "posix" else (Path("/tmp"), Path("/var/tmp"))
+)  # besides Python's folder
+# Folders in the user's cache folder with code that drivers and libraries run: PyOpenCL, PoCL,
 # Intel, Mesa, AMD and NVIDIA.
 _OF_OTHERS = (
     "pytools", "pyopencl", "pocl", "neo_compiler_cache", "mesa_shader_cache",
     "mesa_shader_cache_db", "rusticl", "comgr", "nvidia",
 )  # fmt: skip
-WAIT = 300.0  # [s] for what another process makes
-_STEP = LIMIT // 16  # bytes that a process writes before it looks at the folder's size again
+WAIT = 300.0  # [s] for another process's build
+_STEP = LIMIT // 16  # bytes that a process writes between two checks of the folder's size
 
 _lock = forking.renewed(threading.Lock())
-_written = _STEP  # bytes since the folder's size was looked at: a process looks at its first file
+_written = _STEP  # bytes since the last check: the first file triggers a check
 
 
 def folder() -> Path:
-    """Return clpt's folder in the user's cache folder, or a temporary one in its place.
+    """Return clpt's folder in the user's cache folder, or a temporary folder.
 
-    The user's folder is passed over, with one warning, where it cannot be written, or where others
-    can write: a driver runs what the folder holds.
+    The temporary folder is used, with a warning, if the user's folder cannot be written or other
+    users can write to it: a driver runs code from the folder.
     """
     return private_folder(user_folder("clpt"))
 
 
 def user_folder(name: str | None = None) -> Path:
-    """Return the user's folder for caches, or that of a program in it.
+    """Return the user's folder for caches, or a program's folder in it.
 
-    It is a temporary one, with one warning, for a user without a home, and where other users could
-    put something into it: drivers and PyOpenCL run what they find there. XDG_CACHE_HOME, by which
-    they find it, is set so then.
+    For a user without a home, and if other users could write to the folder, it is a temporary
+    folder, with a warning: drivers and PyOpenCL run code from it. XDG_CACHE_HOME then points
+    there.
     """
     try:
         wanted = platformdirs.user_cache_path(appauthor=False)
         chosen = _safe_home(wanted)
-    except RuntimeError:  # HOME is not set, and the system has no entry for the user
+    except RuntimeError:  # HOME is unset, and the system has no entry for the user
         return _without_home() / (name or "")
     if chosen != wanted:
         os.environ["XDG_CACHE_HOME"] = str(chosen)
@@ -77,7 +78,7 @@ def user_folder(name: str | None = None) -> Path:
 
 @functools.cache
 def _safe_home(wanted: Path) -> Path:
-    """Return the user's folder for caches, or a temporary one if it cannot be used."""
+    """Return the user's folder for caches, or a temporary folder if it is unfit."""
     reason = unfit(wanted, _OF_OTHERS)
     if reason is None:
         return wanted
@@ -87,7 +88,7 @@ def _safe_home(wanted: Path) -> Path:
 
 
 def has_home() -> bool:
-    """Whether there is a folder for this user's caches."""
+    """Return whether this user has a folder for caches."""
     try:
         platformdirs.user_cache_path()
     except RuntimeError:
@@ -104,7 +105,7 @@ def _without_home() -> Path:
 
 @functools.cache
 def private_folder(wanted: Path) -> Path:
-    """Return `wanted`, made where it is missing, or a temporary folder if it cannot be used."""
+    """Return `wanted`, created if missing, or a temporary folder if it is unfit."""
     reason = unfit(wanted)
     if reason is None:
         return wanted
@@ -115,7 +116,7 @@ def private_folder(wanted: Path) -> Path:
 
 @functools.cache
 def temporary_folder() -> Path:
-    """Return a temporary folder for caches, which only this user can write."""
+    """Return a temporary folder for caches that only this user can write."""
     user = os.getuid() if hasattr(os, "getuid") else "user"
     first = Path(tempfile.gettempdir())
     for root in (first, *_TEMPORARY):
@@ -126,7 +127,7 @@ def temporary_folder() -> Path:
 
 
 def _why_unsafe(path: Path) -> str | None:
-    """Return how other users could put something in the place of a folder, or why none can tell."""
+    """Return how other users could replace a folder, or why this is unknown; None if safe."""
     try:
         return ownership.fault(path)
     except OSError as error:
@@ -134,9 +135,9 @@ def _why_unsafe(path: Path) -> str | None:
 
 
 def unfit(path: Path, parts: Collection[str] | None = None) -> str | None:
-    """Return why a folder cannot hold a cache; None if it can. It is made where it is missing.
+    """Return why a folder cannot hold a cache; None if it can. Create it if missing.
 
-    Folders in it are to be safe too: all of them, or those of the names in `parts`.
+    Folders in it must be safe too: all of them, or the names in `parts`.
     """
     try:
         if reason := ownership.fault(path):
@@ -146,7 +147,7 @@ def unfit(path: Path, parts: Collection[str] | None = None) -> str | None:
         if os.name != "posix":
             return None
         inside = path.iterdir() if parts is None else (path / name for name in parts)
-        for part in (path, *(one for one in inside if one.is_dir())):
+        for part in (path, *(entry for entry in inside if entry.is_dir())):
             if {part.lstat().st_uid, part.stat().st_uid} != {os.getuid()}:
                 return "belongs to another user"
             if ownership.others_write(part.stat()):
@@ -157,9 +158,9 @@ def unfit(path: Path, parts: Collection[str] | None = None) -> str | None:
 
 
 def store(entry: str, header: str, binary: bytes, root: Path | None = None) -> None:
-    """Write a program's binary under a key, with a line of text; a full disk is no error.
+    """Write a program's binary and a line of text under a key; a full disk is no error.
 
-    root: the cache folder, where another process tells it.
+    root: the cache folder, if another process chose it.
     """
     content = header.encode() + b"\n" + binary
     check = hashlib.sha256(content).hexdigest().encode()
@@ -170,14 +171,14 @@ def store(entry: str, header: str, binary: bytes, root: Path | None = None) -> N
 
 
 def holds(entry: str) -> bool:
-    """Return whether something was written under a key, perhaps damaged since."""
+    """Return whether an entry exists for a key; it may be damaged."""
     return (folder() / "programs" / entry).exists()
 
 
 def load(entry: str) -> tuple[str, bytes] | None:
-    """Return header and binary that `store` wrote; None if they are missing or damaged.
+    """Return the header and binary of `store`; None if they are missing or damaged.
 
-    The checksum is needed, since drivers crash on a damaged binary.
+    Drivers crash on a damaged binary, so a checksum is compared.
     """
     path = folder() / "programs" / entry
     try:
@@ -187,7 +188,7 @@ def load(entry: str) -> tuple[str, bytes] | None:
     except OSError:
         check, content = b"", b""
     with suppress(OSError):
-        os.utime(path)  # it was used now; many systems do not note that
+        os.utime(path)  # marks the last use, which many systems do not note
     if hashlib.sha256(content).hexdigest().encode() != check:
         _warn(f"a file in {path.parent} is damaged or of another user: its program is built again")
         return None
@@ -196,10 +197,10 @@ def load(entry: str) -> tuple[str, bytes] | None:
 
 
 @contextmanager
-def alone(entry: str) -> Iterator[None]:
-    """Keep other processes from making an entry meanwhile; first wait for one that is at it.
+def exclusive(entry: str) -> Iterator[None]:
+    """Hold the lock of an entry; wait at most WAIT for another process that holds it.
 
-    Nobody waits for longer than WAIT, nor where files have no locks.
+    Does not wait if the file system has no locks.
     """
     path, handle = _lock_of(entry), None
     with suppress(OSError):
@@ -218,17 +219,17 @@ def alone(entry: str) -> Iterator[None]:
 
 
 def _wait_for(handle: int) -> None:
-    """Lock a file as soon as no other process has, or go on without after WAIT."""
-    end, told = time.monotonic() + WAIT, False
+    """Lock a file when no other process holds it, or continue without a lock after WAIT."""
+    end, reported = time.monotonic() + WAIT, False
     while not _locks(handle) and time.monotonic() < end:
-        if not told:
+        if not reported:
             log.info("another process builds the same program: waiting for it")
-        told = True
+        reported = True
         time.sleep(0.05)
 
 
-def is_being_made(entry: str) -> bool:
-    """Return whether another process is making an entry, see `alone`."""
+def is_being_built(entry: str) -> bool:
+    """Return whether another process holds the lock of an entry, see `exclusive`."""
     try:
         handle = os.open(_lock_of(entry), os.O_RDWR)
     except OSError:
@@ -244,25 +245,25 @@ def _lock_of(entry: str) -> Path:
 
 
 def _locks(handle: int) -> bool:
-    """Lock a file; False if another process has done so. True where files have no locks."""
+    """Lock a file; return False if another process holds it. True without file locks."""
     if sys.platform != "win32":
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             return False
         except OSError as error:
-            log.debug("no lock keeps processes from the same work: %s", error)
+            log.debug("files have no locks, so processes may build the same program: %s", error)
     return True
 
 
 @functools.cache
 def _warn(text: str) -> None:
-    """Log a warning, once."""
+    """Log a warning once a process."""
     log.warning("%s", text)
 
 
 def keep_failed(source: Source) -> str | None:
-    """Write the text of a program that did not build; return its path, None if that fails."""
+    """Write the text of a program that failed to build; return its path, None on failure."""
     digest = hashlib.sha256(source.text.encode()).hexdigest()[:12]
     stem = source.name.replace("/", "_").removesuffix(".cl")
     path = folder() / "failed" / f"{stem}-{digest}.cl"
@@ -274,31 +275,31 @@ def keep_failed(source: Source) -> str | None:
 
 
 def prune(root: Path, limit: int = LIMIT, *, parts: tuple[str, ...] = _PARTS) -> None:
-    """Delete the files that were used longest ago, until all take at most `limit` bytes.
+    """Delete the least recently used files until all take at most `limit` bytes.
 
-    parts: their folders in `root`.
+    parts: folders in `root`.
     """
-    found = []
+    files = []
     for path in (path for part in parts for path in (root / part).glob("*")):
         if path.name.startswith(output_files.PARTIAL):
             continue
-        with suppress(OSError):  # another process has deleted it
-            facts = path.lstat()
-            found.append((facts.st_mtime, facts.st_size, path))
-    used = sum(size for _, size, _ in found)
-    for _, size, path in sorted(found):
+        with suppress(OSError):  # another process deleted it
+            status = path.lstat()
+            files.append((status.st_mtime, status.st_size, path))
+    used = sum(size for _, size, _ in files)
+    for _, size, path in sorted(files):
         if used <= limit:
             break
         try:
             path.unlink(missing_ok=True)
-        except OSError as error:  # on Windows a file that is open stays
+        except OSError as error:  # on Windows an open file stays
             log.debug("%s stays in the cache: %s", path, error)
             continue
         used -= size
 
 
 def read(path: Path) -> bytes:
-    """Return the content of a file that this user has written. Raises OSError for any other."""
+    """Return the content of a file of this user. Raises OSError for any other file."""
     with open(own_file(path), "rb") as file:
         return file.read()
 
@@ -311,16 +312,16 @@ def own_file(path: Path) -> int:
     flags = os.O_RDONLY | getattr(os, "O_BINARY", 0)
     if os.name != "posix":
         return os.open(path, flags)
-    handle = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK)  # a pipe has no end
-    facts = os.fstat(handle)
-    if stat.S_ISREG(facts.st_mode) and facts.st_uid == os.getuid():
+    handle = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK)  # a pipe would block
+    status = os.fstat(handle)
+    if stat.S_ISREG(status.st_mode) and status.st_uid == os.getuid():
         return handle
     os.close(handle)
     raise PermissionError(f"{path} is no file of this user")
 
 
 def write(path: Path, content: bytes) -> None:
-    """Write a file in a cache, in the place of a link or a pipe too. Raises OSError."""
+    """Write a file in a cache; it replaces a link or a pipe too. Raises OSError."""
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     if path.is_symlink() or (path.exists() and not path.is_file()):
         path.unlink()
@@ -328,7 +329,7 @@ def write(path: Path, content: bytes) -> None:
 
 
 def _keep(path: Path, content: bytes) -> None:
-    """Write a file of the cache, and keep the cache within its limit."""
+    """Write a file of the cache, and prune the cache from time to time."""
     global _written
     write(path, content)
     with _lock:

@@ -1,6 +1,6 @@
-"""DLPack's form of OpenCL memory: its capsule, made by hand, as no library makes it of a buffer.
+"""DLPack capsules of OpenCL memory; no library offers them for a buffer.
 
-The structures are those of dlpack.h 0.8, whose data pointer is the cl_mem handle for OpenCL.
+The structures follow dlpack.h 0.8. For OpenCL the data pointer is the cl_mem handle.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class _Managed(c.Structure):
     _fields_ = (("tensor", _Tensor), ("manager", c.c_void_p), ("deleter", _Deleter))
 
 
-_owned: dict[int, tuple[Any, ...]] = {}  # by a structure's address: what it refers to
+_owned: dict[int, tuple[Any, ...]] = {}  # referenced objects by a structure's address
 
 _new = c.pythonapi.PyCapsule_New
 _new.restype, _new.argtypes = c.py_object, (c.c_void_p, c.c_char_p, c.c_void_p)
@@ -46,26 +46,26 @@ def _delete(managed: int) -> None:
 
 
 def _sweep() -> None:
-    """Free capsules that no consumer took: with their first name, and no reference but ours.
+    """Free capsules without a consumer: they have their first name, and no other reference.
 
-    A destructor of the capsule would do so at once, but Python may run it while a consumer's error
-    is being raised, and a callback in Python must not run then.
+    Python may run a capsule's destructor while a consumer's exception is raised, when a Python
+    callback must not run. So clpt sets no destructor.
     """
-    # How many references Python counts here beside those of others differs between its versions.
+    # The number of references that this call itself adds differs between Python versions.
     alone = _references({0: (object(),)}, 0)
     for address in list(_owned):
-        with suppress(KeyError):  # a consumer in another thread has freed it meanwhile
+        with suppress(KeyError):  # a consumer's thread freed it meanwhile
             if _references(_owned, address) <= alone and _valid(_owned[address][-1], _NAME):
                 _owned.pop(address, None)
 
 
 def _references(owned: Mapping[int, tuple[Any, ...]], address: int) -> int:
-    """Return the references to the last object of an entry, with those of this call."""
+    """Count the references to the last object of an entry, including this call's."""
     return sys.getrefcount(owned[address][-1])
 
 
 def opencl_capsule(array: Any, device: int) -> Any:
-    """Return a capsule of a `pyopencl.array.Array`, which lives until the consumer frees it."""
+    """Return a capsule that keeps a `pyopencl.array.Array` until the consumer frees it."""
     _sweep()
     dtype, ndim = np.dtype(array.dtype), array.ndim
     if dtype.kind not in _CODES:

@@ -1,6 +1,6 @@
-"""Repair of a forked process, which has only one of its parent's threads.
+"""Repair of a forked process, which has a single thread of its parent's.
 
-Without those of PoCL its commands never end, and a lock that one of them held is never given back.
+Without PoCL's threads its commands never end, and a lock that another thread held stays locked.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ import pyopencl as cl
 
 from ..errors import DeviceError
 
-_lost = False  # whether PoCL was loaded when this process, or one it descends from, was forked
+_lost = False  # whether PoCL was loaded at a fork of this process or an ancestor
 _locks: weakref.WeakSet[Any] = weakref.WeakSet()
 _Lock = TypeVar("_Lock")
 
 
 def renewed(lock: _Lock) -> _Lock:
-    """Return a lock of threading, which nobody holds in a process that is forked later."""
+    """Return a lock of threading that is free in every later forked process."""
     _locks.add(lock)
     return lock
 
@@ -36,15 +36,15 @@ def check(queue: cl.CommandQueue) -> None:
 
 
 def _note_loss() -> None:
-    """Note whether the parent has loaded PoCL, by clpt or without it."""
+    """Note whether the parent has loaded PoCL."""
     global _lost
-    with contextlib.suppress(OSError):  # of a system without such a file
+    with contextlib.suppress(OSError):  # a system without such a file
         _lost = _lost or "libpocl" in Path("/proc/self/maps").read_text(errors="replace")
 
 
 def _renew_locks() -> None:
     for lock in list(_locks):
-        lock._at_fork_reinit()  # as the locks of threading and logging are
+        lock._at_fork_reinit()  # like locks of threading and logging
 
 
 if hasattr(os, "register_at_fork"):

@@ -1,4 +1,4 @@
-"""Arrays that take seconds to compute, in the user's cache folder, for the next process."""
+"""A disk cache of arrays that take seconds to compute."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from clpt.device import disk_cache
 
 
 def kept(
-    make: Callable[..., tuple[NDArray[Any], ...]], *given: object, files: Iterable[Path]
+    compute: Callable[..., tuple[NDArray[Any], ...]], *arguments: object, files: Iterable[Path]
 ) -> tuple[NDArray[Any], ...]:
-    """Return make(*given), of the cache folder where a process has made it before.
+    """Return compute(*arguments), from the cache folder after the first time.
 
-    given: whatever its results follow from, known by its repr; files: the code and data from which
-    they follow too. The last bits may be those of another processor with the same folder.
+    arguments: identified by their repr; files: code and data that the results depend on. The last
+    bits may come from another processor that shares the folder.
     """
-    digest = hashlib.sha256(repr((make.__qualname__, given, np.__version__)).encode())
+    digest = hashlib.sha256(repr((compute.__qualname__, arguments, np.__version__)).encode())
     for file in sorted(files):
         digest.update(file.read_bytes())
     entry = digest.hexdigest()
     stored = disk_cache.load(entry)
     if stored is not None:
-        with np.load(io.BytesIO(stored[1]), allow_pickle=False) as found:
-            return tuple(found[name] for name in found.files)
-    made = make(*given)
+        with np.load(io.BytesIO(stored[1]), allow_pickle=False) as archive:
+            return tuple(archive[name] for name in archive.files)
+    arrays = compute(*arguments)
     packed = io.BytesIO()
-    np.savez(packed, *made)
+    np.savez(packed, *arrays)
     disk_cache.store(entry, "arrays", packed.getvalue())
-    return made
+    return arrays

@@ -1,29 +1,38 @@
-"""OpenCL programs as the driver builds them, without PyOpenCL's warnings.
+"""OpenCL programs of a driver, without PyOpenCL's warnings, and with limits of registers.
 
-PyOpenCL warns of every build whose log is not empty, and Intel's CPU runtime writes a remark for
-each kernel. A filter of Python's warnings belongs to the whole process, and cannot be set for one
-thread. So this module uses PyOpenCL's native class, which does not warn, and logs what the driver
-says.
+PyOpenCL warns of every build with a log, and Intel's CPU runtime writes a remark for each kernel.
+Python's filters of warnings apply to all threads of a process. So this module uses PyOpenCL's
+native class, which does not warn, and logs the driver's log.
+
+NVIDIA's compiler takes a limit of registers as an option and reports the number used. It uses up
+a limit, so a limit is tried only below the number without a limit, and a program that spills is
+dropped. The driver reports nothing for a program from its cache, so callers store the limit.
 """
 
 from __future__ import annotations
 
 import ctypes
 import logging
+import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, TypeVar
 
 import pyopencl as cl
 from pyopencl import _cl
 
 log = logging.getLogger(__name__)
 
+REGISTERS_VERBOSE = "-cl-nv-verbose"
+_USED = re.compile(r"Used (\d+) registers")
+_SPILLED = re.compile(r"(\d+) bytes spill stores")
+_P = TypeVar("_P")
+
 
 def build(
     context: cl.Context, device: cl.Device, code: str | bytes, options: Sequence[str] = ()
 ) -> cl.Program:
-    """Build a program for one device, of a text or a binary.
+    """Build a program for a device, from a text or a binary.
 
     Raises pyopencl.Error with the driver's log.
     """
@@ -37,41 +46,70 @@ def build(
 def compile_part(
     context: cl.Context, device: cl.Device, text: str, options: Sequence[str] = ()
 ) -> cl.Program:
-    """Compile a text, to be linked. Raises pyopencl.Error with the driver's log."""
+    """Compile a text for linking. Raises pyopencl.Error with the driver's log."""
     program = _cl._Program(context, text)
     return _tried(program, device, lambda: program.compile(_joined(options), [device], []))
 
 
 def binary(program: cl.Program) -> bytes:
-    """Return a program's binary, for the one device of its context that it was built for.
+    """Return a program's binary, for the device that it was built for.
 
-    Some drivers compile to the end only for that, and PyOpenCL holds Python's lock meanwhile: no
-    other thread could run, nor Ctrl-C end the process. So its size is asked for without that lock.
+    Some drivers finish compiling only for this query, and PyOpenCL holds Python's lock meanwhile:
+    no other thread could run, and Ctrl-C would not end the process. So ctypes queries the size
+    first, without the lock.
     """
     room = (ctypes.c_size_t * len(program.get_info(cl.program_info.DEVICES)))()
     size, handle = ctypes.c_size_t(ctypes.sizeof(room)), ctypes.c_void_p(program.int_ptr)
-    with suppress(AttributeError):  # the loader's functions are not seen through PyOpenCL's module
-        ask = ctypes.CDLL(_cl.__file__).clGetProgramInfo
-        ask(handle, cl.program_info.BINARY_SIZES, size, room, None)
+    with suppress(AttributeError):  # PyOpenCL's module may hide the loader's functions
+        query = ctypes.CDLL(_cl.__file__).clGetProgramInfo
+        query(handle, cl.program_info.BINARY_SIZES, size, room, None)
     return next(filter(None, program.get_info(cl.program_info.BINARIES)))
 
 
-def said(program: cl.Program, device: cl.Device) -> str:
-    """Return what the driver's compiler said of a program that was built for a device."""
+def log_of(program: cl.Program, device: cl.Device) -> str:
+    """Return the build log of a program for a device."""
     return str(program.get_build_info(device, cl.program_build_info.LOG))
 
 
 def _tried(program: Any, device: cl.Device, action: Callable[[], Any]) -> cl.Program:
-    """Return a program after the action; what the driver says is in the error, or is logged."""
+    """Run an action on a program and return it; add the build log to an error, or log it."""
     try:
         action()
     except cl.Error as error:
-        said = program.get_build_info(device, cl.program_build_info.LOG)
-        record = _cl._ErrorRecord(msg=f"{error}\n\n{said}", code=error.code, routine=error.routine)
+        text = program.get_build_info(device, cl.program_build_info.LOG)
+        record = _cl._ErrorRecord(msg=f"{error}\n\n{text}", code=error.code, routine=error.routine)
         raise type(error)(record) from None
-    if said := program.get_build_info(device, cl.program_build_info.LOG).strip():
-        log.debug("%s says of a program: %s", device.platform.name, said)
+    if text := program.get_build_info(device, cl.program_build_info.LOG).strip():
+        log.debug("%s says of a program: %s", device.platform.name, text)
     return cl.Program(program)
+
+
+def register_options(limit: int) -> list[str]:
+    """Return NVIDIA's options for a limit of registers, 0 for none, and for its report."""
+    return [REGISTERS_VERBOSE, *([f"-cl-nv-maxrregcount={limit}"] if limit else [])]
+
+
+def registers_used(log: str) -> tuple[int, int]:
+    """Return the most registers and spilled bytes of a log's kernels; 0 if it reports none."""
+    registers, spills = (map(int, pattern.findall(log)) for pattern in (_USED, _SPILLED))
+    return max(registers, default=0), max(spills, default=0)
+
+
+def with_fewest_registers(
+    limits: Sequence[int], build: Callable[[int], tuple[_P, tuple[int, int]]]
+) -> tuple[_P, int | None]:
+    """Return a program of the least limit without spills, and the limit.
+
+    The limit is 0 if all limits spill, None if the compiler reported nothing. build: takes a
+    limit; returns a program, and the result of `registers_used`.
+    """
+    program, (used, _) = build(0)
+    for limit in sorted(limits):
+        if limit < used:
+            limited, (registers, spilled) = build(limit)
+            if registers and not spilled:
+                return limited, limit
+    return program, 0 if used else None
 
 
 def _joined(options: Sequence[str]) -> bytes:

@@ -30,14 +30,14 @@ _SCALARS = {
     "float": np.float32,
     "double": np.float64,
 }
-# A null pointer as bytes: None is taken by PyOpenCL from 2026.1.3 on alone.
+# A null pointer as bytes: PyOpenCL accepts None only from 2026.1.3.
 _NULL = np.uintp(0)
 _VECTOR = re.compile(r"([a-z]+?)(2|3|4|8|16)$")
 
 
 @dataclass(frozen=True)
 class Argument:
-    """One argument of a kernel: its name, OpenCL type and address space (global, private, ...)."""
+    """A kernel's argument: name, OpenCL type and address space (global, private, ...)."""
 
     name: str
     type: str
@@ -48,12 +48,12 @@ class Argument:
         return self.space == "private" and not self.type.endswith("*")
 
     def value(self, value: Any) -> Any:
-        """Return a value as the driver takes it: scalars and vectors in the argument's type.
+        """Return a value in the driver's form: scalars and vectors in the argument's type.
 
-        Raises TypeError for a number in the place of a pointer.
+        Raises TypeError for a number in place of a pointer, OverflowError.
         """
         if not self.by_value:
-            if isinstance(value, (int, float, np.number)):  # older versions of PyOpenCL take it
+            if isinstance(value, (int, float, np.number)):  # older versions of PyOpenCL accept it
                 raise TypeError("a pointer takes a buffer, or None")
             return value
         if isinstance(value, (np.void, np.ndarray)):
@@ -63,10 +63,10 @@ class Argument:
         if base is None:  # a struct, an image or a sampler
             return value
         kind: np.dtype[Any] = np.dtype(base)
-        if kind.kind in "iu":  # NumPy before 2 cuts what does not fit
+        if kind.kind in "iu":  # NumPy before 2 truncates silently
             limits = np.iinfo(kind.str)
-            given = value if vector else (value,)
-            if not all(limits.min <= number <= limits.max for number in given):
+            numbers = value if vector else (value,)
+            if not all(limits.min <= number <= limits.max for number in numbers):
                 raise OverflowError(f"it goes from {limits.min} to {limits.max}")
         if vector is None:
             return base(value)
@@ -91,7 +91,7 @@ class Program:
         self._borrowing = forking.renewed(threading.Lock())
 
     def kernel(self, name: str) -> Kernel:
-        """Return the kernel of that name. Raises KeyError, which lists the kernels."""
+        """Return a kernel by name. Raises KeyError, which lists the kernels."""
         if name not in self.signatures:
             known = ", ".join(sorted(self.signatures)) or "no kernel"
             raise KeyError(f"program {self.name!r} has no kernel {name!r}; it has {known}")
@@ -100,16 +100,16 @@ class Program:
     def lend_kernel(
         self, name: str, named: Mapping[str, Any], use: Callable[[BoundKernel], _R]
     ) -> _R:
-        """Lend a kernel with its arguments to `use`, which enqueues it; return what that returns.
+        """Bind a kernel's arguments and call `use`, which enqueues it; return its result.
 
-        It is made the first time only: PyOpenCL takes half a millisecond to make one. Another
-        thread waits meanwhile. Raises as `kernel` and `Kernel.bind` do.
+        The kernel object is created once: PyOpenCL takes half a millisecond for it. Other threads
+        wait meanwhile. Raises like `kernel` and `Kernel.bind`.
         """
-        # No generator: one that an interrupt leaves in the middle holds the lock till it is freed.
+        # A suspended generator would hold the lock after an interrupt, until it is freed.
         with self._borrowing:
             bound = self._borrowed.get(name)
             if bound is None:
-                # Of a copy: a cycle would keep the driver's memory until it is collected.
+                # A copy: a reference cycle would keep the driver's memory until garbage collection.
                 copy = Program(self.name, self.cl_program, self.signatures)
                 bound = self._borrowed[name] = copy.kernel(name).bind(**named)
             else:
@@ -121,7 +121,7 @@ class Program:
 
 
 class Kernel:
-    """A kernel and its signature; `bind` gives it arguments."""
+    """A kernel and its signature; `bind` sets its arguments."""
 
     def __init__(self, program: Program, name: str):
         self.program, self.name = program, name
@@ -130,8 +130,8 @@ class Kernel:
     def bind(self, **named: Any) -> BoundKernel:
         """Return the kernel with every argument set, by name.
 
-        Pointers take buffers (None is a null pointer), local ones `pyopencl.LocalMemory`, scalars
-        numbers, vectors sequences. Two bindings are independent of each other.
+        Pointers take buffers (None is a null pointer), local pointers `pyopencl.LocalMemory`,
+        scalars numbers, vectors sequences. Bindings are independent of each other.
 
         Raises TypeError if a name is missing or unknown, or a value does not fit.
         """
@@ -147,13 +147,13 @@ class BoundKernel:
         self._indices = {
             argument.name: (i, argument) for i, argument in enumerate(kernel.arguments)
         }
-        self._values: dict[str, Any] = {}  # as the driver has them
-        self._numbers: dict[str, Any] = {}  # as the caller gave them
-        self._most: int | None = None  # work-items of a group that the device runs it in
+        self._values: dict[str, Any] = {}  # in the driver's form
+        self._numbers: dict[str, Any] = {}  # in the caller's form
+        self._most: int | None = None  # the largest group on the device
         self.bind(**named)
 
     def bind(self, **named: Any) -> None:
-        """Set all arguments. Raises TypeError as `Kernel.bind` does."""
+        """Set all arguments. Raises TypeError like `Kernel.bind`."""
         missing = [name for name in self._indices if name not in named]
         if missing:
             raise TypeError(f"kernel {self.kernel.name!r} also takes {', '.join(missing)}")
@@ -161,24 +161,24 @@ class BoundKernel:
 
     @property
     def values(self) -> Mapping[str, Any]:
-        """The arguments by name, as the driver has them."""
+        """The arguments by name, in the driver's form."""
         return self._values
 
     def drop_buffers(self) -> None:
-        """Forget the buffers, which the driver keeps until the commands that use them end."""
+        """Drop the references to buffers; the driver keeps them until its commands end."""
         self._values.clear()
 
     def set_args(self, **named: Any) -> None:
-        """Set arguments again by name. Raises TypeError as `Kernel.bind` does."""
+        """Set arguments by name. Raises TypeError like `Kernel.bind`."""
         for name, new in named.items():
             number = isinstance(new, (int, float, tuple))
             if number and type(new) is type(old := self._numbers.get(name)) and new == old:
-                continue  # a number takes longer to set than a kernel to enqueue
+                continue  # setting a number takes longer than enqueueing a kernel
             if name not in self._indices:
                 known = ", ".join(self._indices) or "nothing"
                 raise TypeError(f"kernel {self.kernel.name!r} takes no {name!r}; it takes {known}")
             index, argument = self._indices[name]
-            self._numbers.pop(name, None)  # first: an interrupt may come between any two lines
+            self._numbers.pop(name, None)  # first: an interrupt may occur at any line
             try:
                 value = argument.value(new)
                 null = value is None and argument.space in ("global", "constant")
@@ -200,7 +200,7 @@ class BoundKernel:
         wait_for: Sequence[cl.Event] | None = None,
         offset: Sequence[int] | None = None,
     ) -> cl.Event:
-        """Enqueue it; sizes are (x,), (x, y) or (x, y, z); offset: of the first work-item.
+        """Enqueue the kernel; sizes are (x,), (x, y) or (x, y, z); offset: of the first work-item.
 
         Raises DeviceError if the driver refuses it, MemoryBudgetError if memory has run out.
         """
@@ -216,7 +216,7 @@ class BoundKernel:
     def _fitting(
         self, queue: cl.CommandQueue, local_size: Sequence[int] | None
     ) -> Sequence[int] | None:
-        """The size of a group, halved until the device can run the kernel in such groups."""
+        """Halve a group's size until the device can run the kernel with it."""
         if local_size is None:
             return None
         if self._most is None:
@@ -228,14 +228,14 @@ class BoundKernel:
 
 
 def most_items(kernel: cl.Kernel, device: cl.Device) -> int:
-    """Return how many work-items of a kernel a group on a device has at most."""
+    """Return the largest number of work-items of a kernel's group on a device."""
     return int(kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, device))
 
 
 def read_signatures(program: cl.Program) -> Signatures:
-    """Return the arguments of a built program's kernels, as the driver tells them.
+    """Return the arguments of a built program's kernels, from the driver.
 
-    Raises pyopencl.Error where it does not.
+    Raises pyopencl.Error if the driver does not report them.
     """
     kernels = [cl.Kernel(program, name) for name in program.kernel_names.split(";") if name]
     return {kernel.function_name: _signature(kernel) for kernel in kernels}
@@ -246,7 +246,7 @@ def _signature(kernel: cl.Kernel) -> tuple[Argument, ...]:
     spaces = {getattr(address, name): name.lower() for name in ("GLOBAL", "LOCAL", "CONSTANT")}
     return tuple(
         Argument(
-            # PoCL has macros that rename what is called as a builtin: sign becomes _cl_sign
+            # PoCL's macros rename arguments that share a builtin's name: sign becomes _cl_sign
             name=kernel.get_arg_info(index, info.NAME).removeprefix("_cl_"),
             type=kernel.get_arg_info(index, info.TYPE_NAME).replace("unsigned ", "u"),
             space=spaces.get(kernel.get_arg_info(index, info.ADDRESS_QUALIFIER), "private"),
@@ -261,5 +261,5 @@ def encode(signatures: Signatures) -> str:
 
 
 def decode(text: str) -> Signatures:
-    """Return the signatures of which `encode` made a text. Raises TypeError, ValueError."""
+    """Return the signatures of a text from `encode`. Raises TypeError, ValueError."""
     return {name: tuple(Argument(*a) for a in args) for name, args in json.loads(text).items()}

@@ -1,4 +1,4 @@
-"""Programs that were built in a context, so that a second renderer in it builds nothing."""
+"""A cache of a context's programs, so that a second renderer builds nothing."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import pyopencl as cl
 
 from clpt.device import forking
 
-_LIMIT = 128  # programs, some megabytes of a driver's memory
+_LIMIT = 128  # programs, some megabytes of driver memory
 
 _contexts_lock = forking.renewed(threading.Lock())
 
 
 class ProgramCache:
-    """The programs of one context that were used last.
+    """The most recently used programs of a context.
 
-    They live as long as a Python object of one of the context's queues: each queue of a `Device`
-    refers to the cache of its context, and nothing else does.
+    The cache lives as long as a Python object of the context's queues: only queues of `Device`
+    objects refer to it.
     """
 
     def __init__(self, context: cl.Context):
@@ -33,30 +33,30 @@ class ProgramCache:
         return len(self._programs)
 
     def find(self, key: Hashable) -> Any:
-        """Return a program, None if there is none."""
+        """Return a program, None if it is missing."""
         with self._lock:
             if key in self._programs:
                 self._programs.move_to_end(key)
             return self._programs.get(key)
 
     def keep(self, key: Hashable, program: object) -> None:
-        """Keep a program; drop the one that was used longest ago if there are too many."""
+        """Keep a program; drop the least recently used program beyond the limit."""
         with self._lock:
             self._programs[key] = program
             while len(self._programs) > _LIMIT:
                 self._programs.popitem(last=False)
 
 
-_of_contexts: weakref.WeakValueDictionary[int, ProgramCache] = weakref.WeakValueDictionary()
+_caches: weakref.WeakValueDictionary[int, ProgramCache] = weakref.WeakValueDictionary()
 
 
-def of(queue: cl.CommandQueue) -> ProgramCache:
+def cache_of(queue: cl.CommandQueue) -> ProgramCache:
     """Return the cache of the queue's context."""
     context = queue.context
     with _contexts_lock:
-        # No other context has the handle while a cache refers to this one.
-        cache = _of_contexts.get(context.int_ptr)
+        # The handle is unique while a cache refers to its context.
+        cache = _caches.get(context.int_ptr)
         if cache is None:
-            cache = _of_contexts[context.int_ptr] = ProgramCache(context)
-        queue.clpt_programs = cache  # PyOpenCL's objects take no weak references
+            cache = _caches[context.int_ptr] = ProgramCache(context)
+        queue.clpt_programs = cache  # PyOpenCL's objects have no weak references
     return cache

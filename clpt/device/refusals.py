@@ -1,4 +1,4 @@
-"""Errors of drivers, made errors of clpt that say what to do."""
+"""Errors of drivers as errors of clpt, with advice."""
 
 from __future__ import annotations
 
@@ -26,36 +26,36 @@ _ADVICE = {
 
 
 def refused(
-    what: str,
+    subject: str,
     error: cl.Error,
     nbytes: int | None = None,
     available: int | None = None,
     advice: str = MEMORY_ADVICE,
 ) -> DeviceError:
-    """Return the error of clpt that stands for one of the driver.
+    """Return clpt's error for a driver's error.
 
-    It is a MemoryBudgetError where the device's memory or the host's has run out. Drivers of GPUs
-    allocate late, so any command may find that.
+    It is a MemoryBudgetError if memory of the device or the host has run out. Drivers of GPUs
+    allocate late, so any command may fail so.
 
-    what: the subject of the message, such as "a copy"; nbytes: how much it needs, available: how
-    much there is, as far as that is known; advice: what to do if memory is missing.
+    subject: of the message, such as "a copy"; nbytes: needed, available: free, where known; advice:
+    for missing memory.
     """
     if error.code in _NO_MEMORY or isinstance(error, cl.MemoryError):
-        return MemoryBudgetError(what, nbytes, available, f"{advice} ({error})")
+        return MemoryBudgetError(subject, nbytes, available, f"{advice} ({error})")
     known = _ADVICE.get(error.code)
-    return DeviceError(f"{what} failed: {f'{known} ({error})' if known else error}")
+    return DeviceError(f"{subject} failed: {f'{known} ({error})' if known else error}")
 
 
 def failed_before(event: cl.Event) -> DeviceError:
-    """Return the error that stands for an event of the caller that failed before it was given."""
+    """Return the error for a caller's event that has already failed."""
     status = event.command_execution_status
     name = cl.status_code.to_string(status, "%d")
     return DeviceError(f"an event in `wait_for` has failed with {name}: nothing can wait for it")
 
 
-def wait(event: cl.Event, what: str = "a command") -> None:
+def wait(event: cl.Event, subject: str = "a command") -> None:
     """Wait until an event has ended. Raises DeviceError, MemoryBudgetError."""
     try:
         event.wait()
     except cl.Error as error:
-        raise refused(what, error) from error
+        raise refused(subject, error) from error

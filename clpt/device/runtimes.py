@@ -1,19 +1,15 @@
-"""Preparation of OpenCL's runtimes before the loader looks for platforms.
+"""Preparation of OpenCL's runtimes before the loader lists platforms.
 
-Runtimes that pip installed are made known to the loader.
+The loader reads ICD files, each with the path of a driver's library, from /etc/OpenCL/vendors or
+the folder in OCL_ICD_VENDORS. The wheel of Intel's CPU runtime (extra `clpt[cpu]`) has such a file
+with a placeholder for the path, in a folder that no loader reads. So clpt writes a folder with the
+library's path and a copy of every ICD file of the system, and sets OCL_ICD_VENDORS while the loader
+reads it. A user's OCL_ICD_VENDORS stays as it is.
 
-The loader reads ICD files, each naming a driver's library, from /etc/OpenCL/vendors or from the
-folder in OCL_ICD_VENDORS. Intel's CPU runtime as a wheel (extra `clpt[cpu]`) brings such a file
-with a placeholder for a path, in a folder that no loader reads. So clpt writes a folder of its own
-that names the library where it is, repeats every ICD file of the system, and points
-OCL_ICD_VENDORS there while the loader reads it. Where the user has set OCL_ICD_VENDORS, it stays as
-it is: whoever sets it wants exactly those drivers.
-
-Drivers and PyOpenCL run what their caches hold. So one rule is for all of them, clpt's own too: no
-other user can write the folder, nor put something in its place (`disk_cache.unfit`). Where that
-does not hold, where a cache cannot be written (PoCL lists no device then, and PyOpenCL runs no
-kernel), and for a user without a home, clpt gives its process another folder. PoCL's cache is
-within clpt's own, unless the user has set a safe one.
+Drivers and PyOpenCL run code from their caches. So no other user may write to a cache folder or
+replace it (`disk_cache.unfit`). If a folder breaks this rule, if it cannot be written (PoCL then
+lists no device, and PyOpenCL runs no kernel), and for a user without a home, clpt sets another
+folder for its process. PoCL's cache lies in clpt's, unless the user has set a safe folder.
 """
 
 from __future__ import annotations
@@ -33,6 +29,9 @@ import pyopencl as cl
 from clpt.device import disk_cache
 from clpt.files import output_files, ownership
 
+if sys.platform != "win32":
+    import resource
+
 log = logging.getLogger(__name__)
 
 ADVICE = (
@@ -40,21 +39,32 @@ ADVICE = (
     'or a CPU runtime with pip install "clpt[cpu]"'
 )
 VARIABLE = "OCL_ICD_VENDORS"
-# Variables by which users tell drivers where caches are: PoCL, NVIDIA, Intel's two, Mesa, AMD.
+# Variables for drivers' cache folders: PoCL, NVIDIA, Intel (two), Mesa, AMD.
 CACHES = (
     "POCL_CACHE_DIR", "CUDA_CACHE_PATH", "NEO_CACHE_DIR", "cl_cache_dir", "MESA_SHADER_CACHE_DIR",
     "AMD_COMGR_CACHE_DIR",
 )  # fmt: skip
-_NVIDIA = "~/.nv/ComputeCache"  # where its driver has it else
+_NVIDIA = "~/.nv/ComputeCache"  # its driver's default
 _SYSTEM = Path("/etc/OpenCL/vendors")
 _WHEEL, _LIBRARY = "intel-opencl-rt", "libintelocl.so"
 
 
-def platforms() -> list[cl.Platform]:
-    """Return all platforms, Intel's wheel among them. Raises what PyOpenCL raises.
+def advice() -> str:
+    """Return what to do where there is no device: a limit may keep drivers from being loaded."""
+    if sys.platform == "win32":
+        return ADVICE
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit == resource.RLIM_INFINITY:
+        return ADVICE
+    told = f"the limit of {limit >> 20:,} MiB of address space (ulimit -v) may keep drivers out"
+    return f"{told}; raise it, or {ADVICE}"
 
-    The loader reads its variable when it lists platforms for the first time in a process. It is set
-    meanwhile, and then as it was.
+
+def platforms() -> list[cl.Platform]:
+    """Return all platforms, including Intel's wheel. Raises pyopencl.Error.
+
+    The loader reads its variable when it first lists platforms in a process. The variable is set
+    during the call only.
     """
     _make_caches_writable()
     folder, before = vendors(), os.environ.get(VARIABLE)
@@ -71,16 +81,16 @@ def platforms() -> list[cl.Platform]:
 
 
 def environment() -> dict[str, str]:
-    """Return the variables for another process that is to have the same platforms."""
+    """Return environment variables for another process with the same platforms."""
     folder = vendors()
     return dict(os.environ) if folder is None else {**os.environ, VARIABLE: str(folder)}
 
 
 @functools.cache
 def vendors() -> Path | None:
-    """Return the folder of ICD files that has Intel's wheel too, made where it is missing.
+    """Return a folder of ICD files including Intel's wheel; write it if missing.
 
-    None where there is no such wheel, or the loader finds its drivers without clpt.
+    None without such a wheel, or if the loader finds its driver without clpt.
     """
     library = wheel_library()
     if library is None or os.environ.get(VARIABLE) or not sys.platform.startswith("linux"):
@@ -98,28 +108,28 @@ def vendors() -> Path | None:
 
 @functools.cache
 def _make_caches_writable() -> None:
-    """Set the variables by which runtimes find their caches, once a process."""
+    """Set the variables of runtimes' cache folders, once a process."""
     if not disk_cache.has_home():
         os.environ["XDG_CACHE_HOME"] = str(disk_cache.user_folder())
-    own = disk_cache.folder()
+    clpt_folder = disk_cache.folder()
     for variable in CACHES:
-        if given := os.environ.get(variable):
-            os.environ[variable] = str(disk_cache.private_folder(Path(given)))
+        if path := os.environ.get(variable):
+            os.environ[variable] = str(disk_cache.private_folder(Path(path)))
     if not os.environ.get("POCL_CACHE_DIR"):
-        os.environ["POCL_CACHE_DIR"] = str(_made(own / "pocl"))
+        os.environ["POCL_CACHE_DIR"] = str(_created(clpt_folder / "pocl"))
     if not os.environ.get("CUDA_CACHE_PATH") and not _is_safe(_NVIDIA):
-        os.environ["CUDA_CACHE_PATH"] = str(_made(own / "nvidia"))
+        os.environ["CUDA_CACHE_PATH"] = str(_created(clpt_folder / "nvidia"))
 
 
-def _made(folder: Path) -> Path:
-    """Return a folder in clpt's own, made where it is missing and can be."""
+def _created(folder: Path) -> Path:
+    """Return a folder, created if possible."""
     with suppress(OSError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     return folder
 
 
 def _is_safe(path: str) -> bool:
-    """Return whether a folder in the user's home is this user's alone."""
+    """Return whether other users cannot write to a folder in the user's home."""
     try:
         return ownership.fault(Path(path).expanduser()) is None
     except (OSError, RuntimeError):  # RuntimeError: a user without a home
@@ -127,17 +137,17 @@ def _is_safe(path: str) -> bool:
 
 
 def wheel_library() -> Path | None:
-    """Return the library of Intel's CPU runtime if its wheel is installed in this environment."""
+    """Return the library of Intel's CPU runtime, None if its wheel is not installed."""
     try:
         files = importlib.metadata.files(_WHEEL) or []
     except importlib.metadata.PackageNotFoundError:
         return None
-    found = (Path(str(file.locate())).resolve() for file in files if file.name == _LIBRARY)
-    return next((path for path in found if path.is_file()), None)
+    paths = (Path(str(file.locate())).resolve() for file in files if file.name == _LIBRARY)
+    return next((path for path in paths if path.is_file()), None)
 
 
 def icd_files(folders: Iterable[Path]) -> dict[str, str]:
-    """Return the ICD files in the folders by name, without those that name a missing path."""
+    """Return drivers' paths by ICD file, without missing paths."""
     drivers = {}
     for folder in folders:
         for path in sorted(folder.glob("*.icd")):
@@ -151,18 +161,17 @@ def icd_files(folders: Iterable[Path]) -> dict[str, str]:
 
 
 def write_vendors(drivers: dict[str, str]) -> Path:
-    """Return a folder in the user's cache with these ICD files, named after their content."""
+    """Return a folder in the user's cache with these ICD files, named by their content."""
     digest = hashlib.sha256(repr(sorted(drivers.items())).encode()).hexdigest()[:16]
     folder = disk_cache.folder() / "vendors" / digest
     for name, driver in drivers.items():
-        if not _says(folder / name, driver):
+        if not _names_driver(folder / name, driver):
             disk_cache.write(folder / name, driver.encode())
-    output_files.remove_left(folder)  # the loader reads whatever is there
+    output_files.remove_left(folder)  # the loader reads every file
     return folder
 
 
-def _says(path: Path, driver: str) -> bool:
-    """Whether an ICD file of the cache names a driver."""
+def _names_driver(path: Path, driver: str) -> bool:
     try:
         return disk_cache.read(path) == driver.encode()
     except OSError:

@@ -1,4 +1,4 @@
-"""Assembling kernel text: one self-contained text out of the kernels folder and generated parts."""
+"""Assembly of a self-contained kernel text from the kernels folder and generated parts."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from .conditions import OPENING, Macros, taken
 from .definitions import Paragraph, macro, named, paragraphs, whole, with_gaps
 from .text_rows import Row, rows_of
 
-_GENERATED = "generated/"  # begins the names of files that are made for a scene
-TWIN = "#none"  # ends the name of a half of a file: the step that does nothing
-_TWIN = "\n/* Twin, "  # begins that half
+_GENERATED = "generated/"  # prefix of files generated for a scene
+TWIN = "#none"  # suffix of the half of a file with the step that does nothing
+_HEAD = re.compile(r"/\*.*?\*/", re.DOTALL)
+_STEP, _TWIN = "\n/* Step. */", "\n/* Twin, "  # the starts of both halves
 _QUOTED = re.compile(r'"([^"]+)"$')
 _LINE = re.compile(r'\s*#\s*line (\d+)(?: "([^"]+)")?')
-_PRIVATE = re.compile(  # at the beginning of a line: a constant, or a function with an argument
-    r"^(?:static )?(?=[A-Za-z_])(?P<rest>"
+_PRIVATE = re.compile(  # at a line's start: a constant, or a function with an argument
+    r"^(?:static )?(?=[A-Za-z_])(?P<definition>"
     r"constant\b[^;=\[]*?(?P<constant>\w+)\s*(?=[=\[])"
     r"|(?!static\b|kernel\b|typedef\b|return\b|else\b)"
     r"[A-Za-z_]\w*(?: \w+)* \*?(?P<function>(?!loop_)\w+)\((?=[A-Za-z_]))",
@@ -31,11 +32,11 @@ _PRIVATE = re.compile(  # at the beginning of a line: a constant, or a function 
 
 @dataclass(frozen=True)
 class Source:
-    """A whole program as text.
+    """A program as text.
 
-    name: the root it was assembled from; text: what the compiler gets; files: every file and
-    virtual file that went in, in order, as errors name them; registers: limits of a work-item of a
-    GPU to try, see clpt/device/registers.py.
+    name: of the assembled root; text: for the compiler; files: all files and virtual files in
+    order, as errors name them; registers: limits to try on GPUs, see
+    `native_programs.with_fewest_registers`.
     """
 
     name: str
@@ -43,10 +44,10 @@ class Source:
     files: tuple[str, ...]
     registers: tuple[int, ...] = ()
 
-    def place(self, row: int) -> tuple[str | None, int | None]:
-        """Return the file and line that a row of the text comes from, counted from 1.
+    def location(self, row: int) -> tuple[str | None, int | None]:
+        """Return the file and line of a row of the text, counted from 1.
 
-        It does what a compiler does with `#line`; both are None above the first.
+        Follows `#line` like a compiler; both are None above the first `#line`.
         """
         file, line = None, None
         for text in self.text.splitlines()[: row - 1]:
@@ -58,25 +59,25 @@ class Source:
         return file, line
 
     def with_static(self) -> Source:
-        """Return a source whose functions and constants are static.
+        """Return a source with static functions and constants.
 
-        The rule: a definition begins at the beginning of a line, with its type. Kernels, and
-        functions that a macro names, stay as they are. A compiler leaves out what is not used, and
-        does not optimise by itself what it puts into its callers: a third less time.
+        A definition starts at the beginning of a line, with its type. Kernels, and functions that
+        a macro names, stay as they are. A compiler drops unused static functions, and does not
+        optimise inlined functions separately: a third less time.
         """
-        return replace(self, text=_PRIVATE.sub(r"static \g<rest>", self.text))
+        return replace(self, text=_PRIVATE.sub(r"static \g<definition>", self.text))
 
     def with_private(self, prefix: str) -> Source:
-        """Return a source whose functions and constants other programs do not see, to be linked.
+        """Return a source for linking, with functions and constants that other programs do not see.
 
-        They are static, see `with_static`, and get the prefix, since some linkers look at nothing
-        but names.
+        They are static, see `with_static`, and get the prefix, since some linkers compare names
+        only.
         """
         names: dict[str, None] = {}
 
         def note(match: re.Match[str]) -> str:
             names[match["function"] or match["constant"]] = None
-            return f"static {match['rest']}"
+            return f"static {match['definition']}"
 
         text = _PRIVATE.sub(note, self.text)
         head = [f"#define {name} in_{prefix}_{name}" for name in names]
@@ -85,7 +86,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Part:
-    """A virtual file whose text stands elsewhere: errors name `file`, and lines from `line` on."""
+    """A virtual file with text from another file: errors name `file`, and lines from `line` on."""
 
     text: str
     file: str
@@ -96,7 +97,7 @@ Virtual = Mapping[str, str | Part | tuple[str, ...]]
 
 
 def kernels_folder() -> Path:
-    """Return the folder of the kernels: in the installed package, or beside it in a checkout."""
+    """Return the kernels folder: in the installed package, or beside it in a checkout."""
     package = Path(__file__).resolve().parent.parent
     installed = package / "kernels"
     return installed if installed.is_dir() else package.parent / "kernels"
@@ -109,37 +110,37 @@ def assemble(
     *,
     library: bool = False,
 ) -> Source:
-    """Return the text of `root` with its includes in place, each file once, and nothing unused.
+    """Return the text of `root` with its includes inserted, each file once, and nothing unused.
 
     root: a path under the kernels folder ("stage/shade.cl") or the name of a virtual file.
-    virtual: name -> generated text, a Part, or the names of files that stand for it, includable by
-    that name; it wins over a file of that name.
-    defines: written as `#define` lines at the top.
-    library: whether another text will name what this one defines, and its defines.
+    virtual: by name: generated text, a Part, or names of files to include; it precedes a file of
+    that name.
+    defines: become `#define` lines at the top.
+    library: whether another text will use these definitions and defines.
 
     The constants of clpt.records are virtual files of all texts.
 
-    What an `#if` leaves out is not in the text, nor is the `#if`, but for those that ask for what
-    compilers define (`conditions.OUTSIDE`). Functions, types, constants and macros that nothing in
-    the text names are left out too, unless it is a library, or they are of a Part that pastes names
-    together. So programs that differ by nothing else are built once.
+    Untaken branches of `#if` are left out with their directives, except conditions on names that
+    compilers define (`conditions.OUTSIDE`). Unused functions, types, constants and macros are left
+    out too, except in a library and in a Part that pastes names. So programs that differ by these
+    only are built once.
 
-    A `#line` before every part, and where rows are left out of a file, lets a compiler name our
-    file and line; generated files are numbered as they stand in the text. Includes are resolved
-    before the preprocessor runs, so they have to stand outside of `#if`.
+    A `#line` before every part, and after rows that are left out, lets a compiler name clpt's file
+    and line; generated files are numbered by their rows in the text. Includes are resolved before
+    conditions, so they must stand outside of `#if`.
 
-    Raises KernelBuildError for an include that names nothing, or that stands inside an `#if`, and
-    for an `#if` without its end.
+    Raises KernelBuildError for an include of a missing file or inside an `#if`, and for an `#if`
+    without its `#endif`.
     """
-    given = {name: str(value) for name, value in (defines or {}).items()}
-    assembly = _Assembly(root, {**constant_files(), **(virtual or {})}, given, library)
+    values = {name: str(value) for name, value in (defines or {}).items()}
+    assembly = _Assembly(root, {**constant_files(), **(virtual or {})}, values, library)
     assembly.add(root, None, 0)
     return assembly.source()
 
 
 @cache
 def _text(folder: Path, name: str) -> str:
-    """A file's text. Raises OSError where there is none inside of the folder."""
+    """Return a file's text. Raises OSError if the folder has no such file."""
     inside = PurePath(name)
     if inside.is_absolute() or ".." in inside.parts:
         raise FileNotFoundError(name)
@@ -147,18 +148,29 @@ def _text(folder: Path, name: str) -> str:
 
 
 def _half(folder: Path, name: str) -> Part:
-    """A file up to its twin; or, where the name ends with TWIN, the twin. Raises OSError."""
+    """Return a file up to its twin or, for a name with TWIN, without its step. Raises OSError.
+
+    The text above the step belongs to both halves. Blank rows replace the other half and, of a
+    twin, the comments at the heads of the file and of the half.
+    """
     file = name.removesuffix(TWIN)
-    step, _, twin = _text(folder, file).partition(_TWIN)
+    text, _, twin = _text(folder, file).partition(_TWIN)
     if file == name:
-        return Part(step, f"kernels/{file}")
+        return Part(text.replace(_STEP, "\n"), f"kernels/{file}")
     if not twin:
         raise FileNotFoundError(name)
-    return Part(f"{_TWIN[1:]}{twin}", f"kernels/{file}", step.count("\n") + 2)
+    shared = text.partition(_STEP)[0] if _STEP in text else ""
+    head = _HEAD.match(shared)
+    described = head[0] if head else ""
+    about, _, functions = twin.partition("*/")
+    left_out = (text[len(shared) :], about)
+    blank = "\n" * sum(part.count("\n") for part in (_TWIN, *left_out))
+    above = "\n" * described.count("\n") + shared[len(described) :]
+    return Part(f"{above}{blank}{functions}", f"kernels/{file}")
 
 
 class _BadRow(Exception):
-    """A fault in a row of a file, with the row's number."""
+    """An error in a row of a file, with the row's number."""
 
     def __init__(self, line: int, message: str):
         super().__init__(message)
@@ -167,7 +179,7 @@ class _BadRow(Exception):
 
 @dataclass
 class _Piece:
-    """A part of a file, up to an include or its end: directives, and groups of other rows."""
+    """A part of a file up to an include or its end: directives, and groups of other rows."""
 
     rows: list[Row | list[Row]]
     include: Row | None = None
@@ -175,11 +187,11 @@ class _Piece:
 
 @lru_cache(maxsize=1024)
 def _pieces(text: str, first: int) -> tuple[_Piece, ...]:
-    """The pieces of a file; first: the number of its first line. Raises _BadRow."""
-    found = [_Piece([])]
+    """Return the pieces of a file; first: the number of its first line. Raises _BadRow."""
+    pieces = [_Piece([])]
     openings: list[int] = []
     for row in rows_of(text, first):
-        rows = found[-1].rows
+        rows = pieces[-1].rows
         if not row.directive:
             last = rows[-1] if rows else None
             if isinstance(last, list):
@@ -200,19 +212,19 @@ def _pieces(text: str, first: int) -> tuple[_Piece, ...]:
                 "needs no include guard",
             )
         else:
-            found[-1].include = row
-            found.append(_Piece([]))
+            pieces[-1].include = row
+            pieces.append(_Piece([]))
     if openings:
         raise _BadRow(openings[-1], "there is no #endif of this #if")
-    return tuple(found)
+    return tuple(pieces)
 
 
 @dataclass(eq=False)
 class _File:
-    """A file that goes in: what errors call it, and the comment at its head.
+    """A file in the text: its label in errors, and its head comment.
 
-    generated: whether nobody can open it, so that its lines are those that are in the text; lines:
-    how many they are so far.
+    generated: whether it is no file on disk, so that its lines count as in the text; lines: their
+    number so far.
     """
 
     label: str
@@ -222,7 +234,7 @@ class _File:
 
 
 class _Assembly:
-    """The state of one `assemble`: the macros so far, and what files have between includes."""
+    """The state of `assemble`: the macros so far, and the pieces of files."""
 
     def __init__(self, root: str, virtual: Virtual, defines: dict[str, str], library: bool):
         self.root, self.virtual, self.defines = root, virtual, defines
@@ -232,7 +244,7 @@ class _Assembly:
         self.pieces: list[tuple[_File, tuple[Paragraph, ...]]] = []
 
     def add(self, name: str, includer: str | None, line: int) -> None:
-        """Append the file `name` and, in place of its includes, the files that it names."""
+        """Append the file `name` with its includes inserted."""
         part = self._read(name, includer, line)
         self.names.add(name)
         try:
@@ -253,19 +265,19 @@ class _Assembly:
                 self.add(include[1], part.file, piece.include.number)
 
     def source(self) -> Source:
-        """Return the text, without definitions that nothing in it names."""
+        """Return the text without unused definitions."""
         defines = [macro(name, value) for name, value in self.defines.items()]
-        own = [one for _, ps in self.pieces for p in ps for one in p.definitions]
-        stay = named([*defines, *own]) | {*(defines if self.library else ())}
-        made = [ps for file, ps in self.pieces if file.generated]
-        printed = with_gaps(stay, (one for ps in made for p in ps for one in p.definitions))
+        pieces = [(file, p.definitions) for file, ps in self.pieces for p in ps]
+        stay = named([*defines, *(d for _, ds in pieces for d in ds)])
+        stay |= {*(defines if self.library else ())}
+        printed = with_gaps(stay, (d for file, ds in pieces if file.generated for d in ds))
         left = [(file, [p.left(printed) for p in ps]) for file, ps in self.pieces]
-        text = _Text([row.text for one in defines if one in stay for row in one.rows])
+        text = _Text([row.text for define in defines if define in stay for row in define.rows])
         root = self.pieces[0][0]
-        if any(kept for file, found in left if file is root for kept, _ in found):
+        if any(kept for file, parts in left if file is root for kept, _ in parts):
             text.add(root, root.header)
-        for file, found in left:
-            for kept, apart in found:
+        for file, parts in left:
+            for kept, apart in parts:
                 if kept and file.header and file.label not in text.files:
                     text.begin(file, kept[0])
                 text.add(file, kept, apart)
@@ -274,10 +286,10 @@ class _Assembly:
 
     def _read(self, name: str, includer: str | None, line: int) -> Part:
         if name in self.virtual:
-            given = self.virtual[name]
-            if isinstance(given, tuple):
-                given = "".join(f'#include "{file}"\n' for file in given)
-            return given if isinstance(given, Part) else Part(given, name)
+            content = self.virtual[name]
+            if isinstance(content, tuple):
+                content = "".join(f'#include "{file}"\n' for file in content)
+            return content if isinstance(content, Part) else Part(content, name)
         try:
             return _half(self.folder, name)
         except OSError:
@@ -288,17 +300,17 @@ class _Assembly:
 
 
 class _Text:
-    """A text that is written row by row, with a `#line` where a compiler would count wrongly."""
+    """A text written row by row, with a `#line` where a compiler would count wrongly."""
 
     def __init__(self, rows: list[str]):
         self.rows = rows
         self.files: dict[str, None] = {}
-        self._label, self._line = "", 0  # of the next row, as a compiler counts
+        self._label, self._line = "", 0  # of the next row, by a compiler's count
 
     def begin(self, file: _File, first: Row) -> None:
-        """Append the comment at a file's head in front of the first row that is left of the file.
+        """Append a file's head comment in front of the file's first remaining row.
 
-        It is numbered so that the row's number is right: no error is in a comment.
+        The comment gets a number so that the row's number is right: errors never name comments.
         """
         header = "\n".join([row.text for row in file.header])
         lines = sum(row.lines for row in file.header)
@@ -309,7 +321,7 @@ class _Text:
         self._label, self._line = file.label, first.number
 
     def add(self, file: _File, rows: Sequence[Row], apart: bool = False) -> None:
-        """Append rows of a file; apart: with a blank row before them."""
+        """Append rows of a file; apart: after a blank row."""
         for row in rows:
             self.files.setdefault(file.label)
             self._place(file, row, apart)
@@ -319,7 +331,7 @@ class _Text:
             file.lines += row.lines
 
     def _place(self, file: _File, row: Row, apart: bool) -> None:
-        """Let a compiler count a row right: by nothing, a blank row or a `#line`."""
+        """Append a blank row or a `#line` if a compiler would count the row wrongly."""
         wanted = file.lines + 1 if file.generated else row.number
         if self._label != file.label:
             self.rows.append(f'#line {wanted} "{file.label}"')

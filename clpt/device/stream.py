@@ -1,4 +1,4 @@
-"""Commands on a queue, one after the other, whatever order the queue itself keeps."""
+"""Ordered commands on a queue, in order or out of order, and times of kernels."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from .buffers import host_buffer
 from .program import BoundKernel
 from .refusals import failed_before, refused, wait
 
-Events = Iterable[cl.Event] | None  # as `wait_for` takes them
-TILE = (64, 2)  # work-items of a group of pixels
+Events = Iterable[cl.Event] | None  # for `wait_for`
+TILE = (64, 2)  # pixels of a work-group
 
 
 def tiles(width: int, height: int) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return the global and the local size of a kernel whose work-items are pixels.
+    """Return the global and the local size of a kernel with a work-item for each pixel.
 
-    Groups are the same for pictures of every size, for PoCL compiles a kernel once for each size
-    of a group. There are work-items beyond the picture, which the kernel leaves alone.
+    Groups are equal for all sizes of pictures, since PoCL compiles a kernel for each group size.
+    Work-items beyond the picture do nothing.
     """
     across, down = TILE
     return (-(-width // across) * across, -(-height // down) * down), TILE
@@ -31,7 +31,7 @@ def tiles(width: int, height: int) -> tuple[tuple[int, int], tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Rows:
-    """Parts of a buffer: where the first begins, their size, and their distance [bytes]."""
+    """Rows of a buffer: offset of the first, size and distance [bytes]; their number."""
 
     first: int
     size: int
@@ -40,19 +40,19 @@ class Rows:
 
     @property
     def region(self) -> tuple[int, int, int]:
-        """The rows as OpenCL's commands take a rectangle."""
+        """The region of OpenCL's rectangle commands."""
         return self.size, self.count, 1
 
 
 class Stream:
-    """Commands of one owner on a queue: each begins when the one before it has ended.
+    """An owner's commands on a queue: each starts when the former has ended.
 
-    On an in-order queue that costs nothing; on an out-of-order one each command waits for the event
-    of the last. The host waits in `read` and `wait` only. Nothing calls clFinish, so that commands
-    of others on the queue are left alone. What the driver refuses is raised as DeviceError, or as
-    MemoryBudgetError where memory has run out; so is a fork that the driver does not survive.
+    On an in-order queue this costs nothing; on an out-of-order queue each command waits for the
+    former's event. The host waits in `read` and `wait` only. Nothing calls clFinish, so other
+    owners' commands on the queue are not awaited. Methods raise DeviceError if the driver refuses
+    a command or does not survive a fork, MemoryBudgetError if memory has run out.
 
-    queue: the caller's; last: the event of the last command, None before the first.
+    queue: of the caller; last: the event of the last command, None before the first.
     """
 
     def __init__(self, queue: cl.CommandQueue):
@@ -61,18 +61,18 @@ class Stream:
         self.ordered = not queue.properties & out_of_order
         self.last: cl.Event | None = None
         self._before: list[cl.Event] = []
-        self._copies: deque[cl.Event] = deque()  # to the host, that may not have ended
+        self._copies: deque[cl.Event] = deque()  # unfinished copies to the host
 
     def after(self, events: Events) -> None:
-        """Let the next command wait for events of others too.
+        """Let the next command wait for the caller's events too.
 
-        Raises DeviceError for one that has failed: on some drivers the command would never begin.
+        Raises DeviceError for a failed event: with some drivers the command would never start.
         """
-        given = list(events or ())
-        for event in given:
+        awaited = list(events or ())
+        for event in awaited:
             if event.command_execution_status < 0:
                 raise failed_before(event)
-        self._before += given
+        self._before += awaited
 
     def run(
         self,
@@ -81,17 +81,17 @@ class Stream:
         local_size: Sequence[int] | None = None,
         offset: Sequence[int] | None = None,
     ) -> cl.Event:
-        """Enqueue a kernel; offset: of its first work-item. Raises DeviceError if it is refused."""
+        """Enqueue a kernel; offset: of its first work-item. Raises DeviceError."""
         self.last = bound.enqueue(self.queue, global_size, local_size, self._waits(), offset)
         return self.last
 
     def fill(self, buffer: cl.Buffer, word: int, offset: int, nbytes: int) -> cl.Event:
-        """Enqueue that a range of a buffer becomes one repeated word."""
+        """Enqueue a fill of a buffer's range with a word."""
         command = cl.enqueue_fill_buffer
         return self._enqueue("a fill", nbytes, command, buffer, np.uint32(word), offset, nbytes)
 
     def fill_rows(self, buffer: cl.Buffer, word: int, rows: Rows) -> cl.Event:
-        """Enqueue that rows of a buffer become one repeated word."""
+        """Enqueue a fill of a buffer's rows with a word."""
         flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
         host = np.full(rows.count * rows.size // 4, word, np.uint32)
         staged = host_buffer(self.queue.context, flags, host)
@@ -102,30 +102,30 @@ class Stream:
         )  # fmt: skip
 
     def copy(self, target: cl.Buffer, source: cl.Buffer, **offsets: int) -> cl.Event:
-        """Enqueue a copy on the device; offsets: as of `pyopencl.enqueue_copy`."""
+        """Enqueue a copy on the device; offsets: see `pyopencl.enqueue_copy`."""
         size = offsets.get("byte_count", source.size)
         return self._enqueue("a copy", size, cl.enqueue_copy, target, source, **offsets)
 
     def write(self, target: cl.Buffer, source: np.ndarray, offset: int = 0) -> cl.Event:
-        """Enqueue that an array goes to a buffer, from a copy of it: it may change at once."""
-        # The copy is a buffer, which the driver keeps until it is read: PyOpenCL's event of a copy
-        # from the host waits when nobody refers to it, and no other thread of Python runs then.
+        """Enqueue a copy of an array to a buffer; the array may change at once."""
+        # The array is copied to a buffer, which the driver keeps until it is read: PyOpenCL's event
+        # of a copy from the host waits when it is freed, and blocks Python's other threads.
         flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
         staged = host_buffer(self.queue.context, flags, np.ascontiguousarray(source))
         return self.copy(target, staged, dst_offset=offset, byte_count=staged.size)
 
     def mark(self) -> cl.Event:
-        """Return an event that ends when all commands so far, and the events of `after`, have."""
+        """Return an event that ends after all former commands and the events of `after`."""
         return self._enqueue("a marker", None, cl.enqueue_marker)
 
     def read(self, source: cl.Buffer, into: np.ndarray, offset: int = 0) -> np.ndarray:
-        """Return a buffer's content in an array; wait for it."""
+        """Wait and return a buffer's content in an array."""
         if into.nbytes:
             wait(self.read_later(source, into, offset), "a copy to the host")
         return into
 
     def read_rows(self, source: cl.Buffer, into: np.ndarray, rows: Rows) -> np.ndarray:
-        """Return rows of a buffer in an array, one behind the other; wait for them."""
+        """Wait and return rows of a buffer in an array, without gaps."""
         event = self._enqueue(
             "a copy to the host", into.nbytes, cl.enqueue_copy, into, source,
             buffer_origin=(rows.first, 0, 0), buffer_pitches=(rows.pitch,),
@@ -136,7 +136,7 @@ class Stream:
         return into
 
     def read_later(self, source: cl.Buffer, into: np.ndarray, offset: int = 0) -> cl.Event:
-        """Enqueue that an array is filled from a buffer; it is valid when the event has ended."""
+        """Enqueue a copy of a buffer to an array, which is valid when the event has ended."""
         options = {"src_offset": offset, "is_blocking": False}
         event = self._enqueue(
             "a copy to the host", into.nbytes, cl.enqueue_copy, into, source, **options
@@ -144,7 +144,7 @@ class Stream:
         return self._keep(event)
 
     def rejoin(self) -> None:
-        """Let the next command wait for all so far, also for one whose event was lost."""
+        """Let the next command wait for all former commands, even if an event was lost."""
         if not self.ordered:
             self._before.append(cl.enqueue_marker(self.queue))
 
@@ -155,7 +155,7 @@ class Stream:
             wait(self.last)
 
     def flush(self) -> None:
-        """Let the device begin what was enqueued."""
+        """Let the device start the enqueued commands."""
         try:
             self.queue.flush()
         except cl.Error as error:
@@ -169,20 +169,60 @@ class Stream:
         return waits or None
 
     def _enqueue(
-        self, what: str, nbytes: int | None, command: Callable[..., Any], *args: Any, **named: Any
+        self,
+        subject: str,
+        nbytes: int | None,
+        command: Callable[..., Any],
+        *args: Any,
+        **named: Any,
     ) -> cl.Event:
-        """Enqueue one of OpenCL's commands; what, nbytes: see `refused`."""
+        """Enqueue an OpenCL command; subject, nbytes: see `refused`."""
         waits = self._waits()
         try:
             self.last = command(self.queue, *args, wait_for=waits, **named)
         except cl.Error as error:
-            raise refused(what, error, nbytes) from error
+            raise refused(subject, error, nbytes) from error
         return self.last
 
     def _keep(self, event: cl.Event) -> cl.Event:
-        """Refer to an event of a copy to the host until it has ended."""
+        """Hold an event of a copy to the host until it has ended."""
         done = cl.command_execution_status.COMPLETE
         while self._copies and self._copies[0].command_execution_status <= done:
             self._copies.popleft()
         self._copies.append(event)
         return event
+
+
+@dataclass
+class Timing:
+    """A kernel's number of calls, and its total time [s] by the device's clock."""
+
+    calls: int = 0
+    seconds: float = 0.0
+
+
+class Timings:
+    """Sums of kernels' times by name. A queue without profiling has none, at no cost."""
+
+    def __init__(self, queue: cl.CommandQueue):
+        self.enabled = bool(queue.properties & cl.command_queue_properties.PROFILING_ENABLE)
+        self._pending: list[tuple[str, cl.Event]] = []
+        self._sums: dict[str, Timing] = {}
+
+    def add(self, name: str, event: cl.Event) -> cl.Event:
+        """Note an event, which may be unfinished; return it."""
+        if self.enabled:
+            self._pending.append((name, event))
+            if len(self._pending) >= 4096:  # held events take driver memory
+                self.collect()
+        return event
+
+    def collect(self) -> dict[str, Timing]:
+        """Wait for all events so far; return the Timing of each name, the longest first."""
+        for name, event in self._pending:
+            event.wait()
+            timing = self._sums.setdefault(name, Timing())
+            timing.calls += 1
+            timing.seconds += (event.profile.end - event.profile.start) * 1e-9
+        self._pending.clear()
+        return dict(sorted(self._sums.items(), key=lambda item: -item[1].seconds))

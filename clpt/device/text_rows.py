@@ -1,4 +1,4 @@
-"""Rows of kernel text as a preprocessor takes them: with their continuations, without comments."""
+"""Rows of kernel text for a preprocessor: with continuations, without comments."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ _COMMENT = re.compile(
 )
 _DIRECTIVE = re.compile(r"\s*#\s*(\w*)\s*(.*)", re.DOTALL)
 _DEFINE = re.compile(r"(\w+(?:\([^)]*\))?)\s*(.*)", re.DOTALL)
-_WITHIN = "\0"  # ends a row whose comment goes on
+_WITHIN = "\0"  # at the end of a row inside a comment
 
 
-@dataclass(eq=False, slots=True)  # not frozen, which takes thrice as long: there are ten thousand
+@dataclass(eq=False, slots=True)  # frozen takes three times as long for ten thousand
 class Row:
-    """A row, and those that a comment or a backslash at its end joins to it.
+    """A row, with the rows that a comment or a backslash joins to it.
 
-    number: of its first line; text: its lines as they stand; lines: how many; code: the text
-    without comments; directive, argument: what stands behind `#`, "" where there is none; macro:
-    the name of a `#define` with its arguments, and the value.
+    number: of the first line; text: all lines; lines: their number; code: the text without
+    comments; directive, argument: the words after `#`, "" without `#`; macro: of a `#define`, the
+    name with arguments, and the value.
     """
 
     number: int
@@ -38,15 +38,15 @@ class Row:
 
 
 def _spaces(match: re.Match[str]) -> str:
-    found = match[0]
-    if found[0] != "/":
-        return found
-    return " " + f"{_WITHIN}\n" * found.count("\n")
+    text = match[0]
+    if text[0] != "/":
+        return text
+    return " " + f"{_WITHIN}\n" * text.count("\n")
 
 
 @lru_cache(maxsize=2048)
 def rows_of(text: str, first: int = 1) -> tuple[Row, ...]:
-    """Return the rows of a text, most of which are in many programs; first: its first number."""
+    """Return the rows of a text; first: the number of its first line."""
     text = text.replace("\r\n", "\n").removesuffix("\n")
     plain = text.split("\n") if text else []
     codes = _COMMENT.sub(_spaces, text).split("\n") if "/" in text else plain
@@ -64,29 +64,29 @@ def rows_of(text: str, first: int = 1) -> tuple[Row, ...]:
         if "#" in code and (match := _DIRECTIVE.match(code)):
             row.directive = match[1] or "#"
             row.argument = match[2].replace("\\\n", " ").strip()
-            if row.directive == "define" and (told := _DEFINE.match(row.argument)):
-                row.macro = told[1], told[2]
+            if row.directive == "define" and (define := _DEFINE.match(row.argument)):
+                row.macro = define[1], define[2]
         rows.append(row)
         at = end
     return tuple(rows)
 
 
 def joined(rows: Sequence[Row]) -> tuple[Row, ...]:
-    """Return rows that follow one another as one."""
-    found: list[Row] = []
+    """Return rows with consecutive rows joined."""
+    groups: list[Row] = []
     start = 0
     for at in range(1, len(rows) + 1):
         if at == len(rows) or rows[at].number != rows[at - 1].number + rows[at - 1].lines:
             text = "\n".join([row.text for row in rows[start:at]])
             lines = rows[at - 1].number + rows[at - 1].lines - rows[start].number
-            found.append(Row(rows[start].number, text, text, lines))
+            groups.append(Row(rows[start].number, text, text, lines))
             start = at
-    return tuple(found)
+    return tuple(groups)
 
 
 @lru_cache(maxsize=512)
 def renamed(row: Row, directive: str) -> Row:
-    """Return a directive's row with another one in its place, such as `#if` for `#elif`."""
+    """Return a row with another directive, such as `#if` for `#elif`."""
     text = row.text.replace(row.directive, directive, 1)
     code = row.code.replace(row.directive, directive, 1)
     return replace(row, text=text, code=code, directive=directive)

@@ -1,10 +1,9 @@
 """Limits of a load in memory, time and parts: readers ask before they take what a file announces.
 
-A file of a few bytes can announce gigabytes. So each reader asks here, before it allocates, and the
-whole of a load has one account, which its scene keeps: what is made of the scene until its first
-sample draws from it too. What files hold themselves is always allowed, as far as there is memory;
-what grows out of little is limited. What is read for a scene of no file has the machine's limit
-alone.
+A file of a few bytes can announce gigabytes. So each reader asks here before it allocates. A load
+has one account. The scene keeps it, and the preparation of the scene for its first sample draws
+from the same account. The contents of files are always allowed while there is memory; data that a
+small file expands to is limited. A scene without a file has the limit of the machine alone.
 """
 
 from __future__ import annotations
@@ -23,11 +22,14 @@ from clpt.errors import SceneError
 from clpt.files import host_memory
 
 FREE, RATIO = 768 << 20, 256  # bytes that a load may take anyway, and for each byte of its files
-PARTS, PER_PART = 50_000, 4  # the same of parts: one for so many bytes of its files
-PER_REPEAT = 256  # bytes of a file that is read once more, which count as a part
+PARTS, PER_PART = (
+    50_000,
+    4,
+)  # parts that a load may have anyway, and bytes of its files for each further part
+PER_REPEAT = 256  # a file that is read again counts as a part for each so many bytes
 SECONDS = 600.0
-SHARE = 2  # of the memory that is available, one part in so many
-UNKNOWN = 4 << 30  # bytes, where the system tells nothing
+SHARE = 2  # a load may take the available memory divided by this
+UNKNOWN = 4 << 30  # bytes, if the system does not tell
 Result = TypeVar("Result")
 
 
@@ -35,9 +37,9 @@ Result = TypeVar("Result")
 class Budget:
     """The most that `clpt.load` may take; None stands for the usual limit.
 
-    memory: [bytes], by default half of what is available, and 768 MiB and 256 bytes for each byte
-    of the files read; seconds: 600 by default; parts: elements, shapes, instances and textures, by
-    default 50 000 and one for each 4 bytes of the files read, repeated ones counted each time.
+    memory: [bytes], by default half of the available memory, at most 768 MiB and 256 bytes for each
+    byte of the files; seconds: 600 by default; parts: elements, shapes, instances and textures, by
+    default 50 000 and one for each 4 bytes of the files. A repeated part counts each time.
 
     Raises SceneError for a limit that is not above 0.
     """
@@ -47,28 +49,28 @@ class Budget:
     parts: int | None = None
 
     def __post_init__(self) -> None:
-        given = {"memory": self.memory, "seconds": self.seconds, "parts": self.parts}
-        for name, value in given.items():
+        limits = {"memory": self.memory, "seconds": self.seconds, "parts": self.parts}
+        for name, value in limits.items():
             if value is not None and not value > 0:
                 raise SceneError(f"a budget's {name} must be above 0, not {value!r}")
 
 
 @dataclass(eq=False)
 class Account:
-    """A count of what a load has taken so far, with its limits.
+    """Memory, time and parts that a load has taken so far, with its limits.
 
-    passing: whether images are given back, as while a scene is made ready to be rendered.
+    passing: whether images are freed after use, as while a scene is prepared for rendering.
     """
 
     limits: Budget
     available: int
-    alone: bool = False  # of one thing, outside of a load
+    alone: bool = False  # for a single request outside a load
     began: float = field(default_factory=time.monotonic)
     held: int = 0
     parts: int = 0
     read: int = 0  # bytes of files, each counted once
     files: set[tuple[int, int]] = field(default_factory=set)
-    lent: int = 0  # bytes that are soon given back
+    lent: int = 0  # bytes that are soon freed
     spent: float = 0.0  # [s] before it was opened again
     passing: bool = False
     lock: threading.Condition = field(default_factory=threading.Condition)
@@ -79,8 +81,8 @@ class Account:
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state, lock=threading.Condition())
 
-    def rest(self) -> Account:
-        """Return an account of what this one has left."""
+    def remaining(self) -> Account:
+        """Return an account with the memory, time and parts that this account has left."""
         state = self.__getstate__() | {"files": set(self.files), "lent": 0, "passing": True}
         available = _available() + self.held
         return Account(**state | {"began": time.monotonic(), "available": available})
@@ -95,23 +97,23 @@ class Account:
     @property
     def most_parts(self) -> int:
         """The most parts that there may be."""
-        given = self.limits.parts
-        return PARTS + self.read // PER_PART if given is None else given
+        parts = self.limits.parts
+        return PARTS + self.read // PER_PART if parts is None else parts
 
 
-usual = Budget()  # of loads that are given none
+usual = Budget()  # of loads without a budget
 _account: ContextVar[Account | None] = ContextVar("account", default=None)
 
 
 def set_usual(limits: Budget) -> None:
-    """Set what loads may take that are given no budget: the command line's."""
+    """Set the limits of loads without a budget, as the command line does."""
     global usual
     usual = limits
 
 
 @contextmanager
 def opened(limits: Budget | None = None) -> Iterator[Account]:
-    """Open the account of a load; one inside another has that one's account."""
+    """Open the account of a load; a load inside another shares its account."""
     account = _account.get()
     if account is not None:
         yield account
@@ -123,14 +125,14 @@ def opened(limits: Budget | None = None) -> Iterator[Account]:
 
 @contextmanager
 def resumed(account: Account | None) -> Iterator[None]:
-    """Draw from what a load has left, each time anew: for what is made of its scene.
+    """Draw from the remainder of a load's account while its scene is prepared.
 
-    account: of the scene; None, or one that is open already, changes nothing.
+    account: of the scene. If it is None, or an account is open already, nothing changes.
     """
     if account is None or _account.get() is not None:
         yield
         return
-    with _drawn_from(account.rest()):
+    with _drawn_from(account.remaining()):
         yield
 
 
@@ -158,52 +160,52 @@ def carried(function: Callable[..., Result]) -> Callable[..., Result]:
     return carrying
 
 
-def take(size: int, what: str, file: Path | None = None) -> None:
-    """Ask for memory [bytes] that the load keeps. what: a noun phrase, subject of the message.
+def take(size: int, subject: str, file: Path | None = None) -> None:
+    """Ask for memory [bytes] that the load keeps. subject: of the message, a noun phrase.
 
-    Raises SceneError where there is no more of it, or no more time.
+    Raises SceneError if the memory or the time of the load is spent.
     """
     account = _account.get()
     if account is None:
-        check(size, what, file)
+        check(size, subject, file)
         return
     with account.lock:
-        _check(account, size, what, file)
+        _check(account, size, subject, file)
         account.held += size
     check_time(file)
 
 
-def take_made(arrays: Iterable[Any], what: str) -> None:
-    """Ask for memory of arrays that are made of a scene, None left out. Raises as `take` does.
+def take_arrays(arrays: Iterable[Any], subject: str) -> None:
+    """Ask for the memory of arrays computed from a scene; None takes none. Raises as `take` does.
 
-    The scene of no file, which has no account, has no limit either.
+    A scene without a file has no account and no limit.
     """
     if _account.get() is not None:
-        take(sum(array.nbytes for array in arrays if array is not None), what)
+        take(sum(array.nbytes for array in arrays if array is not None), subject)
 
 
-def take_image(size: int, what: str, file: Path | None = None) -> None:
-    """Ask for memory [bytes] of an image, which a load keeps. Raises as `take` does."""
+def take_image(size: int, subject: str, file: Path | None = None) -> None:
+    """Ask for memory [bytes] of an image that a load keeps. Raises as `take` does."""
     account = _account.get()
-    (check if account is not None and account.passing else take)(size, what, file)
+    (check if account is not None and account.passing else take)(size, subject, file)
 
 
-def check(size: int, what: str, file: Path | None = None) -> None:
-    """Ask for memory [bytes] that is soon given back. Raises as `take` does."""
+def check(size: int, subject: str, file: Path | None = None) -> None:
+    """Ask for memory [bytes] that is soon freed. Raises as `take` does."""
     account = _account.get()
     if account is None:
         account = Account(usual, _available(), alone=True)
-    _check(account, size, what, file)
+    _check(account, size, subject, file)
     check_time(file)
 
 
 @contextmanager
-def lending(size: int, what: str, file: Path | None = None) -> Iterator[None]:
-    """Lend memory [bytes] inside, which threads of one load have together; they wait for it.
+def lending(size: int, subject: str, file: Path | None = None) -> Iterator[None]:
+    """Lend memory [bytes] to the block. Threads of a load share their memory and wait for it.
 
-    Raises as `take` does. What is inside must not ask for any itself.
+    Raises as `take` does. The block must not ask for memory itself.
     """
-    check(size, what, file)
+    check(size, subject, file)
     account = _account.get()
     if account is None:
         yield
@@ -221,7 +223,7 @@ def lending(size: int, what: str, file: Path | None = None) -> Iterator[None]:
             account.lock.notify_all()
 
 
-def take_parts(count: int, what: str, file: Path | None = None) -> None:
+def take_parts(count: int, subject: str, file: Path | None = None) -> None:
     """Ask for elements, shapes, instances or textures. Raises as `take` does."""
     account = _account.get()
     if account is None:
@@ -230,13 +232,13 @@ def take_parts(count: int, what: str, file: Path | None = None) -> None:
         account.parts += count
         parts, most = account.parts, account.most_parts
     if parts > most:
-        message = f"{what}: more than {most} parts, most of them repeated: {_advice('parts')}"
+        message = f"{subject}: more than {most} parts, most of them repeated: {_advice('parts')}"
         raise SceneError(message, file=file)
     check_time(file)
 
 
 def check_time(file: Path | None = None) -> None:
-    """Raise SceneError where the load has no more time."""
+    """Raise SceneError if the time of the load is spent."""
     account = _account.get()
     if account is None:
         return
@@ -247,9 +249,9 @@ def check_time(file: Path | None = None) -> None:
 
 
 def reads(status: os.stat_result) -> None:
-    """Note that a file is read: what it holds itself is allowed, but not once more each time.
+    """Note that a file is read. Its size raises the limits once, not for each reading.
 
-    Raises SceneError where the same is read again and again.
+    Raises SceneError if a file is read again and again.
     """
     account = _account.get()
     if account is None:
@@ -264,18 +266,18 @@ def reads(status: os.stat_result) -> None:
         take_parts(1 + status.st_size // PER_REPEAT, "files are read again and again")
 
 
-def _check(account: Account, size: int, what: str, file: Path | None) -> None:
+def _check(account: Account, size: int, subject: str, file: Path | None) -> None:
     limit = account.memory
     if account.held + size > limit:
         so_far = f", {_shown(account.held)} are taken" if account.held else ""
         message = (
-            f"{what} would take {_shown(size)} of memory, the limit is {_shown(limit)}{so_far}"
+            f"{subject} would take {_shown(size)} of memory, the limit is {_shown(limit)}{so_far}"
         )
         raise SceneError(f"{message}: {_advice('memory')}", file=file)
 
 
-def _advice(what: str) -> str:
-    return f"if you trust the file, raise --load-{what} or clpt.Budget({what}=...)"
+def _advice(resource: str) -> str:
+    return f"if you trust the file, raise --load-{resource} or clpt.Budget({resource}=...)"
 
 
 def _shown(size: int) -> str:
@@ -283,6 +285,6 @@ def _shown(size: int) -> str:
 
 
 def _available() -> int:
-    """Return the share of the memory that is left that one load may have [bytes]."""
+    """Return how much of the free memory a load may take [bytes]."""
     available = host_memory.available()
     return UNKNOWN if available is None else available // SHARE

@@ -1,4 +1,4 @@
-"""Other Python processes of clpt, which import nothing from the folder in which the user stands."""
+"""Other Python processes of clpt. They import nothing from the current folder."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _HOME = str(Path(__file__).parents[2])  # where clpt itself is
 
 
 def command(code: str, *arguments: str) -> list[str]:
-    """Return the command of a process that runs some code, for which sys.argv[1:] are arguments.
+    """Return the command of a process that runs some code with `arguments` as sys.argv[1:].
 
-    It finds modules where this one does, but for what is relative to the current folder. -I keeps
-    Python from looking there by itself, before the code runs; -P does the same, from 3.11 on.
+    The process finds modules where this process does, except in the current folder. -I keeps
+    Python from looking there before the code runs; from Python 3.11 on -P does the same.
     """
     paths = dict.fromkeys([*(path for path in sys.path if os.path.isabs(path)), _HOME])
     code = f"import sys; sys.path[:] = {list(paths)!r}; {code}"

@@ -14,12 +14,12 @@ _CGROUPS = (
 
 
 def available(
-    root: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")
+    root: Path = Path("/sys/fs/cgroup"), membership: Path = Path("/proc/self/cgroup")
 ) -> int | None:
     """Return the host memory left to this process [bytes]; None where the system does not tell.
 
     The limits of the process's control group and of all groups that hold it count too, as does
-    `ulimit -v`. root: the folder of all groups; own: the file that names the process's.
+    `ulimit -v`. root: the folder of all groups; membership: the file that names the process's.
     """
     amounts = []
     try:
@@ -28,7 +28,7 @@ def available(
                 amounts.append(int(row.split()[1]) * 1024)
     except OSError:
         pass
-    for group in _groups(root, own):
+    for group in _groups(root, membership):
         for limit, usage, files in _CGROUPS:
             try:
                 left = int((group / limit).read_text()) - int((group / usage).read_text())
@@ -41,7 +41,7 @@ def available(
     return max(0, min(amounts)) if amounts else None
 
 
-def _groups(root: Path, own: Path) -> set[Path]:
+def _groups(root: Path, membership: Path) -> set[Path]:
     """Return the folders of the process's control group and of all that hold it.
 
     A row is ID:CONTROLLERS:PATH, without controllers in version 2. In version 1 those of memory
@@ -49,7 +49,7 @@ def _groups(root: Path, own: Path) -> set[Path]:
     """
     groups = {root, root / "memory"}
     try:
-        rows = own.read_text().splitlines()
+        rows = membership.read_text().splitlines()
     except OSError:
         return groups
     for row in rows:
@@ -58,12 +58,12 @@ def _groups(root: Path, own: Path) -> set[Path]:
             continue
         for tree in {root / controllers, root / "memory"} if controllers else {root}:
             group = tree / path.lstrip("/")
-            groups |= {group, *(one for one in group.parents if one.is_relative_to(tree))}
+            groups |= {group, *(parent for parent in group.parents if parent.is_relative_to(tree))}
     return groups
 
 
 def _of_process() -> list[int]:
-    """Return what the limit of the process's addresses leaves [bytes], if there is one."""
+    """Return the addresses that `ulimit -v` leaves to the process [bytes], if there is a limit."""
     try:
         import resource  # not on Windows
 

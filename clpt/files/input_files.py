@@ -1,7 +1,7 @@
 """The only way in for files that are read: regular files alone, and only where they may lie.
 
-A name in a scene may lead to a device or a pipe, at which a reader would wait for ever, or out of
-the folder that its format keeps to.
+A name in a scene may lead to a device or a pipe, where a reader would wait for ever, or out of the
+folder that its format keeps to.
 """
 
 from __future__ import annotations
@@ -120,10 +120,10 @@ def content(file: BinaryIO, path: Path) -> bytes:
 
 
 def _other_kind(status: os.stat_result) -> str:
-    """Return what stands there in the place of a regular file; "": it is one."""
+    """Return the name of a file's kind; "" for a regular file."""
     if stat.S_ISREG(status.st_mode):
         return ""
-    return next((name for is_one, name in _KINDS if is_one(status.st_mode)), "something else")
+    return next((name for is_kind, name in _KINDS if is_kind(status.st_mode)), "something else")
 
 
 def _unreadable(path: Path, error: Exception) -> SceneError:

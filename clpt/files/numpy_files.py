@@ -46,13 +46,13 @@ def arrays(path: Path, names: Collection[str] | None = None) -> dict[str, NDArra
     with input_files.opened(path) as file:
         try:
             with zipfile.ZipFile(file) as members:
-                found = [one for one in members.infolist() if one.filename.endswith(_SUFFIX)]
-                named = {one.filename.removesuffix(_SUFFIX): one for one in found}
+                infos = [info for info in members.infolist() if info.filename.endswith(_SUFFIX)]
+                named = {info.filename.removesuffix(_SUFFIX): info for info in infos}
                 chosen = {k: v for k, v in named.items() if names is None or k in names}
-                size = sum(one.file_size for one in chosen.values())
+                size = sum(info.file_size for info in chosen.values())
                 budget.check(2 * size, "what it holds", path)
                 budget.take(size, "what it holds", path)
-                return {name: _member(path, members, one) for name, one in chosen.items()}
+                return {name: _member(path, members, info) for name, info in chosen.items()}
         except (SceneError, MemoryError):
             raise
         except Exception as error:  # zipfile's, and of each way to pack, such as zlib.error
@@ -73,8 +73,8 @@ def _member(path: Path, members: zipfile.ZipFile, member: zipfile.ZipInfo) -> ND
     start, dtype, shape, fortran = _header(file)
     size = math.prod(shape) * dtype.itemsize
     _check_bytes(path, size, len(file.getbuffer()) - start)
-    made = np.frombuffer(file.getbuffer(), dtype, math.prod(shape), start)
-    return made.reshape(shape, order="F" if fortran else "C").copy()
+    values = np.frombuffer(file.getbuffer(), dtype, math.prod(shape), start)
+    return values.reshape(shape, order="F" if fortran else "C").copy()
 
 
 def _header(file: BinaryIO) -> tuple[int, np.dtype[Any], tuple[int, ...], bool]:

@@ -1,8 +1,8 @@
-"""Files that other processes see whole or not at all: the one way in which clpt writes a file.
+"""Files that other processes see whole or not at all: the only way in which clpt writes a file.
 
-A file is written under a name that begins with PARTIAL, and then renamed. Whoever writes it holds
-its lock. So a file of that name whose lock is free was left by a process that was killed, and the
-next one that writes into the folder removes it.
+A file is written under a name that begins with PARTIAL, and then renamed. The writer holds its
+lock. So a killed process left such a file if its lock is free. The next process that writes into
+the folder removes it.
 """
 
 from __future__ import annotations
@@ -25,10 +25,26 @@ if sys.platform != "win32":
 
 PARTIAL = ".clpt-partial-"  # begins the name of a file that is not complete
 
-# Locks of some network file systems are of one machine: those of others are told by their names.
+LONGEST = 255  # bytes of a file's name
+
+# Some network file systems keep locks within a machine. The name tells a file of another machine.
 _HERE = f"{PARTIAL}{hashlib.sha256(platform.node().encode()).hexdigest()[:8]}-"
 _FORGOTTEN = 86400.0  # [s] without a change after which nobody writes a file that has no lock
-_looked_at: set[Path] = set()  # folders, for what was left in them
+_looked_at: set[Path] = set()  # folders whose leftover files have been removed
+
+
+def beside(path: Path, ending: str, most: int = LONGEST) -> Path:
+    """Return the name of a file beside another: its name without suffix, and an ending.
+
+    A name that would have more than `most` bytes is cut, and has a part of its checksum instead, so
+    that different names stay different.
+    """
+    stem, room = path.stem, most - len(os.fsencode(ending))
+    if len(os.fsencode(stem)) > room:
+        mark = "-" + hashlib.sha256(os.fsencode(stem)).hexdigest()[:8]
+        start = os.fsencode(stem)[: room - len(mark)]
+        stem = start.decode("utf-8", "ignore") + mark
+    return path.with_name(stem + ending)
 
 
 @contextmanager
@@ -113,7 +129,7 @@ def link(path: str | Path, other: str | Path) -> None:
     name = _new_name(path)
     try:
         if os.path.exists(other) and os.path.samefile(path, other):
-            return  # to rename one to the other would do nothing
+            return  # a rename would do nothing
         os.link(path, name)
         os.replace(name, other)
     except OSError:  # a file system without links
@@ -124,13 +140,13 @@ def link(path: str | Path, other: str | Path) -> None:
 
 
 def remove_left(folder: Path) -> None:
-    """Remove the files that processes which are gone have left in a folder, not complete.
+    """Remove the incomplete files that killed processes have left in a folder.
 
-    Those of another user stay. One of another machine, or of a file system without locks, stays for
-    a day after its last change.
+    Files of another user stay. A file of another machine, or of a file system without locks, stays
+    for a day after its last change.
     """
-    with suppress(OSError), os.scandir(folder) as found:
-        for path in [Path(one.path) for one in found if one.name.startswith(PARTIAL)]:
+    with suppress(OSError), os.scandir(folder) as entries:
+        for path in [Path(entry.path) for entry in entries if entry.name.startswith(PARTIAL)]:
             with suppress(OSError):
                 _remove_if_left(path)
 
@@ -182,7 +198,7 @@ def _partial(path: Path, suffix: str) -> Iterator[Path]:
 
 
 def _new_name(path: Path, suffix: str = "") -> Path:
-    """A name beside `path` that no file has, of one length for all names."""
+    """Return an unused name beside `path`; all such names have the same length."""
     return path.with_name(f"{_HERE}{secrets.token_hex(8)}{suffix}")
 
 

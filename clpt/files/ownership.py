@@ -19,7 +19,7 @@ OTHERS = stat.S_IWGRP | stat.S_IWOTH
 def way(path: str | Path) -> Iterator[tuple[Path, bool]]:
     """Yield each folder, link and file on the way to a path, and whether it is a link.
 
-    The last one is where the path leads to, which may be missing. Raises OSError for links in a
+    The last path is the target, which may be missing. Raises OSError for links in a
     circle.
     """
     at, links = Path(os.path.abspath(os.sep)), 0
@@ -65,9 +65,9 @@ def followed(path: str | Path) -> Path:
 
 def _is_trusted(at: Path) -> bool:
     """Return whether a link or a pipe may be followed, by its owner and its folder."""
-    folder, own = at.parent.stat(), at.lstat()
+    folder, link = at.parent.stat(), at.lstat()
     shared = stat.S_ISVTX | stat.S_IWOTH
-    return folder.st_mode & shared != shared or own.st_uid in (os.geteuid(), folder.st_uid)
+    return folder.st_mode & shared != shared or link.st_uid in (os.geteuid(), folder.st_uid)
 
 
 def fault(path: str | Path) -> str | None:
@@ -104,7 +104,7 @@ def others_write(facts: os.stat_result) -> bool:
 
 @cache
 def _own_group() -> int | None:
-    """Return the group that bears this user's name and has no other member, if there is one."""
+    """Return the group with this user's name if it has no other member."""
     try:
         import grp
         import pwd
@@ -118,7 +118,7 @@ def _own_group() -> int | None:
 
 
 def _trusted() -> set[int]:
-    """Return the users whose folders are safe: this one, and the system's.
+    """Return the users whose folders are safe: this user, and the system's.
 
     Where root has no number, as in a container without privileges, its folders have the number of
     nobody.

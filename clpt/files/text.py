@@ -33,7 +33,7 @@ def plain(data: bytes) -> bytes:
 
 
 def decode(data: bytes) -> str:
-    """Return a text, or a part of a plain one, as a string: UTF-8, or else Latin-1."""
+    """Decode a text, or a part of a plain text: UTF-8, or else Latin-1."""
     data = plain(data)
     try:
         return data.decode("utf-8")
@@ -42,7 +42,7 @@ def decode(data: bytes) -> str:
 
 
 def read(path: str | Path) -> str:
-    """Read a text file; ends of lines become "\\n". Raises SceneError for one that is not there."""
+    """Read a text file; ends of lines become "\\n". Raises SceneError if it is missing."""
     data = input_files.read_bytes(Path(path))
     budget.check(8 * len(data), "its text", Path(path))
     return decode(data).replace("\r\n", "\n").replace("\r", "\n")
@@ -51,7 +51,7 @@ def read(path: str | Path) -> str:
 def comma_message(line: str) -> str | None:
     """Return what is wrong with a line of numbers with decimal commas; None if it has none.
 
-    For formats in which no comma may stand between two numbers.
+    For formats without commas between numbers.
     """
     if COMMA.search(line) is None:
         return None

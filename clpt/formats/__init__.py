@@ -6,7 +6,7 @@ import difflib
 import importlib
 import itertools
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -14,7 +14,7 @@ from clpt.choices import Missing
 from clpt.errors import LONGEST_WARNING, SceneError, nearest, one_line
 from clpt.files import budget as budgets
 from clpt.files.budget import Budget
-from clpt.formats import own_scenes
+from clpt.formats import blockers, own_scenes
 
 if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
     from clpt.scene import Scene
@@ -44,7 +44,7 @@ MOST_COMPARED, CLOSE = 4096, 0.7  # names of a folder, and how near one is that 
 MOST_NAMED = 8  # scenes of a folder that a message names
 ARGUMENTS = ("kinds", "progress", "missing_textures", "budget")  # of `load`, beside variables
 
-__all__ = ["FORMATS", "load", "locate", "save"]
+__all__ = ["FORMATS", "load", "load_dict", "locate", "save"]
 
 
 def load(
@@ -64,7 +64,7 @@ def load(
     and time; of both `camera` is the number or name of one of several. `progress` is called with
     the share that is read, from 0 to 1, and a text, for files of many shapes.
     `missing_textures`: "grey" puts grey in the place of images that are not there, and of unknown
-    materials of Mitsuba; it leaves out unknown shapes and lights. Each has a warning.
+    materials of Mitsuba and PBRT; it leaves out unknown shapes and lights. Each has a warning.
     `budget`: what the load may take of memory and time; a file that asks for more is refused.
     Raises SceneError with the file and, where it is known, the line.
     """
@@ -116,6 +116,43 @@ def _load(
     if kind == "meshes.framing":
         return loader(path, missing_textures)
     return loader(path)
+
+
+def errors_of(path: str | Path, /, **variables: Any) -> list[SceneError]:
+    """Return the errors of a file, in the order in which they are met, each once.
+
+    path: of a scene of any format; of Mitsuba's and PBRT's materials, textures, shapes, lights and
+    parameters each have their own. variables: see `load`.
+    """
+    with blockers.collecting() as errors:
+        try:
+            load(path, **variables)
+        except SceneError as error:
+            errors.append(error)
+    return list({str(error): error for error in errors}.values())
+
+
+def load_dict(
+    scene: Mapping[str, Any],
+    /,
+    *,
+    folder: str | Path = "",
+    missing_textures: Missing = "error",
+    budget: Budget | None = None,
+) -> Scene:
+    """Make a scene of a dictionary as Mitsuba 3's `load_dict` takes it.
+
+    Its values are numbers, texts, sequences of three numbers, transforms (any object with a
+    `matrix` (4, 4), such as clpt.ScalarTransform4f), arrays of images (h, w) or (h, w, c) and of
+    volumes (z, y, x) or (z, y, x, c), and dictionaries with a `type`. `folder` is that of relative
+    file names, by default the current one. `missing_textures` and `budget` are those of `load`.
+    Raises SceneError with the name of the entry.
+    """
+    loader = importlib.import_module("clpt.formats.mitsuba").load_dict
+    with budgets.opened(budget):
+        built: Scene = loader(scene, Path(folder), missing_textures)
+    built.warnings[:] = [one_line(text, LONGEST_WARNING) for text in built.warnings]
+    return built
 
 
 def save(scene: Scene, path: str | Path, /) -> None:

@@ -17,13 +17,13 @@ from clpt.geometry.triangles import triangle_areas, triangulate
 from clpt.scene import shapes
 from clpt.scene.shapes import Shape
 
-UNEVEN = 1e-5  # relative difference of lengths or cosine of axes from which a sphere is none
+UNEVEN = 1e-5  # larger differences of axes' lengths, or their cosine, make no sphere
 
-PADDING = 1e-6  # of the size of an analytic shape, for what float32 rounds in its kernel
+PADDING = 1e-6  # of the size of an analytic shape, for rounding to float32 in its kernel
 
 
 def check(shape: shapes.Sphere | shapes.Spheres | shapes.Cylinder) -> None:
-    """Raise SceneError for a sphere, many or a cylinder that its transform makes none."""
+    """Raise SceneError for a sphere, spheres or a cylinder that its transform distorts."""
     if isinstance(shape, shapes.Cylinder):
         row(shape)
     elif not np.array_equal(on_host(shape.to_world), transforms.IDENTITY):
@@ -33,10 +33,10 @@ def check(shape: shapes.Sphere | shapes.Spheres | shapes.Cylinder) -> None:
 def row(shape: Shape) -> Words:
     """Return the words of a rectangle, sphere, disk or cylinder in `geometry`, placed.
 
-    Of spheres, those of one around the origin with radius 1 before `to_world`; of curves, what
-    their pieces share but for where they are.
+    Spheres have the row of a sphere around the origin with radius 1 before `to_world`; curves the
+    members that all their pieces share.
 
-    Raises SceneError for a singular transform, or one after which it is no such shape any more.
+    Raises SceneError for a transform that is singular, or that makes the shape another kind.
     """
     matrix = placement(shape)
     record = ROWS[ONE_OF.get(shape.kind, shape.kind)]
@@ -168,11 +168,11 @@ def members_of(shape: Shape) -> dict[str, NDArray[np.float64]]:
 
 
 def _single(values: NDArray[np.float64], shape: Shape) -> Points:
-    made = single(values)
-    if not np.isfinite(made).all():
+    numbers = single(values)
+    if not np.isfinite(numbers).all():
         message = "it is too large or too far away: coordinates are float32, up to 3.4e38 m"
         raise SceneError(message, where=where(shape))
-    return made
+    return numbers
 
 
 def _three(value: ArrayLike, name: str, shape: Shape) -> NDArray[np.float64]:

@@ -100,11 +100,11 @@ def _gradient(values: Floats, cells: Integers, at: Floats) -> Floats:
     """Its gradient (n, 3), by cells."""
     total = np.zeros((len(cells), 3))
     for corner in CORNERS:
-        one = values[tuple((cells + corner).T)]
+        corner_values = values[tuple((cells + corner).T)]
         weights = np.where(corner, at, 1.0 - at)
         for axis in range(3):
             others = np.delete(weights, axis, axis=1).prod(axis=1)
-            total[:, axis] += (1.0 if corner[axis] else -1.0) * others * one
+            total[:, axis] += (1.0 if corner[axis] else -1.0) * others * corner_values
     return total
 
 
@@ -116,8 +116,8 @@ def _march(values: Floats, cells: Integers, pieces: int) -> tuple[Floats, Intege
         _tetrahedra(values, cells[first : first + step], first, pieces)
         for first in range(0, len(cells), step)
     ]
-    corners, owner, local, found = (np.concatenate(each) for each in zip(*parts, strict=True))
-    inside = found < 0.0
+    corners, owner, local, distances = (np.concatenate(each) for each in zip(*parts, strict=True))
+    inside = distances < 0.0
     keys = np.ravel_multi_index(tuple(np.moveaxis(corners, -1, 0)), tuple(fine))
     ends = []
     for number, edges in _cases():
@@ -135,7 +135,7 @@ def _march(values: Floats, cells: Integers, pieces: int) -> tuple[Floats, Intege
     tetrahedron, a, b = tetrahedron[index], a[index], b[index]
     zero = _zeros(
         values, cells[owner[tetrahedron]], local[tetrahedron, a], local[tetrahedron, b],
-        found[tetrahedron, a], found[tetrahedron, b],
+        distances[tetrahedron, a], distances[tetrahedron, b],
     )  # fmt: skip
     points, faces = cells[owner[tetrahedron]] + zero, inverse.reshape(-1, 3)
     return points, _outward(points, faces, corners, inside, triangles[:, 0, 0], pieces)
@@ -164,28 +164,28 @@ def _tetrahedra(
     ends = (crossed[:, None, None, 1:] + TETRAHEDRA).reshape(-1, 4, 3)  # in their cell
     cell = np.repeat(crossed[:, 0], len(TETRAHEDRA))
     x, y, z = np.moveaxis(ends, -1, 0)
-    found = distance[cell[:, None], x, y, z]
-    inside = found < 0.0
+    distances = distance[cell[:, None], x, y, z]
+    inside = distances < 0.0
     some = inside.any(axis=1) & ~inside.all(axis=1)
-    cell, found = cell[some], found[some]
+    cell, distances = cell[some], distances[some]
     corners = cells[cell][:, None] * pieces + ends[some]
-    return corners, first + cell, corners / pieces - cells[cell][:, None], found
+    return corners, first + cell, corners / pieces - cells[cell][:, None], distances
 
 
 def _cases() -> list[tuple[int, list[tuple[int, ...]]]]:
     """For each set of corners inside, as bits, the edges of its one or two triangles."""
-    made: list[tuple[int, list[tuple[int, ...]]]] = []
+    cases: list[tuple[int, list[tuple[int, ...]]]] = []
     for number in range(1, 15):
         within = [i for i in range(4) if number >> i & 1]
         outside = [i for i in range(4) if i not in within]
         edge = {(i, j): EDGES.index((min(i, j), max(i, j))) for i in within for j in outside}
         if len(within) != 2:
-            made.append((number, [tuple(edge.values())]))
+            cases.append((number, [tuple(edge.values())]))
             continue
         (p, q), (r, s) = within, outside
         ring = [edge[p, r], edge[p, s], edge[q, s], edge[q, r]]
-        made.append((number, [(ring[0], ring[1], ring[2]), (ring[0], ring[2], ring[3])]))
-    return made
+        cases.append((number, [(ring[0], ring[1], ring[2]), (ring[0], ring[2], ring[3])]))
+    return cases
 
 
 def _zeros(

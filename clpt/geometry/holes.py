@@ -46,8 +46,8 @@ def _first_of_place(points: NDArray[np.float64]) -> NDArray[np.int64]:
         name = (name ^ words[:, k]) * np.uint64(0x9E3779B97F4A7C15)
         name ^= name >> np.uint64(29)
     _, first, same = np.unique(name, return_index=True, return_inverse=True)
-    found: NDArray[np.int64] = first[same.reshape(-1)]
-    return found
+    first_points: NDArray[np.int64] = first[same.reshape(-1)]
+    return first_points
 
 
 def _unbalanced(corners: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

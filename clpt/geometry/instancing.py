@@ -95,15 +95,15 @@ def concatenated(parts: Sequence[Shared]) -> Instances:
     )
 
 
-def distinct(things: Iterable[Shape]) -> Iterator[Shape]:
+def distinct(shapes_: Iterable[Shape]) -> Iterator[Shape]:
     """Yield every shape that a scene has, those of its groups once and where the group has them."""
     seen: set[int] = set()
-    for thing in things:
-        if not isinstance(thing, Instance):
-            yield thing
-        elif id(thing.group) not in seen:
-            seen.add(id(thing.group))
-            yield from thing.group.shapes
+    for shape in shapes_:
+        if not isinstance(shape, Instance):
+            yield shape
+        elif id(shape.group) not in seen:
+            seen.add(id(shape.group))
+            yield from shape.group.shapes
 
 
 def sort(
@@ -164,17 +164,19 @@ def _met_as(shape: Shape, to_world: Matrices | None = None) -> Shape:
 def matrices(instances: Sequence[Shape]) -> Matrices:
     """Return the transforms of instances, (k, 4, 4), checked all at once. Raises as `sort` does."""
     try:
-        found = np.stack([np.asarray(on_host(one.to_world), np.float64) for one in instances])
-        affine = found.shape[1:] == (4, 4) and (found[:, 3] == transforms.IDENTITY[3]).all()
-        linear = found[:, :3, :3]
+        stacked = np.stack(
+            [np.asarray(on_host(instance.to_world), np.float64) for instance in instances]
+        )
+        affine = stacked.shape[1:] == (4, 4) and (stacked[:, 3] == transforms.IDENTITY[3]).all()
+        linear = stacked[:, :3, :3]
         with np.errstate(all="ignore"):
             lengths = np.linalg.norm(linear, axis=1)
             volume = np.abs(np.linalg.det(linear)) / lengths.prod(axis=1)
-        if affine and np.isfinite(found).all() and (volume >= transforms.SINGULAR_BELOW).all():
-            return found
+        if affine and np.isfinite(stacked).all() and (volume >= transforms.SINGULAR_BELOW).all():
+            return stacked
     except (TypeError, ValueError, IndexError):
         pass
-    return np.stack([shapes.placement(one) for one in instances])  # tells which one is wrong
+    return np.stack([shapes.placement(instance) for instance in instances])  # names the wrong one
 
 
 def _copies(shape: Shape, whole: Prototype) -> list[Placed]:
@@ -185,8 +187,8 @@ def _copies(shape: Shape, whole: Prototype) -> list[Placed]:
 
 def _placed(shape: Shape, to_world: Matrices) -> list[Shape]:
     """A shape under each of the transforms, which its own goes before."""
-    own = shapes.placement(shape)
-    return [dataclasses.replace(shape, to_world=matrix @ own) for matrix in to_world]
+    placement = shapes.placement(shape)
+    return [dataclasses.replace(shape, to_world=matrix @ placement) for matrix in to_world]
 
 
 def _alone(shape: Shape, number: int) -> Prototype:
@@ -198,8 +200,8 @@ def _own(
     copies: list[Placed], prototypes: list[Prototype], moving: Collection[int]
 ) -> list[Placed]:
     """The copies that are still; those that move become prototypes."""
-    prototypes += [_alone(one.shape, one.number) for one in copies if one.number in moving]
-    return [one for one in copies if one.number not in moving]
+    prototypes += [_alone(copy.shape, copy.number) for copy in copies if copy.number in moving]
+    return [copy for copy in copies if copy.number not in moving]
 
 
 def _analytic(

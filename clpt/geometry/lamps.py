@@ -33,11 +33,11 @@ def _lit(shape: Shape, groups: dict[int, Group]) -> Shape:
     if isinstance(shape, Instance):
         group = shape.group
         if id(group) not in groups:
-            shapes = tuple(_lit(one, groups) for one in group.shapes)
+            shapes = tuple(_lit(shape, groups) for shape in group.shapes)
             same = _same(shapes, group.shapes)
             groups[id(group)] = group if same else dataclasses.replace(group, shapes=shapes)
-        made = groups[id(group)]
-        return shape if made is group else dataclasses.replace(shape, group=made)
+        lit_group = groups[id(group)]
+        return shape if lit_group is group else dataclasses.replace(shape, group=lit_group)
     light = shape.emission
     if light is None or not any(_asked(light, name) for name in (TEMPERATURE, *STRENGTHS)):
         return shape
@@ -57,4 +57,4 @@ _T = TypeVar("_T", Light, Shape)
 
 
 def _same(new: Sequence[_T], old: Sequence[_T]) -> bool:
-    return all(one is other for one, other in zip(new, old, strict=True))
+    return all(shape is other for shape, other in zip(new, old, strict=True))

@@ -73,8 +73,8 @@ class Motions:
         if not self:
             return (self.shutter.open,)
         keys = [*self.shapes.values(), *self.lamps.values(), self.camera]
-        times = {t for one in keys if one is not None for t in one.times}
-        times |= {t for own in self.deforming.values() for t in own}
+        times = {t for moving in keys if moving is not None for t in moving.times}
+        times |= {t for moments in self.deforming.values() for t in moments}
         inner = {t for t in times if self.shutter.open < t < self.shutter.close}
         even = np.linspace(self.shutter.open, self.shutter.close, LOOKS).tolist()
         return tuple(sorted({*inner, *even}))
@@ -99,8 +99,8 @@ def at_rest(scene: Scene) -> Scene:
     as it is. Raises SceneError for keys on a shape of a group, and on lights that cannot move.
     """
     changes: dict[str, Any] = {}
-    things = (*scene.shapes, *scene.lights, scene.camera)
-    if not all(isinstance(thing, (Shape, Light, Camera)) for thing in things):
+    owners = (*scene.shapes, *scene.lights, scene.camera)
+    if not all(isinstance(owner, (Shape, Light, Camera)) for owner in owners):
         return scene  # which is refused
     shutter = scene.camera.shutter or AT_ONCE
     if not isinstance(shutter, Shutter):
@@ -131,45 +131,46 @@ def at_rest(scene: Scene) -> Scene:
 
 
 def _deforms(shape: Shape) -> bool:
-    return any(one.deformation is not None for one in shape.members)
+    return any(member.deformation is not None for member in shape.members)
 
 
 def _times(shape: Shape, shutter: Shutter) -> tuple[float, ...]:
-    """The times between which all points of a shape or instance move linearly."""
-    found = [one.deformation for one in shape.members]
-    return tuple(sorted({t for one in found if one is not None for t in one.while_open(shutter)}))
+    """Return the times [s] between which all points of a shape or instance move linearly."""
+    deformations = [member.deformation for member in shape.members]
+    times = {t for keys in deformations if keys is not None for t in keys.while_open(shutter)}
+    return tuple(sorted(times))
 
 
-def _undeformed(things: Sequence[Shape], shutter: Shutter) -> list[Shape]:
-    """Shapes and instances, of which those have deformations whose points move while it is open."""
+def _undeformed(shapes_: Sequence[Shape], shutter: Shutter) -> list[Shape]:
+    """Return the shapes; a deformation stays only if it moves points while the shutter is open."""
     groups: dict[int, Group] = {}
-    made: list[Shape] = []
-    for thing in things:
-        if not _deforms(thing):
-            made.append(thing)
-        elif isinstance(thing, Instance):
-            group = thing.group
+    still: list[Shape] = []
+    for shape in shapes_:
+        if not _deforms(shape):
+            still.append(shape)
+        elif isinstance(shape, Instance):
+            group = shape.group
             if id(group) not in groups:
-                inner = tuple(_opening(one, shutter) for one in group.shapes)
+                inner = tuple(_opening(member, shutter) for member in group.shapes)
                 groups[id(group)] = replace(group, shapes=inner)
-            made.append(replace(thing, group=groups[id(group)]))
+            still.append(replace(shape, group=groups[id(group)]))
         else:
-            made.append(_opening(thing, shutter))
-    return made
+            still.append(_opening(shape, shutter))
+    return still
 
 
 def _opening(shape: Any, shutter: Shutter) -> Any:
     """A shape with its points where they are when the shutter opens; what stands still then has no
     deformation. Raises SceneError for one that is not of the shape's points."""
-    given = shape.deformation
-    if given is None:
+    deformation = shape.deformation
+    if deformation is None:
         return shape
     triangles.check_deformation(shape)
-    still = len(given.while_open(shutter)) == 1
+    still = len(deformation.while_open(shutter)) == 1
     if not still and shape.emission is not None and shape.kind == "spheres":
         message = "spheres that emit light cannot deform: leave one of the two out"
         raise SceneError(message, where=f"{shapes.where(shape)}.deformation")
-    changes = {} if still else {"deformation": given}
+    changes = {} if still else {"deformation": deformation}
     return replace(triangles.at_time(shape, shutter.open), **changes)
 
 
@@ -209,8 +210,8 @@ def _keeps_lengths(matrix: NDArray[np.float64]) -> bool:
 def _moves(keys: Keys, shutter: Shutter) -> bool:
     """Whether what has keys is elsewhere at some time while the shutter is open."""
     times = [t for t in keys.times if shutter.open < t < shutter.close]
-    found = [keys.at(t) for t in (shutter.open, *times, shutter.close)]
-    return any(not np.array_equal(matrix, found[0]) for matrix in found)
+    matrices = [keys.at(t) for t in (shutter.open, *times, shutter.close)]
+    return any(not np.array_equal(matrix, matrices[0]) for matrix in matrices)
 
 
 def check(scene: Scene, motions: Motions) -> None:
@@ -221,7 +222,7 @@ def check(scene: Scene, motions: Motions) -> None:
             raise SceneError(message, where=f"lights[{i}].motion")
     for i, keys in motions.shapes.items():
         shape = scene.shapes[i]
-        if any(one.emission is not None for one in shape.members) and not is_even(keys):
+        if any(member.emission is not None for member in shape.members) and not is_even(keys):
             message = "a shape that emits light may be scaled evenly, not stretched"
             raise SceneError(message, where=f"{shapes.where(shape)}.motion")
 

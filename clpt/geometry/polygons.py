@@ -61,8 +61,8 @@ def _range(count: int) -> NDArray[np.int32]:
 
 def _first(counts: Integers) -> Integers:
     """Return the row of each polygon's first triangle, (p,)."""
-    made = np.maximum(counts - 2, 0)
-    return np.cumsum(made) - made
+    triangles = np.maximum(counts - 2, 0)
+    return np.cumsum(triangles) - triangles
 
 
 def _fans(counts: Integers, starts: Integers) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -152,14 +152,14 @@ def _clip(outline: Floats, normal: Floats) -> Integers | None:
     flat = outline - (outline @ normal / (normal @ normal))[:, None] * normal
     flat = np.delete(flat, int(np.argmax(np.abs(normal))), axis=1)[kept]
     flat = np.ascontiguousarray(flat / np.abs(flat).max())
-    found = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], np.uint32))
-    ears = np.asarray(found, np.int64).reshape(-1, 3)
+    ears_found = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], np.uint32))
+    ears = np.asarray(ears_found, np.int64).reshape(-1, 3)
     if not len(ears):
         return None
-    made = _turned_alike(outline[kept], normal, ears)
-    _put_back(made, outline[kept])
-    missing = len(outline) - 2 - len(made)
-    return np.array([*kept[np.array(made)].tolist(), *[(0, 0, 0)] * missing])
+    turned = _turned_alike(outline[kept], normal, ears)
+    _put_back(turned, outline[kept])
+    missing = len(outline) - 2 - len(turned)
+    return np.array([*kept[np.array(turned)].tolist(), *[(0, 0, 0)] * missing])
 
 
 def _without_spikes(outline: Floats) -> Integers:

@@ -46,8 +46,10 @@ def refined(mesh: Mesh, parts: Parts, name: str) -> Parts:
         points, faces, smooth, uvs = _subdivided(points, faces, uvs, mesh.subdivision, name)
     if mesh.displacement is not None:
         points, faces, smooth, uvs = _displaced(mesh, (points, faces, smooth, uvs), name)
-    made = (None if one is None else one.astype(np.float32) for one in (points, smooth, uvs))
-    vertices, normals, uvs = made
+    singles = (
+        None if values is None else values.astype(np.float32) for values in (points, smooth, uvs)
+    )
+    vertices, normals, uvs = singles
     return vertices, faces.astype(np.uint32), normals, uvs
 
 
@@ -59,10 +61,13 @@ def check(mesh: Mesh) -> None:
     if not 0 <= mesh.subdivision <= DEEPEST:
         message = f"subdivision must be 0 to {DEEPEST}, not {mesh.subdivision}"
         raise SceneError(message, where=name)
-    made = "subdivided" if mesh.displacement is None else "displaced"
-    for found, what in ((mesh.attributes, "attributes"), (mesh.tangents is not None, "tangents")):
-        if found:
-            raise SceneError(f"a mesh that is {made} has no {what}", where=name)
+    action = "subdivided" if mesh.displacement is None else "displaced"
+    for present, array in (
+        (mesh.attributes, "attributes"),
+        (mesh.tangents is not None, "tangents"),
+    ):
+        if present:
+            raise SceneError(f"a mesh that is {action} has no {array}", where=name)
     if mesh.displacement is None:
         return
     image = mesh.displacement
@@ -127,9 +132,9 @@ def _subdivided(
         edges, faces = _halved(faces, count)
         uvs = None if uvs is None else _grown(uvs, edges)
         count += len(edges)
-    own = np.zeros(count, np.int64)
-    own[faces.reshape(-1)] = finer.reshape(-1)
-    return limit[own], faces, normals[own], uvs
+    origin = np.zeros(count, np.int64)
+    origin[faces.reshape(-1)] = finer.reshape(-1)
+    return limit[origin], faces, normals[origin], uvs
 
 
 def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
@@ -149,7 +154,7 @@ def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
     for _ in range(levels):
         budget.check_time()
         edges, faces = _halved(faces, len(points))
-        points, normals, uvs = (_grown(one, edges) for one in (points, normals, uvs))
+        points, normals, uvs = (_grown(values, edges) for values in (points, normals, uvs))
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.where(length > 0.0, length, 1.0)
     image = mesh.displacement

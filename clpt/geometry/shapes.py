@@ -22,8 +22,8 @@ def where(shape: Shape) -> str:
 
 def geometry(shape: Shape) -> tuple[Any, ...]:
     """Return all that the triangles of a shape follow from: its fields but for the surface."""
-    own = fields_of(shape)
-    return type(shape), *[own[name] for name in own if name not in ("material", "emission")]
+    fields = fields_of(shape)
+    return type(shape), *[fields[name] for name in fields if name not in ("material", "emission")]
 
 
 def placement(shape: Shape) -> NDArray[np.float64]:

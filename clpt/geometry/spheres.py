@@ -39,13 +39,13 @@ def balls(shape: Spheres) -> Balls:
     if radii.shape not in ((), (len(centers),)):
         message = f"radii must be one number or ({len(centers)},), found {radii.shape}"
         raise SceneError(message, where=shapes.where(shape))
-    made = np.empty((len(centers), 4), np.float32)
+    rows_ = np.empty((len(centers), 4), np.float32)
     moved = not np.array_equal(matrix, transforms.IDENTITY)
     with np.errstate(over="ignore"):
-        made[:, :3] = transforms.transform_points(matrix, centers) if moved else centers
-        made[:, 3] = radii * scale
-    _check(shape, made)
-    return made
+        rows_[:, :3] = transforms.transform_points(matrix, centers) if moved else centers
+        rows_[:, 3] = radii * scale
+    _check(shape, rows_)
+    return rows_
 
 
 def keyed(shape: Spheres, times: Sequence[float]) -> Balls:
@@ -69,11 +69,11 @@ def common(shape: Shape) -> Words:
 
 def rows(shape: Shape, placed: Balls) -> Words:
     """Return a row of `geometry` for each of the balls of a shape, (n, words) uint32."""
-    made = np.tile(common(shape), (len(placed), 1))
+    words = np.tile(common(shape), (len(placed), 1))
     center, radius = (analytic.member("sphere", name) for name in ("center", "radius"))
-    made[:, center : center + 3] = placed[:, :3].view(np.uint32)
-    made[:, radius] = placed[:, 3].view(np.uint32)
-    return made
+    words[:, center : center + 3] = placed[:, :3].view(np.uint32)
+    words[:, radius] = placed[:, 3].view(np.uint32)
+    return words
 
 
 def swept(placed: Balls) -> NDArray[np.float32]:
@@ -88,10 +88,10 @@ def boxes(placed: Sequence[Balls]) -> NDArray[np.float32]:
     centers, radii = whole[:, :3], whole[:, 3]
     reach = np.maximum(2.0 * radii, np.abs(centers).max(axis=1, initial=0.0) + radii)
     reach = (radii + np.float32(analytic.PADDING) * reach)[:, None]
-    made = np.empty((len(whole), 2, 3), np.float32)
-    np.subtract(centers, reach, out=made[:, 0])
-    np.add(centers, reach, out=made[:, 1])
-    return made
+    corners = np.empty((len(whole), 2, 3), np.float32)
+    np.subtract(centers, reach, out=corners[:, 0])
+    np.add(centers, reach, out=corners[:, 1])
+    return corners
 
 
 def _numbers(shape: Shape, name: str) -> NDArray[np.float32]:
@@ -104,12 +104,12 @@ def _numbers(shape: Shape, name: str) -> NDArray[np.float32]:
 
 
 def _check(shape: Shape, placed: Balls) -> None:
-    for wrong, what in (
+    for wrong, form in (
         (~np.isfinite(placed[:, :3]).all(axis=1), "centers[{}] is not finite"),
         (~(np.isfinite(placed[:, 3]) & (placed[:, 3] > 0.0)), "radii[{}] must be above zero"),
         (np.abs(placed).max(axis=1) > FARTHEST, "centers[{}] or its radius is too large"),
     ):
         if wrong.any():
             at = int(np.argmax(wrong))
-            message = f"{what.format(at)}: in the world it is {placed[at].tolist()}"
+            message = f"{form.format(at)}: in the world it is {placed[at].tolist()}"
             raise SceneError(message, where=shapes.where(shape))

@@ -59,19 +59,19 @@ def _pieces(shape: Curves, cut_as: Curves | None = None) -> tuple[Floats32, NDAr
     control = _between(spans[span], begin, begin + 1.0 / cuts[span])
     first = np.append(True, strand[span[1:]] != strand[span[:-1]])
     start, end = _directions(control)
-    made = np.zeros((len(span), WORDS), np.float32)
-    made[:, CONTROL : CONTROL + 3] = tubes.frames(start, first)[0]
-    made[:, CONTROL + 3] = (span + begin) / len(spans)
-    made[:, CONTROL + 4] = 1.0 / (cuts[span] * len(spans))
+    rows_ = np.zeros((len(span), WORDS), np.float32)
+    rows_[:, CONTROL : CONTROL + 3] = tubes.frames(start, first)[0]
+    rows_[:, CONTROL + 3] = (span + begin) / len(spans)
+    rows_[:, CONTROL + 4] = 1.0 / (cuts[span] * len(spans))
     points = control.astype(np.float32)
     if not np.isfinite(points).all():
         raise SceneError("its transform moves points out of float32", where=name)
     closed_start, closed_end = _closed(control, start, end, first)
     points[closed_start, 0, 3] *= -1.0
     points[closed_end, 3, 3] *= -1.0
-    made[:, :CONTROL] = points.swapaxes(1, 2).reshape(-1, CONTROL)
+    rows_[:, :CONTROL] = points.swapaxes(1, 2).reshape(-1, CONTROL)
     order = _near_to_each_other(points[:, 0, :3])
-    return made[order], strand[span[order]]
+    return rows_[order], strand[span[order]]
 
 
 def boxes(placed: Floats32) -> NDArray[np.float32]:
@@ -90,12 +90,12 @@ def _in_world(shape: Curves) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     if spans.shape[1] == 2:  # a straight cubic, at an even speed
         a, b = spans[:, :1], spans[:, 1:]
         spans = np.concatenate([a, (2.0 * a + b) / 3.0, (a + 2.0 * b) / 3.0, b], axis=1)
-    matrix, made = shapes.placement(shape), np.empty(spans.shape)
+    matrix, placed = shapes.placement(shape), np.empty(spans.shape)
     points = transforms.transform_points(matrix, spans[..., :3].reshape(-1, 3))
-    made[..., :3] = points.reshape(*spans.shape[:2], 3)
+    placed[..., :3] = points.reshape(*spans.shape[:2], 3)
     scale = analytic.row(shape).view(np.float32)[analytic.member("curve", "scale")]
-    made[..., 3] = spans[..., 3] * float(scale)
-    return made, strand
+    placed[..., 3] = spans[..., 3] * float(scale)
+    return placed, strand
 
 
 def _near_to_each_other(points: NDArray[np.float32]) -> NDArray[np.intp]:
@@ -164,7 +164,7 @@ def _between(
 
 def _directions(control: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Unit tangents at both ends (n, 3); of a piece that is a point, z."""
-    found = []
+    axes = []
     for order in ((0, 1, 2, 3), (3, 2, 1, 0)):
         p = control[:, order, :3]
         tangent = p[:, 1] - p[:, 0]
@@ -174,9 +174,9 @@ def _directions(control: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDAr
             tangent[still] = p[still, later] - p[still, 0]
         length = np.linalg.norm(tangent, axis=1, keepdims=True)
         tangent = np.where(length > 0.0, tangent / np.where(length > 0.0, length, 1.0), [0, 0, 1])
-        found.append(tangent)
-    return found[0], np.where(
-        (control[:, :, :3] == control[:, :1, :3]).all((1, 2))[:, None], found[1], -found[1]
+        axes.append(tangent)
+    return axes[0], np.where(
+        (control[:, :, :3] == control[:, :1, :3]).all((1, 2))[:, None], axes[1], -axes[1]
     )
 
 

@@ -43,9 +43,9 @@ def tessellate(shape: Sphere | Cylinder) -> Tessellated:
         normals = circle @ np.stack(across(axis / np.linalg.norm(axis)))
         vertices = np.asarray(shape.p0) + uvs[:, 1:] * axis + shape.radius * normals
     faces = _quads(along)
-    budget.take_made((vertices, normals, uvs, faces), f"{shape.kind} {shape.name}, in triangles")
+    budget.take_arrays((vertices, normals, uvs, faces), f"{shape.kind} {shape.name}, in triangles")
     budget.check_time()
-    if isinstance(shape, Sphere):  # v runs down; at the poles one half of a quad has no area
+    if isinstance(shape, Sphere):  # v runs down; at the poles a half of each quad has no area
         centre = faces[1:-1].reshape(-1, 3)
         faces = np.concatenate([faces[0, :, 1], centre, faces[-1, :, 0]])
         faces = faces[:, ::-1]

@@ -100,18 +100,18 @@ def keyed(
         at_all = [_in_world(shape)] * count
     else:
         alike = [at_time(shape, time) for time in times]
-        at_all = [_in_world(one, alike) for one in alike]
+        at_all = [_in_world(surface, alike) for surface in alike]
     vertices, faces, _, uvs = at_all[0]
     budget.check(PER_KEY * count * len(vertices), f"{where(shape)} at {count:,} times")
-    if any(not np.array_equal(one[1], faces) for one in at_all):
+    if any(not np.array_equal(surface[1], faces) for surface in at_all):
         raise SceneError("its triangles are others at other times", where=where(shape))
-    solid = np.any([_solid(one[0], faces) for one in at_all], axis=0)
+    solid = np.any([_solid(surface[0], faces) for surface in at_all], axis=0)
     flat = [] if solid.all() else [Flat(where(shape), int((~solid).sum()), len(solid))]
     normals: Points | None = None
     if at_all[0][2] is not None:
-        normals = np.stack([np.asarray(one[2]) for one in at_all], axis=1).reshape(-1, 3)
+        normals = np.stack([np.asarray(surface[2]) for surface in at_all], axis=1).reshape(-1, 3)
     return (
-        np.stack([one[0] for one in at_all], axis=1).reshape(-1, 3),
+        np.stack([surface[0] for surface in at_all], axis=1).reshape(-1, 3),
         np.ascontiguousarray(faces[solid] * np.uint32(count)),
         normals,
         None if uvs is None else np.repeat(uvs, count, axis=0),
@@ -122,8 +122,8 @@ def keyed(
 def kept(shape: Shape, times: Sequence[float] = ()) -> NDArray[np.bool_]:
     """Return which of a shape's triangles `triangulate`, or at `times` [s] `keyed`, keeps, (m,)."""
     alike = [shape] if shape.deformation is None else [at_time(shape, time) for time in times]
-    at_all = [_in_world(one, alike if times else ()) for one in alike]
-    return np.asarray(np.any([_solid(one[0], one[1]) for one in at_all], axis=0))
+    at_all = [_in_world(surface, alike if times else ()) for surface in alike]
+    return np.asarray(np.any([_solid(surface[0], surface[1]) for surface in at_all], axis=0))
 
 
 def at_time(shape: Any, time: float) -> Any:
@@ -136,24 +136,27 @@ def at_time(shape: Any, time: float) -> Any:
 
 
 def check_deformation(shape: Shape) -> None:
-    """Raise SceneError for a deformation that is not one of the shape's points."""
-    given, place = shape.deformation, f"{where(shape)}.deformation"
-    if not isinstance(given, Deformation):
-        raise SceneError(f"must be a Deformation, not {given!r}", where=place)
+    """Raise SceneError for a deformation that does not fit the shape's points."""
+    deformation, place = shape.deformation, f"{where(shape)}.deformation"
+    if not isinstance(deformation, Deformation):
+        raise SceneError(f"must be a Deformation, not {deformation!r}", where=place)
     name = POINTS[shape.kind]
     points = fields_of(shape)[name]
     if points is None:
         raise SceneError(f"a {shape.kind} that deforms needs {name} too", where=place)
-    own = np.shape(on_host(points))
-    with_radii = shape.kind == "spheres" and given.points.shape[1:] == (*own[:1], 4)
-    if given.points.shape[1:] != own and not with_radii:
-        message = f"its keys have {given.points.shape[1:]} where {name} are {own}"
+    expected = np.shape(on_host(points))
+    with_radii = shape.kind == "spheres" and deformation.points.shape[1:] == (
+        *expected[:1],
+        4,
+    )
+    if deformation.points.shape[1:] != expected and not with_radii:
+        message = f"its keys have {deformation.points.shape[1:]} where {name} are {expected}"
         raise SceneError(message, where=place)
     if not isinstance(shape, Mesh):
-        if given.normals is not None:
+        if deformation.normals is not None:
             raise SceneError(f"{shape.kind} take no normals", where=place)
         return
-    if given.normals is None and shape.normals is not None and not smooth(shape):
+    if deformation.normals is None and shape.normals is not None and not smooth(shape):
         message = "needs normals at each time, as the mesh has some; or give it normals='smooth'"
         raise SceneError(message, where=place)
     if shape.displacement is not None:
@@ -169,7 +172,7 @@ def warnings_of(flat: Sequence[Flat]) -> list[str]:
     first = f"{head.where}: {of} triangles have no area, left out"
     if len(flat) == 1:
         return [first]
-    total = sum(one.count for one in flat)
+    total = sum(flat_triangles.count for flat_triangles in flat)
     return [f"{first}; with those of {len(flat) - 1} more shapes {total:,} in all"]
 
 
@@ -182,15 +185,15 @@ def tangents(shape: shapes.Mesh) -> Points:
     if shape.normals is None:
         message = "tangents need normals: a frame has both; leave them out, or give normals"
         raise SceneError(message, where=where(shape))
-    given = _array(shape, "tangents", 4, len(_array(shape, "vertices", 3)))
+    declared = _array(shape, "tangents", 4, len(_array(shape, "vertices", 3)))
     matrix = placement(shape)
-    made = np.empty_like(given)
-    made[:, :3] = given[:, :3] @ matrix[:3, :3].T
-    length = np.linalg.norm(made[:, :3], axis=1, keepdims=True)
-    made[:, :3] /= np.where(length > 0.0, length, 1.0)
+    rotated = np.empty_like(declared)
+    rotated[:, :3] = declared[:, :3] @ matrix[:3, :3].T
+    length = np.linalg.norm(rotated[:, :3], axis=1, keepdims=True)
+    rotated[:, :3] /= np.where(length > 0.0, length, 1.0)
     turned = transforms.flips_handedness(matrix) != shape.flip_normals
-    made[:, 3] = np.where(given[:, 3] < 0.0, -1.0, 1.0) * (-1.0 if turned else 1.0)
-    return made
+    rotated[:, 3] = np.where(declared[:, 3] < 0.0, -1.0, 1.0) * (-1.0 if turned else 1.0)
+    return rotated
 
 
 def per_face(name: str) -> bool:
@@ -245,19 +248,19 @@ def _moved(
     move: Callable[[ArrayLike, ArrayLike], NDArray[Any]], matrix: NDArray[Any], rows: Points
 ) -> Points:
     """Return rows (n, 3) as a matrix moves them; a chunk at a time, whose memory is used again."""
-    made = np.empty(rows.shape, np.float32)
+    moved = np.empty(rows.shape, np.float32)
     for first in range(0, len(rows), CHUNK):
-        made[first : first + CHUNK] = single(move(matrix, rows[first : first + CHUNK]))
-    return made
+        moved[first : first + CHUNK] = single(move(matrix, rows[first : first + CHUNK]))
+    return moved
 
 
 def _solid(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
-    """Which faces have a cross product whose square is not zero in float32."""
-    found, vertices = np.empty(len(faces), np.bool_), _wide(vertices)
+    """Return which faces have a cross product whose square is not zero in float32."""
+    has_area, vertices = np.empty(len(faces), np.bool_), _wide(vertices)
     for first in range(0, len(faces), CHUNK):
         crosses = _crosses(vertices, faces[first : first + CHUNK])
-        found[first : first + CHUNK] = (np.abs(crosses) > LEAST_CROSS).any(axis=1)
-    return found
+        has_area[first : first + CHUNK] = (np.abs(crosses) > LEAST_CROSS).any(axis=1)
+    return has_area
 
 
 def _wide(vertices: NDArray[Any]) -> NDArray[Any]:
@@ -322,8 +325,8 @@ def _mesh(shape: shapes.Mesh) -> tuple[Points, Faces, Points | None, Points | No
     if faces.size == 0 or len(vertices) == 0:
         raise SceneError("the mesh is empty: it has no triangle", where=where(shape))
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
-        found = f"{faces.shape} {faces.dtype}"
-        raise SceneError(f"faces must be (m, 3) whole numbers, found {found}", where=where(shape))
+        form = f"{faces.shape} {faces.dtype}"
+        raise SceneError(f"faces must be (m, 3) whole numbers, found {form}", where=where(shape))
     shapes.check_faces(faces, len(vertices), where(shape))
     normals = _normals(shape, vertices, faces)
     uvs = None if shape.uvs is None else _array(shape, "uvs", 2, len(vertices))

@@ -224,9 +224,9 @@ def _across(tangent: Floats, world: Floats) -> Floats:
 def _product(a: Floats, b: Floats) -> Floats:
     """Products of quaternions (n, 4): b's rotation, then a's."""
     w = a[:, 0] * b[:, 0] - np.einsum("ij,ij->i", a[:, 1:], b[:, 1:])
-    rest = a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:] + np.cross(a[:, 1:], b[:, 1:])
-    made = np.column_stack([w, rest])
-    return made / np.linalg.norm(made, axis=1, keepdims=True)
+    vector = a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:] + np.cross(a[:, 1:], b[:, 1:])
+    quaternion = np.column_stack([w, vector])
+    return quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
 
 
 def _around(

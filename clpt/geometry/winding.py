@@ -20,7 +20,7 @@ from clpt.geometry.triangles import counted, triangulate
 from clpt.scene.shapes import Cylinder, Disk, Mesh, Shape, Sphere, Spheres
 
 Triangles = tuple[NDArray[np.float32], NDArray[np.uint32]]
-AROUND = 96  # corners of what stands for a disk
+AROUND = 96  # corners of a disk's polygon
 CHUNK = 1 << 18  # triangles that are summed at a time
 
 
@@ -71,7 +71,7 @@ def areas(
 
 
 def volume(shape: Shape, cached: Callable[..., Any] | None) -> float:
-    """Return what a shape encloses [m^3], below 0 of one that faces inward."""
+    """Return the volume of a shape [m^3], below 0 if it faces inward."""
     if isinstance(shape, Spheres):
         return (-1.0 if shape.flip_normals else 1.0) * 4.2 * float((balls(shape)[1] ** 3).sum())
     vertices, faces = triangles_of(shape, cached)

@@ -1,4 +1,4 @@
-"""Lenses: what they are made of, read from files, and what they do to light, in float64.
+"""Lenses: their surfaces and glasses, readers of lens files, and exact optics in float64.
 
 Lengths are in millimetres here, wavelengths in nm.
 """

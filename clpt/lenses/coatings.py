@@ -1,4 +1,4 @@
-"""Coatings against reflections, and how much light a surface returns."""
+"""Anti-reflection coatings, and the reflectance of a coated surface."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from numpy.typing import NDArray
 from clpt.lenses.prescription import Coat
 from clpt.spectra import Constant
 
-DESIGN = 550.0  # [nm], the wavelength at which films are a quarter of a wave
+DESIGN = 550.0  # [nm], the wavelength of a film's quarter wave
 
 
 def quarter_wave(index: float, waves: float = 0.25, at: float = DESIGN) -> Coat:
-    """Return a film of an index whose thickness is a part of the wavelength in it."""
+    """Return a film of an index, its thickness in `waves` of the wavelength `at` [nm] inside it."""
     return Coat(Constant(index), waves * at / index)
 
 
-# From the air to the glass. Of magnesium fluoride; and with zirconia and alumina below it, of a
-# quarter, a half and a quarter of a wave (Macleod 2010, 4.3).
+# From the air to the glass. "single" is magnesium fluoride; "multi" has zirconia and alumina below
+# it: a quarter, a half and a quarter of a wave (Macleod 2010, 4.3).
 COATINGS: dict[str, tuple[Coat, ...]] = {
     "none": (),
     "single": (quarter_wave(1.38),),
@@ -28,10 +28,10 @@ COATINGS: dict[str, tuple[Coat, ...]] = {
 def reflectance(
     n: float, beyond: float, coating: tuple[Coat, ...], lambdas: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the share of light (n,) that comes back, straight on, at wavelengths [nm].
+    """Return the reflectance (n,) at normal incidence, at wavelengths [nm].
 
-    n, beyond: indices in front and behind; coating: from the front. By the recursion of amplitudes
-    from the back on (Rouard 1937).
+    n, beyond: indices in front and behind; coating: from the front. The recursion of amplitudes
+    begins at the back (Rouard 1937).
     """
     r, below = np.zeros(len(lambdas), np.complex128), np.full(len(lambdas), beyond)
     for coat in reversed(coating):

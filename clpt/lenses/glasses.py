@@ -12,10 +12,10 @@ HIGHEST = 5.0  # index
 
 
 def by_number(n: float, abbe: float = 0.0) -> Spectrum:
-    """Return the index of a glass of index `n` at the line d and an Abbe number; 0: constant.
+    """Return the index of a glass from its index `n` at the line d and its Abbe number.
 
-    The model is Cauchy's formula with two terms, which has both n_d and n_F - n_C exactly. Raises
-    SceneError for numbers that no glass has.
+    The model is Cauchy's formula with two terms, which fits n_d and n_F - n_C exactly; an Abbe
+    number of 0 makes the index constant. Raises SceneError for numbers outside of glasses' range.
     """
     if not 1.0 <= n <= HIGHEST:
         raise SceneError(f"an index lies between 1 and {HIGHEST:g}, not {n:g}")
@@ -30,7 +30,7 @@ def by_number(n: float, abbe: float = 0.0) -> Spectrum:
 def known(name: str) -> Spectrum | None:
     """Return the index of a glass by its name in any case, or None where clpt has no formula.
 
-    A glass without lead stands for its forerunner of the same name, and the other way round.
+    N-BK7 and BK7, a glass without lead and its forerunner, stand for each other.
     """
     wanted = name.strip().lower().replace("_", " ")
     for each in (wanted, f"n-{wanted}", wanted.removeprefix("n-")):
@@ -44,9 +44,9 @@ def by_name(name: str, n: float = 0.0, abbe: float = 0.0) -> Spectrum:
 
     Raises SceneError where neither is known.
     """
-    found = known(name)
-    if found is not None:
-        return found
+    index = known(name)
+    if index is not None:
+        return index
     if n == 0.0:
         raise SceneError(
             f"the glass {name!r} is not known{nearest(name.lower(), spectra.glasses())}; give its"

@@ -23,21 +23,21 @@ class Line:
     def error(self, message: str) -> SceneError:
         return SceneError(message, file=self.file, line=self.number)
 
-    def numeral(self, at: int, what: str) -> float:
+    def numeral(self, at: int, name: str) -> float:
         """Return the finite number of a field."""
         if at >= len(self.fields):
-            raise self.error(f"needs {what}")
+            raise self.error(f"needs {name}")
         try:
             value = float(self.fields[at])
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise self.error(f"{what} must be a number, not {self.fields[at][:40]!r}")
+            raise self.error(f"{name} must be a number, not {self.fields[at][:40]!r}")
         return value
 
     @contextmanager
     def locating(self) -> Iterator[None]:
-        """Give errors that name no file this line."""
+        """Add this line to errors that name no file."""
         try:
             yield
         except SceneError as error:
@@ -53,7 +53,7 @@ class Row:
 
 
 def assembled(rows: list[Row], file: Path, name: str = "", source: str = "") -> Prescription:
-    """Return the lens of rows; each is checked, so that an error names its line."""
+    """Return the lens of rows; an error names the line of the wrong row."""
     for row in rows:
         with row.line.locating():
             row.surface.check()

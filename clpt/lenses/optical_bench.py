@@ -2,8 +2,8 @@
 
 `[lens data]` has a row for each surface: its number, radius (`AS` the stop, `FS` a field stop,
 `Infinity` a plane), thickness or a name, index, diameter, Abbe number, glass. `[aspherical data]`
-has number, radius, conic constant and factors of r^4, r^6, ... or, where the first is not so small,
-of r^2. `[variable distances]` has a value for each state of a zoom or focus: the first one is read.
+has number, radius, conic constant and factors of r^4, r^6, ... `[variable distances]` has a value
+for each state of a zoom or focus; the first is read.
 `[coating]`, ours: a surface's number and pairs of index and thickness [nm], from the front on.
 """
 
@@ -21,7 +21,7 @@ from clpt.spectra import Constant, Spectrum
 
 PLANES = ("infinity", "inf", "∞", "0", "0.0", "")
 STOPS, FIELD_STOPS = ("as", "stop", "aperture", "sto"), ("fs", "cg", "field stop")
-ENDS = ("bf", "")  # what stands for the way to the film
+ENDS = ("bf", "")  # fields for the distance to the film
 
 
 def parse(text: str, file: Path) -> Prescription:
@@ -61,7 +61,7 @@ def parse(text: str, file: Path) -> Prescription:
 
 
 def _tables(text: str, file: Path) -> dict[str, list[Line]]:
-    """The lines of each table, by its name in small letters."""
+    """Return the lines of each table, by its name in small letters."""
     tables: dict[str, list[Line]] = {}
     current: list[Line] | None = None
     for number, written in enumerate(text.splitlines(), 1):
@@ -81,7 +81,7 @@ def _row_of(line: Line, rows: dict[str, Row]) -> Row:
 
 
 def _number_of(line: Line | None) -> float | None:
-    """The first value of a line in [variable distances]."""
+    """Return the first value of a line in [variable distances]."""
     if line is None or len(line.fields) < 2:
         return None
     try:

@@ -1,7 +1,7 @@
 """A lens near its axis: focal lengths, pupils, focus by distance. All in float64 and millimetres.
 
 A ray is a height and a slope (y, u); a surface of curvature c from index n to n' makes
-n' u' = n u - y (n' - n) c, and a way t makes y' = y + t u (Hecht 2017, 6.2). z counts from the
+n' u' = n u - y (n' - n) c, and a distance t makes y' = y + t u (Hecht 2017, 6.2). z counts from the
 first surface's vertex towards the film.
 """
 
@@ -16,16 +16,17 @@ from clpt.errors import SceneError
 from clpt.lenses.glasses import LINE_D
 from clpt.lenses.prescription import Prescription
 
-NO_POWER = 1e-9  # [1/mm], below which nothing is brought to a focus
+NO_POWER = 1e-9  # [1/mm], a lens of less power has no focus
 
 
 @dataclass(frozen=True)
 class Cardinal:
-    """Properties of a lens near its axis, at one wavelength [nm]; lengths [mm].
+    """Properties of a lens near its axis, at a wavelength [nm]; lengths [mm].
 
-    focal_length: of the whole; back_focus: from the last surface to the image of what is far away;
+    focal_length: of the whole lens; back_focus: from the last surface to the image of a far object;
     front_focus: from the first surface to the front focus, below 0 in front of it; entrance, exit:
-    where the pupils stand behind the first and the last surface; their radii; f_number: far away.
+    distances of the pupils behind the first and the last surface; entrance_radius, exit_radius: of
+    the pupils; f_number: for a far object.
     """
 
     wavelength: float
@@ -45,16 +46,16 @@ class Cardinal:
 def matrix(
     lens: Prescription, wavelength: float = LINE_D, first: int = 0, last: int | None = None
 ) -> np.ndarray:
-    """Return the matrix (2, 2) that (y, u) before a surface becomes behind another one.
+    """Return the matrix (2, 2) that takes (y, u) in front of `first` to behind the surfaces.
 
-    first, last: numbers of the surfaces, from 0; last is not among them; None: all that follow.
+    first, last: numbers of the surfaces, from 0, without `last`; None: to the end.
     """
     indices = lens.indices(wavelength)
     last = len(lens.surfaces) if last is None else last
     whole = np.eye(2)
     for i in range(first, last):
         surface = lens.surfaces[i]
-        # At the vertex r^4 and beyond change no curvature, nor does the conic constant.
+        # Neither the conic constant nor r^4 and beyond change the curvature at the vertex.
         power = (indices[i + 1] - indices[i]) * surface.curvature
         refraction = np.array([[1.0, 0.0], [-power / indices[i + 1], indices[i] / indices[i + 1]]])
         whole = refraction @ whole
@@ -64,9 +65,9 @@ def matrix(
 
 
 def cardinal(lens: Prescription, wavelength: float = LINE_D) -> Cardinal:
-    """Return what a lens does near its axis at a wavelength [nm].
+    """Return the properties of a lens near its axis at a wavelength [nm].
 
-    What is infinitely far away, such as the focus of a mere hole, is inf.
+    A length that is infinite, such as the focal length of a pinhole, is inf.
     """
     (a, _), (c, d) = matrix(lens, wavelength)
     c = 0.0 if abs(c) < NO_POWER else c
@@ -74,7 +75,7 @@ def cardinal(lens: Prescription, wavelength: float = LINE_D) -> Cardinal:
     entrance = exit_ = 0.0
     entrance_radius = exit_radius = radius
     if stop > 0:
-        # From the first surface to the stop's vertex; rays through its middle have y = 0 there.
+        # From the first surface to the stop's vertex: y = 0 at the stop's centre.
         front = matrix(lens, wavelength, 0, stop)
         gap = lens.surfaces[stop - 1].thickness
         front = np.array([[1.0, gap], [0.0, 1.0]]) @ front
@@ -99,17 +100,17 @@ def _ratio(a: float, b: float) -> float:
 
 
 def film_distance(lens: Prescription, focus: float, wavelength: float = LINE_D) -> float:
-    """Return how far behind the last surface the film stands [mm], for what is `focus` [mm] away.
+    """Return the distance of the film behind the last surface [mm] that focuses at `focus` [mm].
 
-    The distance counts from the film. The whole lens moves; one without power, as a mere hole,
-    stands where its last thickness says. Raises SceneError for what is too near.
+    `focus` counts from the film. The whole lens moves; a lens without power, such as a pinhole,
+    stays at its last thickness. Raises SceneError for a distance that is too near.
     """
     (a, b), (c, d) = matrix(lens, wavelength)
     if abs(c) < NO_POWER and lens.surfaces[-1].thickness > 0.0:
         return lens.surfaces[-1].thickness
     if not c < -NO_POWER:
         raise SceneError("this lens forms no picture: its focal length is not above 0")
-    # An object s in front of the first surface has its image x behind the last one:
+    # An object s in front of the first surface has its image x behind the last surface:
     # a s + b + x (c s + d) = 0, and s + length + x = focus. With s from that:
     # -c x^2 + x (c r - a + d) + a r + b = 0 with r = focus - length; the smaller x is a camera's.
     room = focus - lens.length
@@ -124,18 +125,20 @@ def film_distance(lens: Prescription, focus: float, wavelength: float = LINE_D) 
 
 
 def _nearest(a: float, b: float, c: float, d: float) -> float:
-    """The least distance of an object from the first surface and its image from the last [mm].
+    """Return the least sum of the distances of an object and its image from the lens [mm].
 
-    At a magnification of -1: c s + d = -1 and a + c x = -1.
+    It is at a magnification of -1: c s + d = -1 and a + c x = -1.
     """
     return (-1.0 - d) / c + (-1.0 - a) / c
 
 
 def stop_radius(lens: Prescription, f_number: float) -> float:
     """Return the semi-diameter of the stop [mm] at an f-number. Raises SceneError."""
-    found = cardinal(lens)
-    if math.isinf(found.f_number):
+    optics = cardinal(lens)
+    if math.isinf(optics.f_number):
         raise SceneError("a lens without power has no f-number")
-    if f_number < found.f_number * (1.0 - 1e-3):
-        raise SceneError(f"this lens opens to f/{found.f_number:.3g} at most, asked f/{f_number:g}")
-    return lens.surfaces[lens.stop].semi_diameter * min(found.f_number / f_number, 1.0)
+    if f_number < optics.f_number * (1.0 - 1e-3):
+        raise SceneError(
+            f"this lens opens to f/{optics.f_number:.3g} at most, asked f/{f_number:g}"
+        )
+    return lens.surfaces[lens.stop].semi_diameter * min(optics.f_number / f_number, 1.0)

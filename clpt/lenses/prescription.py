@@ -1,7 +1,7 @@
 """Surfaces of a lens from the front to the film, as patents and lens files list them.
 
 Lengths are in millimetres. A radius is above 0 where the centre lies behind the surface; 0 is a
-plane. Light that makes a picture meets the first surface first.
+plane. Light of a picture enters at the first surface.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ MOST_COATS = 6
 
 @dataclass(frozen=True)
 class Coat:
-    """One thin film of a coating: its index, and its thickness [nm]."""
+    """A thin film of a coating: its index, and its thickness [nm]."""
 
     index: Spectrum
     thickness: float
@@ -30,11 +30,11 @@ class Coat:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """One surface.
+    """A surface of a lens.
 
-    radius, thickness to the next one, semi_diameter: [mm]; glass: behind it; conic: 0 is a sphere,
-    -1 a parabola; aspheric: factors of r^4, r^6, ... [mm^-3, mm^-5, ...] that are added to the
-    sag; coating: its films from the front; stop: whether the diaphragm stands here.
+    radius, thickness to the next surface, semi_diameter: [mm]; glass: behind it; conic: 0 is a
+    sphere, -1 a parabola; aspheric: factors of r^4, r^6, ... [mm^-3, mm^-5, ...] added to the sag;
+    coating: its films from the front; stop: whether the diaphragm stands here.
     """
 
     radius: float
@@ -48,11 +48,11 @@ class Surface:
 
     @property
     def curvature(self) -> float:
-        """1 / radius [1/mm]; of a plane 0."""
+        """1 / radius [1/mm]; 0 for a plane."""
         return 0.0 if self.radius == 0.0 else 1.0 / self.radius
 
     def check(self) -> None:
-        """Raise SceneError for numbers that no surface has."""
+        """Raise SceneError for impossible numbers."""
         numbers = (self.radius, self.thickness, self.semi_diameter, self.conic, *self.aspheric)
         if not all(map(math.isfinite, numbers)):
             raise SceneError("a number is not finite")
@@ -77,7 +77,7 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class Prescription:
-    """A lens: its surfaces from the front to the film, a name, and where the numbers are from."""
+    """A lens: its surfaces from the front to the film, its name, and the source of its numbers."""
 
     surfaces: tuple[Surface, ...]
     name: str = ""
@@ -108,7 +108,7 @@ class Prescription:
 
     @cached_property
     def vertices(self) -> tuple[float, ...]:
-        """Where the surfaces stand along the axis, from the first one towards the film [mm]."""
+        """Positions of the surfaces along the axis, from the first towards the film [mm]."""
         places = [0.0]
         for surface in self.surfaces[:-1]:
             places.append(places[-1] + surface.thickness)
@@ -121,7 +121,7 @@ class Prescription:
 
     @property
     def disperses(self) -> bool:
-        """Whether the index of one of its glasses differs between wavelengths."""
+        """Whether the index of any of its glasses depends on the wavelength."""
         return any(not isinstance(surface.glass, Constant) for surface in self.surfaces)
 
     def indices(self, wavelength: float) -> list[float]:
@@ -139,7 +139,7 @@ class Prescription:
         return replace(self, surfaces=tuple(surfaces))
 
     def with_coating(self, coating: Sequence[Coat]) -> Prescription:
-        """Return the lens with a coating on each surface between air and glass that has none.
+        """Return the lens with a coating on each bare surface between air and glass.
 
         coating: from the air to the glass.
         """

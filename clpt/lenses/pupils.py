@@ -1,4 +1,4 @@
-"""Which way light comes to the film through a lens: what of its rear plane each place sees."""
+"""Exit pupils: the part of a lens's rear plane that sends light to a point of the film."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from clpt.lenses.tracing import Rays, trace
 ZONES = 64  # rings of the film
 COARSE, FINE = (32, 16), (48, 24)  # cells of a grid over half of the pupil
 ROUNDS = (COARSE, COARSE, FINE)
-WAVELENGTHS = (380.0, 480.0, LINE_D, 780.0)  # [nm], at which pupils of lenses that disperse are met
+WAVELENGTHS = (380.0, 480.0, LINE_D, 780.0)  # [nm], of rays through lenses that disperse
 
 
 def zones(lens: Prescription, distance: float, radius: float) -> Floats:
     """Return an ellipse of the rear plane for each ring of the film, (ZONES, 3) [mm].
 
-    The rear plane touches the last surface. `distance`: from there to the film; radius: of the film
-    [mm]. A row has the ellipse's middle on the radius towards the place on the film, its half axis
-    along that radius and that across. All light that reaches the ring comes through it, at any
-    wavelength; a ring that gets none has zeros.
+    The rear plane touches the last surface. `distance`: from it to the film; radius: of the film
+    [mm]. A row has the ellipse's centre, on the radius towards the point on the film, its half axis
+    along that radius, and its half axis across. All light that reaches the ring comes through the
+    ellipse, at any wavelength; a ring without light has zeros.
     """
     places = np.linspace(0.0, radius, ZONES + 1)
     waves = WAVELENGTHS if lens.disperses else (LINE_D,)
@@ -52,7 +52,7 @@ def zones(lens: Prescription, distance: float, radius: float) -> Floats:
         across, middle, along = max(high[j, 1] for j in lit), (first + last) / 2, (last - first) / 2
         most = 0.0
         for j in lit:
-            # The far corner of each cell that light comes through.
+            # The far corner of each cell that passes light.
             u = (np.abs(x[j][inside[j]] - middle) + 0.5 * step[j, 0]) / along
             v = (y[j][inside[j]] + 0.5 * step[j, 1]) / across
             most = max(most, float(np.max(u * u + v * v)))
@@ -61,22 +61,22 @@ def zones(lens: Prescription, distance: float, radius: float) -> Floats:
 
 
 def _start(lens: Prescription, distance: float, places: Floats) -> tuple[Floats, Floats]:
-    """Where to look first (n, 2): the last surface, or the exit pupil if that is smaller."""
+    """Return the first search region (n, 2): the last surface, or a smaller exit pupil."""
     size = lens.surfaces[-1].semi_diameter
     low, high = np.full((len(places), 2), -size), np.full((len(places), 2), size)
     low[:, 1] = 0.0
-    found = cardinal(lens)
-    away = distance - found.exit  # of the pupil, from the film
+    optics = cardinal(lens)
+    away = distance - optics.exit  # of the pupil, from the film
     if math.isfinite(away) and away > 0.0:
         share = distance / away
-        middle, reach = places * (1.0 - share), 2.0 * found.exit_radius * share
+        middle, reach = places * (1.0 - share), 2.0 * optics.exit_radius * share
         if reach < 0.25 * size:
             low[:, 0], high[:, 0], high[:, 1] = middle - reach, middle + reach, reach
     return low, high
 
 
 def _grid(low: Floats, high: Floats, cells: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
-    """Middles of cells, x and y (n, m), and their size (n, 2)."""
+    """Return centres of cells, x and y (n, m), and their size (n, 2)."""
     step = (high - low) / np.array(cells)
     i, j = (each.ravel() for each in np.meshgrid(*(np.arange(c) + 0.5 for c in cells)))
     return low[:, :1] + step[:, :1] * i, low[:, 1:] + step[:, 1:] * j, step
@@ -93,9 +93,9 @@ def _seen(
 
 
 def axis_solid_angle(lens: Prescription, distance: float) -> float:
-    """Return the projected solid angle [sr] of the light that reaches the middle of the film.
+    """Return the projected solid angle [sr] of the light at the centre of the film.
 
-    pi sin^2 of the steepest ray that gets through, at the line d; the stop is round.
+    pi sin^2 of the steepest ray that passes, at the line d; the stop is round.
     """
     low, high = 0.0, lens.surfaces[-1].semi_diameter
     for _ in range(40):

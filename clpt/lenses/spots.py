@@ -1,4 +1,4 @@
-"""Spot diagrams: where the light of a far point meets the film."""
+"""Spot diagrams: the points on the film that a far point's light reaches."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ RINGS = 24
 class Spot:
     """Points (n, 2) where a far point's light meets the film [mm], each of the same power.
 
-    through: part of the light into the entrance pupil that gets there.
+    through: part of the light into the entrance pupil that reaches the film.
     """
 
     points: Floats
@@ -28,31 +28,31 @@ class Spot:
 
     @property
     def radius(self) -> float:
-        """Root mean square distance from their middle [mm]."""
+        """Root mean square distance from the centroid [mm]."""
         return float(np.sqrt(np.mean(np.sum((self.points - self.points.mean(axis=0)) ** 2, 1))))
 
 
 def pupil_points(rings: int = RINGS) -> Floats:
     """Return points (n, 2) evenly over the unit disk: 6 i + 3 on the ring i."""
-    made = []
+    circles = []
     for i in range(rings):
         turns = 2.0 * math.pi * (np.arange(6 * i + 3) + 0.5) / (6 * i + 3)
-        made.append((i + 0.5) / rings * np.stack([np.cos(turns), np.sin(turns)], 1))
-    return np.concatenate(made)
+        circles.append((i + 0.5) / rings * np.stack([np.cos(turns), np.sin(turns)], 1))
+    return np.concatenate(circles)
 
 
 def bundle(lens: Prescription, angle: float, wide: float = 1.0, rings: int = RINGS) -> Rays:
     """Return parallel rays to the entrance pupil, from a point at an angle [degrees] in y.
 
-    wide: times the pupil's paraxial radius, as pupils of wide lenses grow off the axis.
+    wide: the bundle's radius in the pupil's paraxial radii: wide lenses' pupils grow off the axis.
     """
-    found = cardinal(lens)
+    optics = cardinal(lens)
     slope = math.tan(math.radians(angle))
-    disk = wide * found.entrance_radius * pupil_points(rings)
-    o = np.column_stack([disk, np.full(len(disk), found.entrance)])
+    disk = wide * optics.entrance_radius * pupil_points(rings)
+    o = np.column_stack([disk, np.full(len(disk), optics.entrance)])
     d = np.array([[0.0, slope, 1.0]])
-    # From a plane square to the rays, in front of all glass.
-    far = found.entrance + lens.length + 10.0 * found.entrance_radius
+    # From a plane perpendicular to the rays, in front of all glass.
+    far = optics.entrance + lens.length + 10.0 * optics.entrance_radius
     rays = Rays.of(o, d)
     rays.o -= rays.d * (far / rays.d[:, 2:])
     return rays

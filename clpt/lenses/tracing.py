@@ -1,6 +1,6 @@
-"""Rays through a lens, exactly, in float64: what pupils, spot diagrams and tests are made of.
+"""Exact rays through a lens in float64, for pupils, spot diagrams and tests.
 
-z counts from the first surface's vertex towards the film [mm]. Rays go either way.
+z counts from the first surface's vertex towards the film [mm]. Rays go in both directions.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ NEWTON_STEPS = 12
 
 @dataclass
 class Rays:
-    """Rays (n, 3): places [mm] and directions of unit length; alive (n,): what was not stopped."""
+    """Rays (n, 3): origins [mm] and unit directions; alive (n,): whether no surface stopped it."""
 
     o: Floats
     d: Floats
@@ -27,14 +27,14 @@ class Rays:
 
     @staticmethod
     def of(o: Floats, d: Floats) -> Rays:
-        """Rays from places (n, 3) along directions (n, 3) of any length."""
+        """Return rays from points (n, 3) along directions (n, 3) of any length."""
         o, d = np.broadcast_arrays(np.asarray(o, np.float64), np.asarray(d, np.float64))
         length = np.linalg.norm(d, axis=1, keepdims=True)
         return Rays(o.copy(), d / length, np.ones(len(o), np.bool_))
 
 
 def sag(surface: Surface, r2: Floats) -> Floats:
-    """Return how far a surface lies behind its vertex; r2: squares of distances from the axis."""
+    """Return a surface's sag behind its vertex [mm]; r2: squared distances from the axis."""
     c = surface.curvature
     root = np.sqrt(np.maximum(1.0 - (1.0 + surface.conic) * c * c * r2, 0.0))
     z = c * r2 / (1.0 + root)
@@ -52,8 +52,8 @@ def trace(
 ) -> Rays:
     """Return rays as they leave the lens.
 
-    wavelength [nm]; backwards: from the film to the front; open_: no surface stops a ray by its
-    semi-diameter, only where there is none, or all light is reflected.
+    wavelength [nm]; backwards: from the film to the front; open_: semi-diameters stop no ray; a
+    ray ends only if it misses a surface or is totally reflected.
     """
     indices = lens.indices(wavelength)
     order = range(len(lens.surfaces))
@@ -76,10 +76,10 @@ def trace(
 
 
 def intersect(surface: Surface, o: Floats, d: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Return where rays meet a surface, its normals, which look towards -z, and whether they do.
+    """Return points where rays meet a surface, its normals towards -z, and whether they meet it.
 
-    o, d: (n, 3), z from the vertex. The sphere's or conic's point is in closed form (Welford 1986,
-    4.4), that of an asphere by Newton's method from there.
+    o, d: (n, 3), z from the vertex. A sphere or conic is solved in closed form (Welford 1986, 4.4);
+    an asphere by Newton's method from its conic.
     """
     z = np.where(np.abs(d[:, 2]) < 1e-12, 1e-12, d[:, 2])
     p = o - d * (o[:, 2] / z)[:, None]
@@ -116,7 +116,7 @@ def _slope(surface: Surface, r2: Floats) -> Floats:
 
 
 def refract(d: Floats, normal: Floats, ratio: float) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return directions behind a boundary, and whether light passes; ratio: n over n' beyond."""
+    """Return directions behind a boundary, and whether light passes; ratio: n over n' behind."""
     cosine = -np.sum(d * normal, axis=1)
     side = np.where(cosine < 0.0, -1.0, 1.0)
     inside = 1.0 - ratio * ratio * (1.0 - cosine * cosine)

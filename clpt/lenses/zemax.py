@@ -1,7 +1,7 @@
 """Sequential Zemax files (.zmx): spherical, conic and even aspheric surfaces in a row.
 
 SURF begins a surface, STOP marks it; TYPE, CURV, CONI, PARM, DISZ, GLAS and DIAM describe it.
-Surface 0 is the object, the last one the image. Where DIAM is 0, marginal rays decide.
+Surface 0 is the object, the last surface the image. Where DIAM is 0, marginal rays decide.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Measuring a function: the Measurement of any reflection f, by the method of Dupuy and Jakob 2018.
+"""The Measurement of any reflection function f, by the method of Dupuy and Jakob 2018.
 
-What the surface sends back to where light comes from tells the distribution of its microfacets
-(Dupuy et al. 2015): f(w, w) cos(w) = ndf(w) / (4 sigma(w)) up to a factor, and sigma is an integral
-of ndf, so that ndf is the eigenvector of a matrix that is not negative. Visible normals follow, and
-f is stored over the square that they warp.
+Retroreflection determines the distribution of microfacets (Dupuy et al. 2015): f(w, w) cos(w) =
+ndf(w) / (4 sigma(w)) up to a factor. sigma is an integral of ndf, so that ndf is the eigenvector of
+a matrix that is not negative. The visible normals follow from ndf; f is stored over the square that
+they warp.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ def fit(
 ) -> Measurement:
     """Return the measurement of a reflection.
 
-    wavelengths: [nm] of the colours of f; none where these are red, green and blue. theta_i, phi_i:
-    of the viewers [rad], by default 8 from 0 to 80 degrees and one azimuth, for an isotropic f;
-    else azimuths from -pi on, over all of the circle, a half or a quarter of it. normals, size:
-    rows and columns of the tables of facets, and of f. Raises SceneError.
+    wavelengths: [nm] of the colours of f; empty for red, green and blue. theta_i, phi_i: of the
+    viewers [rad]. By default 8 thetas from 0 to 80 degrees and a single azimuth, for an isotropic
+    f; otherwise azimuths from -pi on, over the circle, its half or its quarter. normals, size: rows
+    and columns of the tables of facets, and of f. Raises SceneError.
     """
     theta = np.radians(80.0) * np.linspace(0.0, 1.0, 8) if theta_i is None else theta_i
     thetas, phis = np.asarray(theta, np.float64), np.asarray(phi_i, np.float64)
@@ -67,9 +67,9 @@ def fit(
 
 
 def hemispherical(measurement: Measurement) -> Floats:
-    """Return the share of light (colours,) that is reflected to the first viewer; at most 1.
+    """Return the reflectance (colours,) towards the first viewer; at most 1.
 
-    It is the mean of f cos(theta) over the density of visible normals, which light is mirrored at.
+    It is the mean of f cos(theta) over the density of light mirrored at visible normals.
     """
     count = measurement.luminance.shape[-1]
     at = (np.arange(2 * count) + 0.5) / (2 * count)
@@ -96,7 +96,7 @@ def grey() -> Measurement:
 def _over_square(
     f: Reflection, wo: Floats, turn: float, vndf: Floats, ndf: Floats, sigma: Floats, size: int
 ) -> Floats:
-    """f cos(theta) over ndf / (4 sigma), (colours, size, size), at a grid of the warped square."""
+    """Return 4 sigma f cos(theta) / ndf at a grid of the warped square, (colours, size, size)."""
     u, v = grid(size, size)
     x, y, _ = sample(warp(vndf), u, v)
     m = _turned(direction(x, y), turn)
@@ -108,19 +108,19 @@ def _over_square(
         raise SceneError("the reflection to measure is negative or not finite")
     there = _square(wo[None])
     density = bilinear(ndf, x, y) / (4.0 * bilinear(sigma, *there))
-    made = np.divide(values, density[:, None], np.zeros_like(values), where=density[:, None] > 0)
-    return made.T.reshape(-1, size, size)
+    ratio = np.divide(values, density[:, None], np.zeros_like(values), where=density[:, None] > 0)
+    return ratio.T.reshape(-1, size, size)
 
 
 def _facets(
     f: Reflection, m: Floats, solid: Floats, n: int, isotropic: bool
 ) -> tuple[Floats, Floats]:
-    """The distribution of facets [1/sr] and its projected areas, (n, n) each, at directions m.
+    """Return the distribution of facets [1/sr] and its projected areas, (n, n), at directions m.
 
-    solid: solid angle over area of the square there.
+    solid: solid angle over area of the square at m.
     """
     weight = solid / (n - 1) ** 2 * _ends(n)
-    if isotropic:  # one row of directions; the integral goes over all of the square
+    if isotropic:  # a single row of directions; the integral covers the square
         rows = slice(0, n)
         at = spherical(0.5 * np.pi * np.linspace(0.0, 1.0, n) ** 2, 0.0)
         fold = np.tile(np.eye(n), (n, 1))
@@ -128,7 +128,7 @@ def _facets(
         rows = slice(0, n * n)
         at, fold = m, np.eye(n * n)
     at = at[rows].copy()
-    at[:, 2] = np.maximum(at[:, 2], 1e-3)  # at the horizon nothing is sent back
+    at[:, 2] = np.maximum(at[:, 2], 1e-3)  # the horizon reflects nothing
     at /= np.linalg.norm(at, axis=1, keepdims=True)
     back = np.asarray(f(at, at), np.float64).mean(axis=1) * at[:, 2]
     back *= np.isfinite(back)
@@ -147,29 +147,29 @@ def _facets(
 
 
 def grid(rows: int, columns: int) -> tuple[Floats, Floats]:
-    """Corners (rows * columns,) of cells of the unit square: x, y."""
+    """Return corners x, y (rows * columns,) of cells of the unit square."""
     y, x = np.meshgrid(np.linspace(0, 1, rows), np.linspace(0, 1, columns), indexing="ij")
     return x.ravel(), y.ravel()
 
 
 def _ends(n: int) -> Floats:
-    """Weights (n * n,) of the trapezoidal rule."""
+    """Return weights (n * n,) of the trapezoidal rule."""
     edge = np.where((np.arange(n) == 0) | (np.arange(n) == n - 1), 0.5, 1.0)
     return np.outer(edge, edge).ravel()
 
 
 def area(x: Floats) -> Floats:
-    """Solid angle [sr] over area of the square, at its points of that x."""
+    """Return solid angle [sr] over area of the square at x."""
     return 2.0 * np.pi**2 * x * np.sin(0.5 * np.pi * x * x)
 
 
 def direction(x: Floats, y: Floats) -> Floats:
-    """The direction (n, 3) at points of the square."""
+    """Return the directions (n, 3) at points of the square."""
     return spherical(0.5 * np.pi * x * x, (2.0 * y - 1.0) * np.pi)
 
 
 def _square(w: Floats) -> tuple[Floats, Floats]:
-    """The points of the square of directions (n, 3)."""
+    """Return the points of the square at directions (n, 3)."""
     theta = np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2])
     phi = np.arctan2(w[:, 1], w[:, 0])
     return np.sqrt(theta * 2.0 / np.pi), (phi + np.pi) / (2.0 * np.pi)
@@ -182,6 +182,6 @@ def spherical(theta: ArrayLike, phi: ArrayLike) -> Floats:
 
 
 def _turned(w: Floats, phi: float) -> Floats:
-    """Directions (n, 3) turned about z."""
+    """Return directions (n, 3) turned about z."""
     c, s = np.cos(phi), np.sin(phi)
     return w @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -1,9 +1,13 @@
-"""Measured reflection of a material, by direction and wavelength."""
+"""Measured reflection of a material, by direction and wavelength, and its files.
+
+Dupuy and Jakob's laboratory publishes them as tensor files (.bsdf).
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,29 +15,30 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import in_memory
 from clpt.errors import SceneError
+from clpt.measured import tensor_file
 
-REDUCTIONS = (1, 2, 4)  # equal parts of the azimuths of which one is stored
+REDUCTIONS = (1, 2, 4)  # symmetric parts of the azimuths; a file stores the first
 AXES = {
     "ndf": "(rows, columns)", "sigma": "(rows, columns)",
     "vndf": "(phi, theta, rows, columns)", "luminance": "(phi, theta, rows, columns)",
     "spectra": "(phi, theta, wavelengths, rows, columns)",
 }  # fmt: skip
 MOST_VALUES = 1 << 28
+FILE_TABLES = ("phi_i", "theta_i", "ndf", "sigma", "vndf", "luminance")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Measurement:
-    """A reflection in the adaptive coordinates of Dupuy and Jakob 2018, as their files have it.
+    """A reflection in the adaptive coordinates of Dupuy and Jakob 2018, as their files store it.
 
-    The viewer is at `phi_i`, `theta_i` [rad]; one azimuth: the material is isotropic. The halfway
-    direction lies at (sqrt(2 theta / pi), (phi + pi) / 2 pi) in the unit square, x over columns;
-    its phi is from the viewer's where the material is isotropic. `vndf` is a density there: a
-    `clpt.measured.warp` makes of a point of a second square a halfway direction. Over that second
-    square lie `spectra`, the reflected light f cos(theta) [1/sr] over ndf / (4 sigma), and
-    `luminance`, a density by which it is sampled. `jacobian`: whether `spectra` are over that, or
-    f cos(theta) itself.
+    The viewer is at `phi_i`, `theta_i` [rad]; with a single azimuth the material is isotropic. The
+    halfway direction lies at (sqrt(2 theta / pi), (phi + pi) / 2 pi) in the unit square, x over
+    columns; an isotropic material's phi counts from the viewer's. `vndf` is a density over this
+    square: `clpt.measured.warp` takes points of a second square to halfway directions. `spectra`
+    and `luminance` are tables over the second square: the reflected light f cos(theta) [1/sr],
+    divided by ndf / (4 sigma) if `jacobian`, and the density that samples it.
 
-    wavelengths: (n,) [nm]; () where `spectra` have three, of red, green and blue.
+    wavelengths: (n,) [nm]; () if `spectra` are red, green and blue.
 
     Raises SceneError for shapes that do not match, angles or wavelengths that do not ascend, and
     numbers that are negative or not finite.
@@ -51,11 +56,11 @@ class Measurement:
     description: str = ""
 
     def __post_init__(self) -> None:
-        given = dict(vars(self))
+        fields = dict(vars(self))
         for name in ("phi_i", "theta_i", "wavelengths"):
-            object.__setattr__(self, name, _ascending(name, given[name]))
+            object.__setattr__(self, name, _ascending(name, fields[name]))
         for name in AXES:
-            object.__setattr__(self, name, _table(name, given[name]))
+            object.__setattr__(self, name, _table(name, fields[name]))
         if not len(self.phi_i) or not len(self.theta_i):
             raise SceneError("'phi_i' and 'theta_i' must have an angle each, at least")
         if self.theta_i[0] < -1e-3 or self.theta_i[-1] > 0.5 * math.pi + 1e-3:
@@ -63,9 +68,9 @@ class Measurement:
         both = len(self.phi_i), len(self.theta_i)
         tables = {"vndf": self.vndf, "luminance": self.luminance, "spectra": self.spectra}
         for name, table in tables.items():
-            if (found := table.shape)[:2] != both:
+            if (shape := table.shape)[:2] != both:
                 raise SceneError(
-                    f"{name!r} is of {found[0]} x {found[1]} viewers, but 'phi_i' and 'theta_i'"
+                    f"{name!r} is of {shape[0]} x {shape[1]} viewers, but 'phi_i' and 'theta_i'"
                     f" of {both[0]} x {both[1]}"
                 )
         if self.spectra.shape[3:] != self.luminance.shape[2:]:
@@ -87,27 +92,74 @@ class Measurement:
 
     @property
     def reduction(self) -> int:
-        """The number of equal parts of the azimuths; only one part is stored."""
+        """The number of symmetric parts of the azimuths; the first is stored."""
         if self.isotropic:
             return 1
         return round(2.0 * math.pi / float(self.phi_i[-1] - self.phi_i[0]))
 
 
 def _ascending(name: str, values: ArrayLike) -> NDArray[Any]:
-    made = np.asarray(in_memory(values), np.float32)
-    if made.ndim != 1 or not np.isfinite(made).all() or not (np.diff(made) > 0.0).all():
+    numbers = np.asarray(in_memory(values), np.float32)
+    if numbers.ndim != 1 or not np.isfinite(numbers).all() or not (np.diff(numbers) > 0.0).all():
         raise SceneError(f"{name!r} must be finite numbers that ascend")
-    return made
+    return numbers
 
 
 def _table(name: str, values: ArrayLike) -> NDArray[Any]:
-    made = np.asarray(in_memory(values), np.float32)
-    if made.ndim != AXES[name].count(",") + 1:
-        raise SceneError(f"{name!r} must be {AXES[name]}, not {made.shape}")
-    if min(made.shape[-2:]) < 2 or not made.size:
-        raise SceneError(f"{name!r} must have two rows and columns at least, not {made.shape}")
-    if made.size > MOST_VALUES:
-        raise SceneError(f"{name!r} has {made.size:,} numbers; at most {MOST_VALUES:,} are read")
-    if not (np.isfinite(made) & (made >= 0.0)).all():
+    table = np.asarray(in_memory(values), np.float32)
+    if table.ndim != AXES[name].count(",") + 1:
+        raise SceneError(f"{name!r} must be {AXES[name]}, not {table.shape}")
+    if min(table.shape[-2:]) < 2 or not table.size:
+        raise SceneError(f"{name!r} must have two rows and columns at least, not {table.shape}")
+    if table.size > MOST_VALUES:
+        raise SceneError(f"{name!r} has {table.size:,} numbers; at most {MOST_VALUES:,} are read")
+    if not (np.isfinite(table) & (table >= 0.0)).all():
         raise SceneError(f"{name!r} has a number that is negative or not finite")
-    return made
+    return table
+
+
+def read(path: str | Path) -> Measurement:
+    """Read a measured material. Raises SceneError that names the wrong field."""
+    fields = tensor_file.read(path)
+    try:
+        return _measurement(fields)
+    except SceneError as error:
+        raise SceneError(error.message, file=Path(path)) from None
+
+
+def _measurement(fields: dict[str, np.ndarray]) -> Measurement:
+    colours = "spectra" if "spectra" in fields else "rgb"
+    needed = [*FILE_TABLES, colours, *(["wavelengths"] if colours == "spectra" else [])]
+    for name in needed:
+        if name not in fields:
+            known = ", ".join(map(repr, fields)) or "none"
+            raise SceneError(f"has no field {name!r}; it has {known}")
+        if fields[name].dtype.kind != "f":
+            raise SceneError(f"the field {name!r} must be of floats, not {fields[name].dtype}")
+    flag = fields.get("jacobian", np.ones(1, np.uint8))
+    if flag.size != 1:
+        raise SceneError(f"the field 'jacobian' must be one number, not {flag.shape}")
+    text = fields.get("description", np.zeros(0, np.uint8))
+    return Measurement(
+        **{name: fields[name] for name in FILE_TABLES},
+        spectra=fields[colours],
+        wavelengths=fields["wavelengths"] if colours == "spectra" else np.zeros(0),
+        jacobian=bool(flag.reshape(-1)[0]),
+        description=text.astype(np.uint8).tobytes().decode("utf8", "replace"),
+    )
+
+
+def write(path: str | Path, measurement: Measurement) -> None:
+    """Write a measured material, so that `read` returns it. Raises SceneError."""
+    spectral = len(measurement.wavelengths) > 0
+    fields = {
+        "description": np.frombuffer(measurement.description.encode(), np.uint8),
+        "jacobian": np.array([measurement.jacobian], np.uint8),
+        **{name: vars(measurement)[name] for name in FILE_TABLES},
+        **({"wavelengths": measurement.wavelengths} if spectral else {}),
+        "spectra" if spectral else "rgb": measurement.spectra,
+    }
+    try:
+        tensor_file.write(path, fields)
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error.strerror}", file=Path(path)) from None

@@ -1,8 +1,8 @@
 """Tables of MERL (Matusik et al. 2003): isotropic reflection by halfway and difference angles.
 
 A file `.binary` has three int32, by default 90 x 90 x 180, then float64 for red, green and blue:
-over the halfway direction's angle to the normal, whose root is in even steps, the angle from it to
-the light, and the azimuth of that, up to pi (Rusinkiewicz 1998).
+over the halfway direction's angle to the normal, in even steps of its root, the angle from halfway
+to the light, and the light's azimuth about halfway, up to pi (Rusinkiewicz 1998).
 """
 
 from __future__ import annotations
@@ -25,35 +25,35 @@ from clpt.measured.warp import sample, warp
 STEPS = (90, 90, 180)  # of the published files
 SCALES = np.array([1.0, 1.15, 1.66]) / 1500.0  # of the numbers in a file [1/sr]
 MOST_VALUES = 1 << 24
-VIEWERS, ROWS, COLUMNS = 16, 32, 64  # of the table by which light is sampled
-EVEN = 0.05  # share of light that is sampled by the cosine alone
+VIEWERS, ROWS, COLUMNS = 16, 32, 64  # of the table that samples light
+EVEN = 0.05  # share of the samples that follow the cosine alone
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MerlTable:
     """A reflection f [1/sr], (halfway, difference, azimuths, 3) float32, linear in between.
 
-    A number below 0 says that no light meets the surface so. Raises SceneError for another shape,
-    for numbers that are not finite, and where none is from 0 on.
+    A number below 0 marks directions below the horizon. Raises SceneError for another shape, for
+    numbers that are not finite, and if all are below 0.
     """
 
     values: NDArray[Any]
 
     def __post_init__(self) -> None:
-        made = np.asarray(in_memory(self.values), np.float32)
-        if made.ndim != 4 or made.shape[3] != 3 or min(made.shape) < 2:
-            raise SceneError(f"must be (halfway, difference, azimuths, 3), not {made.shape}")
-        if made.size > 3 * MOST_VALUES:
-            raise SceneError(f"has {made.size:,} numbers; at most {3 * MOST_VALUES:,} are read")
-        if not np.isfinite(made).all():
+        values = np.asarray(in_memory(self.values), np.float32)
+        if values.ndim != 4 or values.shape[3] != 3 or min(values.shape) < 2:
+            raise SceneError(f"must be (halfway, difference, azimuths, 3), not {values.shape}")
+        if values.size > 3 * MOST_VALUES:
+            raise SceneError(f"has {values.size:,} numbers; at most {3 * MOST_VALUES:,} are read")
+        if not np.isfinite(values).all():
             raise SceneError("has a number that is not finite")
-        if (made < 0.0).all():
+        if (values < 0.0).all():
             raise SceneError("has no number from 0 on")
-        object.__setattr__(self, "values", made)
+        object.__setattr__(self, "values", values)
 
 
 def read(path: str | Path) -> MerlTable:
-    """Read a table. Raises SceneError for what is none."""
+    """Read a table. Raises SceneError for another kind of file."""
     path = Path(path)
     data = input_files.read_bytes(path)
     shape = struct.unpack_from("<3i", data) if len(data) >= 12 else (0, 0, 0)
@@ -72,7 +72,7 @@ def read(path: str | Path) -> MerlTable:
 
 
 def write(path: str | Path, table: MerlTable) -> None:
-    """Write a table, so that `read` gives it back but for rounding. Raises SceneError."""
+    """Write a table, so that `read` returns it but for rounding. Raises SceneError."""
     numbers = np.moveaxis(table.values / SCALES, -1, 0).astype("<f8")
     head = struct.pack("<3i", *table.values.shape[:3])
     try:
@@ -82,7 +82,7 @@ def write(path: str | Path, table: MerlTable) -> None:
 
 
 def tabulate(f: Reflection, steps: tuple[int, int, int] = STEPS) -> MerlTable:
-    """Return the table of an isotropic f(wo, wi), which gives red, green and blue (n, 3) [1/sr]."""
+    """Return the table of an isotropic f(wo, wi), whose values (n, 3) are rgb [1/sr]."""
     at = [(np.arange(n) + 0.5) / n for n in steps]
     halfway, difference, phi = (axis.ravel() for axis in np.meshgrid(*at, indexing="ij"))
     halfway, difference, phi = 0.5 * np.pi * halfway**2, 0.5 * np.pi * difference, np.pi * phi
@@ -99,7 +99,7 @@ def tabulate(f: Reflection, steps: tuple[int, int, int] = STEPS) -> MerlTable:
 
 
 def filled(table: MerlTable) -> NDArray[Any]:
-    """The values; where no light meets the surface so, those nearer to the mirror's direction."""
+    """Return the values; below the horizon, the next value towards the mirror direction."""
     values = table.values.copy()
     for i in range(1, values.shape[1]):
         values[:, i] = np.where(values[:, i] < 0.0, values[:, i - 1], values[:, i])
@@ -107,34 +107,38 @@ def filled(table: MerlTable) -> NDArray[Any]:
 
 
 def densities(values: NDArray[Any]) -> tuple[Floats, Floats, Floats]:
-    """Return tables by which light is sampled.
+    """Return tables for sampling.
 
     They are angles of viewers (n,) [rad], densities over the square of halfway directions
-    (n, rows, columns), and the share of light (3,) that a viewer along the normal sees.
+    (n, rows, columns), and the reflectance (3,) towards a viewer along the normal. Each density is
+    the largest among its neighbours, so that no bright direction is missed.
 
-    values: of `filled`. Of the brightest of neighbours each, so that nothing bright is missed.
+    values: from `filled`.
     """
     x, y = grid(ROWS, COLUMNS)
     angles = 0.5 * np.pi * (np.arange(VIEWERS) / (VIEWERS - 0.75))
-    made = np.empty((VIEWERS, ROWS, COLUMNS))
+    tables = np.empty((VIEWERS, ROWS, COLUMNS))
     for i, theta in enumerate(angles):
         wo, light, solid = _seen(values, theta, x, y)
         brightness = (light.mean(axis=1) * solid).reshape(ROWS, COLUMNS)
         even = (np.maximum(wo, 0.0) * solid).reshape(ROWS, COLUMNS)
-        shares = [_widest(one) / max(one.mean(), 1e-30) for one in (brightness, even)]
-        made[i] = (1.0 - EVEN) * shares[0] + EVEN * shares[1]
+        shares = [
+            _widest(density_table) / max(density_table.mean(), 1e-30)
+            for density_table in (brightness, even)
+        ]
+        tables[i] = (1.0 - EVEN) * shares[0] + EVEN * shares[1]
     at = (np.arange(128) + 0.5) / 128
     v, u = (axis.ravel() for axis in np.meshgrid(at, at, indexing="ij"))
-    x, y, density = sample(warp(made[0]), u, v)
+    x, y, density = sample(warp(tables[0]), u, v)
     _, light, solid = _seen(values, 0.0, x, y)
     share = (light * (solid / np.maximum(density, 1e-30))[:, None]).mean(axis=0)
-    return angles, made, np.minimum(share, 1.0)
+    return angles, tables, np.minimum(share, 1.0)
 
 
 def _seen(
     values: NDArray[Any], theta: float, x: Floats, y: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """At halfway directions: cosine of wi, f cos (n, 3), solid angle over area of the square."""
+    """Return at halfway directions: cosine of wi, f cos (n, 3), solid angle over square's area."""
     wo = spherical(theta, 0.0)
     m = direction(x, y)
     cosine = m @ wo
@@ -146,7 +150,7 @@ def _seen(
 
 
 def _nearest(values: NDArray[Any], m: Floats, wo: Floats, wi: Floats) -> Floats:
-    """The table's nearest values (n, 3) at halfway directions m."""
+    """Return the table's nearest values (n, 3) at halfway directions m."""
     halfway = np.arctan2(np.hypot(m[:, 0], m[:, 1]), m[:, 2])
     difference = np.arctan2(np.linalg.norm(wi - wo, axis=1), np.linalg.norm(wi + wo, axis=1))
     turn = np.arctan2(m[:, 1], m[:, 0])
@@ -160,7 +164,7 @@ def _nearest(values: NDArray[Any], m: Floats, wo: Floats, wi: Floats) -> Floats:
 
 
 def _widest(values: Floats) -> Floats:
-    """The largest of each value and its eight neighbours; rows go around."""
+    """Return the largest of each value and its eight neighbours; rows are periodic."""
     rows = np.maximum(values, np.maximum(np.roll(values, 1, 0), np.roll(values, -1, 0)))
     padded = np.pad(rows, ((0, 0), (1, 1)), "edge")
     return np.maximum(rows, np.maximum(padded[:, 2:], padded[:, :-2]))

@@ -1,8 +1,8 @@
-"""Tensor files: named arrays in one binary file, as Dupuy and Jakob publish their measurements.
+"""Tensor files: named arrays in a binary file, as Dupuy and Jakob publish their measurements.
 
 "tensor_file\\0", two bytes of version (1, 0), the number of fields (u32); of each field its name
 (u16 length, then the letters), the number of axes (u16), the type (u8), where its values begin
-(u64) and its shape (u64 an axis). Numbers are little-endian. All of it is checked: a file may lie.
+(u64) and its shape (u64 an axis). Numbers are little-endian. The reader checks all of them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ TYPES = (
     "u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f2", "<f4", "<f8",
 )  # fmt: skip
 MOST_FIELDS, MOST_AXES = 256, 16
-ALIGNED = 8  # bytes at whose multiples values begin
+ALIGNED = 8  # [bytes] values begin at multiples
 
 
 def read(path: str | Path) -> dict[str, np.ndarray]:
@@ -77,7 +77,7 @@ def _fields(data: bytes) -> dict[str, np.ndarray]:
         if not 1 <= kind <= len(TYPES):
             raise SceneError(f"is damaged: the field {name!r} is of an unknown type ({kind})")
         dtype, size = np.dtype(TYPES[kind - 1]), math.prod(shape)
-        # of an empty field too: NumPy has no shape of larger numbers
+        # also an empty field must have a shape that NumPy can hold
         if max(offset + size * dtype.itemsize, *shape, 0) > len(data):
             raise SceneError(f"is damaged: the field {name!r} goes beyond its end")
         fields[name] = np.frombuffer(data, dtype, size, offset).reshape(shape)

@@ -1,7 +1,7 @@
-"""Warps: the unit square to itself, so that even points follow a density that is a bilinear table.
+"""Warps of the unit square that take uniform points to a bilinear density.
 
 A table is (..., rows, columns): x goes over the columns, y over the rows. Its leading axes are
-parameters, between which density and warp are linear (Dupuy and Jakob 2018, section 4.2).
+parameters; density and warp are linear in them (Dupuy and Jakob 2018, section 4.2).
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from clpt.arrays import Floats
 class Warp:
     """A density of integral 1, values (..., rows, columns), and its integrals.
 
-    across: (..., rows, columns), along a row up to a column, in steps of columns; down: (...,
-    rows), over all rows above, in the end 1.
+    across: (..., rows, columns), integrals along a row up to each column, in steps of columns;
+    down: (..., rows), integrals over the rows before; the last is 1.
     """
 
     values: Floats
@@ -28,13 +28,13 @@ class Warp:
 
 
 def warp(values: ArrayLike) -> Warp:
-    """Make a warp of values that are not negative; where all of a table are 0, it is even."""
-    given = np.asarray(values, np.float64)
-    given = np.where((given > 0.0).any(axis=(-2, -1), keepdims=True), given, 1.0)
-    across = _running(given)
+    """Return the warp of values from 0 up; a table of zeros becomes uniform."""
+    density = np.asarray(values, np.float64)
+    density = np.where((density > 0.0).any(axis=(-2, -1), keepdims=True), density, 1.0)
+    across = _running(density)
     down = _running(across[..., -1])
     whole = down[..., -1:]
-    return Warp(given / whole[..., None], across / whole[..., None], down / whole)
+    return Warp(density / whole[..., None], across / whole[..., None], down / whole)
 
 
 def _running(values: Floats) -> Floats:
@@ -43,7 +43,7 @@ def _running(values: Floats) -> Floats:
 
 
 def bilinear(table: Floats, x: Floats, y: Floats) -> Floats:
-    """Values (..., n) of a table (..., rows, columns) at points (n,) of the unit square."""
+    """Return values (..., n) of a table (..., rows, columns) at points (n,) of the unit square."""
     (column, s), (row, t) = _cell(x, table.shape[-1]), _cell(y, table.shape[-2])
     upper = table[..., row, column] * (1.0 - s) + table[..., row, column + 1] * s
     lower = table[..., row + 1, column] * (1.0 - s) + table[..., row + 1, column + 1] * s
@@ -57,7 +57,7 @@ def _cell(x: Floats, nodes: int) -> tuple[NDArray[np.int64], Floats]:
 
 
 def sample(of: Warp, u: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
-    """Take points (n,) of the unit square to x, y and their density, by one table."""
+    """Warp points (n,) of the unit square by a single table; return x, y and their density."""
     rows, columns = of.values.shape
     row = np.clip(np.searchsorted(of.down, v, "right") - 1, 0, rows - 2)
     ends = of.across[row, -1], of.across[row + 1, -1]
@@ -75,7 +75,7 @@ def sample(of: Warp, u: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _linear(u: Floats, a: Floats, b: Floats) -> Floats:
-    """x with density proportional to a (1 - x) + b x."""
+    """Return x with density proportional to a (1 - x) + b x."""
     u = np.clip(u, 0.0, 1.0)
     root = np.sqrt(a * a + u * (b * b - a * a))
     return np.where(a + root > 0.0, u * (a + b) / _above(a + root), u)

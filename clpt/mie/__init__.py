@@ -1,12 +1,10 @@
-"""Droplets and other small spheres: what light does in a cloud of them, by Mie's theory.
+"""Scattering by droplets and other small spheres, by Mie's theory.
 
-`droplets` makes a medium from indices and sizes; the others are its steps.
+`droplets` returns a medium from indices and sizes; the other functions are its steps.
 """
 
-from .droplets import DENSE, angles, droplets
-from .sizes import Sizes, sizes
+from .droplets import DENSE, Sizes, angles, droplets, sizes, water_index
 from .sphere import Spheres, spheres
-from .water import water_index
 
 __all__ = [
     "DENSE", "Sizes", "Spheres", "angles", "droplets", "sizes", "spheres", "water_index",

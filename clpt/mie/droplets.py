@@ -1,22 +1,117 @@
-"""A medium of small spheres, far from each other: fog, mist, milk."""
+"""A medium of small spheres, far from each other (fog, mist, milk): radii, water, medium.
+
+The index of water is by IAPWS 1997, release on the refractive index of ordinary water.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import scalars, spectra
+from clpt.choices import DROP_SIZES
 from clpt.errors import SceneError
-from clpt.mie.sizes import Sizes
 from clpt.mie.sphere import spheres
-from clpt.mie.water import water_index
 from clpt.scene.media import Homogeneous
 from clpt.scene.phases import Tabulated
 from clpt.spectra import Spectrum
 
-DENSE = 0.1  # share of the volume above which spheres do not scatter on their own
+DENSE = 0.1  # share of the volume above which spheres do not scatter independently
 WATER = "water"
-EVEN, FINE = 721, 100  # angles from 0 to 180 degrees, and more of them near either end
+EVEN, FINE = 721, 100  # angles from 0 to 180 degrees, and further angles near each end
+BEYOND = 1e-6  # share of the cross sections that is cut off at each end
+WIDEST = 2.0  # of `spread`: measured laws are narrower
+RANGE = (200.0, 1900.0)  # [nm] within which the release holds
+A = (
+    0.244257733, 9.74634476e-3, -3.73234996e-3, 2.68678472e-4,
+    1.58920570e-3, 2.45934259e-3, 0.900704920, -1.66626219e-2,
+)  # fmt: skip
+ULTRAVIOLET, INFRARED = 0.2292020, 5.432937
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Radii (s,) float64 [m], ascending, and the share of the spheres at each radius (s,)."""
+
+    radii: NDArray[np.float64]
+    shares: NDArray[np.float64]
+
+    def mean(self, power: int) -> float:
+        """Return the mean of a power of the radius [m^power]."""
+        return float(self.shares @ self.radii**power)
+
+
+def sizes(law: str, radius: float, spread: float = 0.0, count: int = 200) -> Sizes:
+    """Return radii and shares of a law of sizes.
+
+    law: "mono", all have `radius` [m]; "log_normal": `radius` is the median, `spread` the standard
+    deviation of the radius's logarithm; "gamma": `radius` and `spread` are the effective radius and
+    the effective variance of Hansen and Travis 1974, so that shares go as
+    r^(1 / spread - 3) exp(-r / (radius spread)). count: of radii.
+
+    Raises SceneError for another law, and for numbers outside the law's range.
+    """
+    if law not in DROP_SIZES:
+        raise SceneError(f"{law!r} is none of {', '.join(DROP_SIZES)}", where="law")
+    if not (np.isfinite(radius) and radius > 0.0):
+        raise SceneError(f"{radius:g} m; it must be above 0", where="radius")
+    if law == "mono":
+        return Sizes(np.array([radius], np.float64), np.ones(1))
+    most = 0.5 if law == "gamma" else WIDEST
+    if not 0.0 < spread < most:
+        raise SceneError(
+            f"{spread:g}; of the law {law!r} it is above 0 and below {most:g}", where="spread"
+        )
+    if count < 2:
+        raise SceneError("must be 2 or more", where="count")
+    # in s = ln(r / radius): the range keeps nearly all of the weight r^2
+    s = np.linspace(-12.0, 12.0, 48001)
+    if law == "log_normal":
+        exponent = -0.5 * (s / spread) ** 2
+    else:
+        exponent = (1.0 / spread - 2.0) * s - np.exp(s) / spread
+    weight = np.exp(exponent + 2.0 * s - np.max(exponent + 2.0 * s))
+    running = np.cumsum(weight) / weight.sum()
+    low, high = s[np.searchsorted(running, BEYOND)], s[np.searchsorted(running, 1.0 - BEYOND)]
+    at = low + (high - low) * (np.arange(count) + 0.5) / count
+    shares = np.exp(np.interp(at, s, exponent - exponent.max()))
+    return Sizes(radius * np.exp(at), shares / shares.sum())
+
+
+def water_index(
+    lambdas: ArrayLike, celsius: float = 15.0, density: float = 0.0
+) -> NDArray[np.float64]:
+    """Return the index of liquid water at wavelengths [nm] in vacuum, float64.
+
+    celsius: its temperature; density: [kg/m^3], 0 for water at 1 atm (Kell 1975). Raises
+    SceneError for a wavelength outside 200 to 1900 nm or water that is not liquid.
+    """
+    wavelengths = np.asarray(lambdas, np.float64)
+    if wavelengths.size and not (RANGE[0] <= wavelengths.min() and wavelengths.max() <= RANGE[1]):
+        raise SceneError(
+            f"of water it is known from {RANGE[0]:g} to {RANGE[1]:g} nm, not at"
+            f" {wavelengths.min():g} to {wavelengths.max():g} nm",
+            where="index",
+        )
+    if not -12.0 <= celsius <= 100.0:
+        raise SceneError(f"water of {celsius:g} C; it must be -12 to 100 C", where="celsius")
+    rho, t = (density or _density(celsius)) / 1000.0, (celsius + 273.15) / 273.15
+    square = (wavelengths / 589.0) ** 2
+    right = (
+        A[0] + A[1] * rho + A[2] * t + A[3] * square * t + A[4] / square
+        + A[5] / (square - ULTRAVIOLET**2) + A[6] / (square - INFRARED**2) + A[7] * rho**2
+    )  # fmt: skip
+    ratio = rho * right
+    return np.asarray(np.sqrt((1.0 + 2.0 * ratio) / (1.0 - ratio)))
+
+
+def _density(t: float) -> float:
+    """Return the density of water at 1 atm [kg/m^3] and `t` [C] (Kell 1975)."""
+    top = 999.83952 + t * (16.945176 + t * (-7.9870401e-3 + t * (
+        -46.170461e-6 + t * (105.56302e-9 - 280.54253e-12 * t))))  # fmt: skip
+    return top / (1.0 + 16.879850e-3 * t)
 
 
 def angles(size: float) -> NDArray[np.float64]:
@@ -29,7 +124,7 @@ def angles(size: float) -> NDArray[np.float64]:
     near = np.geomspace(min(least, 0.02), 0.3, FINE)
     theta = np.concatenate([np.linspace(0.0, np.pi, EVEN), near, np.pi - near])
     cosines = np.unique(np.round(np.cos(theta), 12))
-    apart = np.concatenate([[True], np.diff(cosines) > 2e-7])  # as float32 tells them
+    apart = np.concatenate([[True], np.diff(cosines) > 2e-7])  # float32 must distinguish them
     apart[-1] = apart[0] = True
     cosines = cosines[apart]
     cosines[0], cosines[-1] = -1.0, 1.0
@@ -55,10 +150,10 @@ def droplets(
 ) -> Homogeneous:
     """Return the medium of spheres that take a share of its volume.
 
-    of: their sizes; share: 1e-7 is .1 g of water in a cubic metre, 0.04 the fat of milk; index, k,
-    host: of the spheres, their absorption, and what is around, which does not absorb: a number, a
-    spectrum, the name of a glass or "water" (IAPWS 1997, 15 C); lambdas: [nm], by default every
-    10 nm from 360 to 830.
+    of: their sizes; share: 1e-7 is .1 g of water in a cubic metre, 0.04 the fat of milk; index, k:
+    refraction and absorption of the spheres; host: index around them, without absorption. Each is a
+    number, a spectrum, the name of a glass or "water" (IAPWS 1997, 15 C). lambdas: [nm], by
+    default every 10 nm from 360 to 830.
 
     The medium has sigma_t and albedo by wavelength, and a Tabulated phase function. Raises
     SceneError for a share above DENSE or not above 0, and as `spheres` does.
@@ -79,10 +174,10 @@ def droplets(
     number = share / (4.0 / 3.0 * np.pi * of.mean(3))
     area = number * of.shares * np.pi * of.radii**2
     for i, (wave, m) in enumerate(zip(waves, inside, strict=True)):
-        found = spheres(wave * of.radii, m, cosines)
-        own = area * found.scattering
-        sigma_t[i], scattered[i] = area @ found.extinction, own.sum()
-        rows[i] = own @ found.phase
+        scattering = spheres(wave * of.radii, m, cosines)
+        cross_sections = area * scattering.scattering
+        sigma_t[i], scattered[i] = area @ scattering.extinction, cross_sections.sum()
+        rows[i] = cross_sections @ scattering.phase
     albedo = np.clip(scattered / sigma_t, 0.0, 1.0)
     return Homogeneous(
         sigma_t=spectra.Tabulated(at, sigma_t, "hold"),

@@ -11,16 +11,16 @@ from clpt.arrays import Floats
 from clpt.errors import SceneError
 
 LARGEST = 2e4  # size parameter: 1 mm of radius at 315 nm
-BLOCK = 1 << 22  # numbers in the largest arrays that are made at a time
+BLOCK = 1 << 22  # numbers in the largest temporary arrays
 
 
 @dataclass(frozen=True)
 class Spheres:
-    """Efficiencies of s spheres, (s,) float64 each, and where they scatter.
+    """Efficiencies of s spheres, (s,) float64 each, and their phase functions.
 
     extinction, scattering, backscattering: cross sections over the sphere's; asymmetry: the mean
-    cosine. phase: (s, k) float64 [1/sr] at the cosines that were asked for, its integral over
-    directions is 1.
+    cosine. phase: (s, k) float64 [1/sr] at the requested cosines; its integral over directions is
+    1.
     """
 
     extinction: Floats
@@ -31,14 +31,14 @@ class Spheres:
 
 
 def spheres(size: ArrayLike, index: ArrayLike, cosines: ArrayLike = ()) -> Spheres:
-    """Return what spheres scatter of unpolarised light.
+    """Return the scattering of unpolarised light by spheres.
 
-    size: circumference over the wavelength in what is around (s,); index: that of the sphere over
-    that around (s,) complex, with an imaginary part from 0 up where it absorbs; one number stands
-    for all; cosines: (k,) of the angle by which light turns.
+    size: circumference over the wavelength in the host (s,); index: the sphere's over the host's
+    (s,) complex, with an imaginary part from 0 up for absorption; a single number holds for all
+    spheres; cosines: (k,) of the scattering angle.
 
-    Raises SceneError for a size that is not above 0 or above LARGEST, an index that is not above 0
-    or gives out light, and a cosine beyond -1 or 1.
+    Raises SceneError for a size that is not above 0 or above LARGEST, an index whose real part is
+    not above 0 or whose imaginary part is negative, and a cosine beyond -1 or 1.
     """
     x, m = np.broadcast_arrays(
         np.atleast_1d(np.asarray(size, np.float64)), np.asarray(index, np.complex128)
@@ -47,7 +47,7 @@ def spheres(size: ArrayLike, index: ArrayLike, cosines: ArrayLike = ()) -> Spher
     _check(x, m, mu)
     orders = np.ceil(x + 4.05 * np.cbrt(x) + 8.0).astype(int)
     a, b = np.zeros((2, len(x), int(orders.max(initial=1))), np.complex128)
-    for some in np.array_split(np.argsort(orders), max(1, len(x) // 64)):  # of about one size
+    for some in np.array_split(np.argsort(orders), max(1, len(x) // 64)):  # of about the same size
         most = int(orders[some].max(initial=1))
         a[some, :most], b[some, :most] = _coefficients(x[some], m[some], orders[some])
     n = np.arange(1, a.shape[1] + 1)
@@ -82,7 +82,7 @@ def _check(x: Floats, m: NDArray[np.complex128], mu: Floats) -> None:
 def _coefficients(
     x: Floats, m: NDArray[np.complex128], orders: NDArray[np.int_]
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """a_n and b_n (s, n) of the book's (4.88), from n = 1 on; those beyond a sphere's own are 0."""
+    """Return a_n and b_n (s, n) of the book's (4.88), from n = 1; 0 beyond a sphere's orders."""
     most, z = int(orders.max()), m * x
     d = np.zeros((most + 1, len(x)), np.complex128)  # logarithmic derivative: downward is stable
     running = np.zeros(len(x), np.complex128)
@@ -102,30 +102,30 @@ def _coefficients(
             before, psi = psi, factor * psi - before
             chi_before, chi = chi, factor * chi - chi_before
             xi, xi_before = psi - 1j * chi, before - 1j * chi_before
-            own = n <= orders
-            for made, part in ((a, d[n] / m + n / x), (b, d[n] * m + n / x)):
+            within_orders = n <= orders
+            for coefficients, part in ((a, d[n] / m + n / x), (b, d[n] * m + n / x)):
                 value = (part * psi - before) / (part * xi - xi_before)
-                made[:, n - 1] = np.where(own, value, 0.0)
+                coefficients[:, n - 1] = np.where(within_orders, value, 0.0)
     return a, b
 
 
 def _intensity(a: NDArray, b: NDArray, mu: Floats) -> Floats:
-    """|S1|^2 + |S2|^2 (s, k) of the book's (4.74)."""
-    made = np.zeros((len(a), len(mu)))
+    """Return |S1|^2 + |S2|^2 (s, k) of the book's (4.74)."""
+    intensity = np.zeros((len(a), len(mu)))
     step = max(1, BLOCK // (a.shape[1] + len(a)))
     n = np.arange(1, a.shape[1] + 1)
     weights = (2.0 * n + 1.0) / (n * (n + 1.0))
     for first in range(0, len(mu), step):
         some = mu[first : first + step]
         pi, tau = _angular(a.shape[1], some)
-        # of the sum and the difference, as the two polynomials are real
+        # the polynomials are real: sum and difference need half of the products
         plus, minus = (weights * (a + b)) @ (pi + tau), (weights * (a - b)) @ (pi - tau)
-        made[:, first : first + step] = 0.5 * (np.abs(plus) ** 2 + np.abs(minus) ** 2)
-    return made
+        intensity[:, first : first + step] = 0.5 * (np.abs(plus) ** 2 + np.abs(minus) ** 2)
+    return intensity
 
 
 def _angular(orders: int, mu: Floats) -> tuple[Floats, Floats]:
-    """pi_n and tau_n (n, k) of the book's (4.47), from n = 1 on."""
+    """Return pi_n and tau_n (n, k) of the book's (4.47), from n = 1."""
     pi, tau = np.zeros((2, orders, len(mu)))
     before, now = np.zeros_like(mu), np.ones_like(mu)
     for n in range(1, orders + 1):

@@ -1,4 +1,4 @@
-"""Ray queries on an application's own queue: what rays meet among triangles."""
+"""Ray queries on an application's queue: intersections of rays with triangles."""
 
 from .accel import Accel
 from .instanced import InstancedAccel

@@ -13,20 +13,20 @@ from .. import bvh
 from ..device import Buffers, Events, wait
 from ..errors import SceneError
 from . import batch
-from .arrays import ArrayInput, device_arg, on_device
+from .batch import ArrayInput, device_arg, on_device
 from .queries import AllHits, Queries
 
 
 class Accel(Queries):
-    """Triangles that rays can be sent at, on the caller's queue and in its context.
+    """Triangles for ray queries, on the caller's queue and in its context.
 
-    vertices: (n, 3) float32; faces: (m, 3) uint32 or int32. Arrays of numpy are copied. A PyOpenCL
-    array or buffer is not: the constructor reads it in place, and waits until that is done. Faces
-    on the device must stay as they are for as long as `update` is called. Values on the device are
-    not checked: a face that names no vertex reads outside of its buffer.
-    layout: "wide8", "compact" or "binary"; by default what suits the device. quality: "fast"
-    is built sooner and traced a little slower. wait_for: events that come first; those of PyOpenCL
-    arrays always do.
+    vertices: (n, 3) float32; faces: (m, 3) uint32 or int32. Arrays of numpy are copied. The
+    constructor reads a PyOpenCL array or buffer in place, and waits. Faces on the device must stay
+    unchanged as long as `update` is called. Values on the device are not checked: an index out of
+    range reads outside of its buffer.
+    layout: "wide8", "compact" or "binary"; by default the fastest for the device. quality: "fast"
+    builds faster and traces a little slower. wait_for: events to wait for; events of PyOpenCL
+    arrays are always awaited.
 
     moved: the event of the last update, None before the first.
 
@@ -57,11 +57,11 @@ class Accel(Queries):
         self.moved: cl.Event | None = None
 
     def update(self, vertices: ArrayInput, *, wait_for: Events = None) -> cl.Event:
-        """Enqueue that the triangles move: as many vertices as before, elsewhere; the faces stay.
+        """Enqueue a move of all vertices; their number and the faces stay.
 
-        Where they went far rays get slower; then make a new one. A triangle with a vertex that is
-        not finite is met by no ray until it has a better one. Leave arrays on the device alone
-        until the event. Raises SceneError for other numbers or types, DeviceError when closed.
+        After large moves rays get slower; then create a new Accel. No ray hits a triangle while a
+        vertex is not finite. Do not change arrays on the device before the event. Raises SceneError
+        for another number or type of vertices, DeviceError when closed.
         """
         with self._lock:
             self._opened()
@@ -85,10 +85,10 @@ class Accel(Queries):
         *,
         wait_for: Events = None,
     ) -> AllHits:
-        """All that each ray meets at t_min < t < t_max, by ray and then by distance.
+        """Return all hits of each ray at t_min < t < t_max, by ray and then by distance.
 
-        A ray meets each triangle at most once, and both triangles at an edge. The call
-        waits, since the number of hits is not known before; the rays are as for `intersect`.
+        A ray hits each triangle at most once, and both triangles at an edge. The call waits, since
+        the number of hits is unknown before. Rays: see `intersect`.
         """
         rays = batch.rays(*self._memory, origins, directions, t_min, t_max)
         with self._lock:
@@ -116,9 +116,9 @@ class Accel(Queries):
         self._wait(kernel, rays, arrays, outputs)
 
     def _input(self, name: str, values: ArrayInput, *kinds: type) -> tuple[Any, int]:
-        """An array (n, 3) of the host, or a buffer that holds nothing else; and n.
+        """Return an array (n, 3) of the host, or a buffer with only these values; and n.
 
-        The next command waits for the events of the array.
+        The next command waits for the array's events.
         """
         if not on_device(values):
             array = np.asarray(values)
@@ -126,9 +126,8 @@ class Accel(Queries):
                 return np.zeros((0, 3), kinds[0]), 0
             numbers = "fiu" if np.float32 in kinds else "iu"
             if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in numbers:
-                wanted = f"(n, 3) {np.dtype(kinds[0])}"
-                found = f"{array.shape} {array.dtype}"
-                raise SceneError(f"{wanted} is wanted, not {found}", where=name)
+                message = f"(n, 3) {np.dtype(kinds[0])} is wanted, not {array.shape} {array.dtype}"
+                raise SceneError(message, where=name)
             return array, len(array)
         argument = device_arg(self.queue.context, name, values, 3, *kinds)
         buffer, rows = argument.buffer, argument.rows
@@ -142,7 +141,7 @@ class Accel(Queries):
         return copy, rows
 
     def _upload(self, array: object, kind: type) -> Any:
-        """An array on the device, None for no values; a buffer is returned as it is."""
+        """Return a buffer with an array, None for no values; a buffer is returned unchanged."""
         if not isinstance(array, np.ndarray):
             return array
         return batch.wrap_host(self.queue.context, np.ascontiguousarray(array, kind), False).buffer

@@ -1,10 +1,10 @@
-"""A batch of rays as arguments of a kernel, and the arrays that its hits go to."""
+"""Rays and hits as arguments of kernels: numpy arrays, or PyOpenCL arrays used in place."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pyopencl as cl
@@ -14,16 +14,79 @@ from pyopencl.array import Array
 from .. import scalars
 from ..device import host_buffer
 from ..errors import SceneError
-from .arrays import ArrayInput, DeviceArg, device_arg, on_device, vectors
 
-Columns = Mapping[str, tuple[int, type]]  # of results: columns, 0 for one axis, and the type
+ArrayInput: TypeAlias = Any  # an array or sequence of numbers, a pyopencl Array, or a Buffer
+Columns = Mapping[str, tuple[int, type]]  # by result: columns, 0 for a single axis, and the type
+
+
+@dataclass
+class DeviceArg:
+    """Values on the device as a kernel's argument.
+
+    buffer: None for no values; rows: their number; offset: of the first in the buffer [elements];
+    events: to wait for before reading.
+    """
+
+    buffer: Any
+    rows: int
+    offset: int = 0
+    events: Sequence[cl.Event] = ()
+
+
+def on_device(array: ArrayInput) -> bool:
+    """Return whether an array is in device memory."""
+    return isinstance(array, (Array, cl.MemoryObjectHolder))
+
+
+def device_arg(
+    context: cl.Context, name: str, array: ArrayInput, columns: int, *dtypes: type
+) -> DeviceArg:
+    """Return an array on the device as an argument.
+
+    columns: of its rows, 0 for a single axis; dtypes: allowed dtypes, the first for buffers. Raises
+    SceneError, which names the argument and its actual shape and type.
+    """
+    if array.context != context:
+        raise SceneError("it belongs to another context than the queue", where=name)
+    size = np.dtype(dtypes[0]).itemsize
+    if not isinstance(array, Array):
+        rows, remainder = divmod(array.size, size * max(columns, 1))
+        if remainder:
+            raise _wrong(name, f"{array.size} bytes", columns, dtypes[0])
+        return DeviceArg(array, rows)
+    shape = array.shape
+    if len(shape) != (2 if columns else 1) or (columns and shape[1] != columns):
+        raise _wrong(name, shape, columns, dtypes[0])
+    if array.dtype.type not in dtypes:
+        raise _wrong(name, f"{shape} {array.dtype}", columns, dtypes[0])
+    if not array.flags.c_contiguous:
+        raise SceneError(f"its rows are not contiguous: {array.strides}", where=name)
+    return DeviceArg(array.base_data, shape[0], array.offset // size, array.events)
+
+
+def _wrong(name: str, actual: object, columns: int, dtype: type) -> SceneError:
+    wanted = f"(n, {columns})" if columns else "(n,)"
+    return SceneError(f"{wanted} {np.dtype(dtype)} is wanted, not {actual}", where=name)
+
+
+def vectors(name: str, array: ArrayInput) -> NDArray[np.float32]:
+    """Return an array of the host as C-contiguous (n, 3) float32; a vector becomes a row."""
+    try:
+        rows = np.atleast_2d(np.asarray(array, np.float32))
+    except (TypeError, ValueError) as error:
+        raise SceneError(f"it is no array of numbers: {error}", where=name) from error
+    if rows.size == 0:
+        return np.zeros((0, 3), np.float32)
+    if rows.ndim != 2 or rows.shape[1] != 3:
+        raise _wrong(name, np.shape(array), 3, np.float32)
+    return np.ascontiguousarray(rows)
 
 
 @dataclass(frozen=True)
 class Rays:
     """Rays on the device.
 
-    from_host: whether origins and directions came from the host, which then waits for the hits;
+    from_host: whether origins and directions are on the host, which then waits for the hits;
     arguments: of the kernel by name; arrays: origins, directions, t_min and t_max.
     """
 
@@ -41,9 +104,9 @@ def rays(
     t_min: ArrayInput,
     t_max: ArrayInput,
 ) -> Rays:
-    """Return a batch as arguments, checked, with copies of what is on the host. Raises SceneError.
+    """Check a batch and return it as arguments, with copies of host arrays. Raises SceneError.
 
-    shares: whether the device works in the host's memory, so that nothing needs to be copied.
+    shares: whether the device uses the host's memory, so that no copy is needed.
     """
     both = {"origins": origins, "directions": directions}
     from_host = not any(map(on_device, both.values()))
@@ -53,18 +116,18 @@ def rays(
         else vectors(name, array)
         for name, array in both.items()
     }
-    lengths = [one.rows if isinstance(one, DeviceArg) else len(one) for one in checked.values()]
+    lengths = [a.rows if isinstance(a, DeviceArg) else len(a) for a in checked.values()]
     count = max(lengths) if min(lengths) else 0
     arrays: dict[str, DeviceArg] = {}
-    for name, one in checked.items():
-        if not isinstance(one, DeviceArg):
-            whole = np.repeat(one, count, 0) if len(one) == 1 else one
-            one = wrap_host(context, whole, from_host and shares)
-        if one.rows != count:
+    for name, argument in checked.items():
+        if not isinstance(argument, DeviceArg):
+            repeated = np.repeat(argument, count, 0) if len(argument) == 1 else argument
+            argument = wrap_host(context, repeated, from_host and shares)
+        if argument.rows != count:
             message = f"{lengths[0]} origins have {lengths[1]} directions"
             raise SceneError(message, where="directions")
-        arrays[name] = one
-    arguments: dict[str, Any] = {name: one.buffer for name, one in arrays.items()}
+        arrays[name] = argument
+    arguments: dict[str, Any] = {name: a.buffer for name, a in arrays.items()}
     for name, limit in (("t_min", t_min), ("t_max", t_max)):
         each = _limits(context, name, limit, count, from_host and shares)
         arrays[name] = each or DeviceArg(None, count)
@@ -78,7 +141,7 @@ def rays(
 def _limits(
     context: cl.Context, name: str, limit: ArrayInput, count: int, shared: bool
 ) -> DeviceArg | None:
-    """Where each ray begins or ends; None if one number holds for all."""
+    """Return a limit of each ray's interval; None for a common number."""
     if on_device(limit):
         each = device_arg(context, name, limit, 0, np.float32)
     elif np.ndim(limit) == 0:
@@ -93,8 +156,8 @@ def _limits(
 def wrap_host(context: cl.Context, array: NDArray[Any], shared: bool) -> DeviceArg:
     """Return an array of the host as an argument.
 
-    shared: the kernel works in the array itself, which the caller keeps until the kernel has ended;
-    otherwise in a copy.
+    shared: the kernel uses the array in place, and the caller keeps it until the kernel has ended;
+    otherwise a copy.
     """
     if not array.size:
         return DeviceArg(None, len(array))
@@ -107,9 +170,9 @@ def wrap_host(context: cl.Context, array: NDArray[Any], shared: bool) -> DeviceA
 def results(
     queue: cl.CommandQueue, count: int, columns: Columns, out: Mapping[str, Any]
 ) -> tuple[dict[str, Array], dict[str, DeviceArg]]:
-    """Return arrays on the device for the hits of `count` rays, and as arguments.
+    """Return arrays on the device for the hits of `count` rays, and their arguments.
 
-    Those in `out` are used again. Raises SceneError if one of them does not fit.
+    Arrays in `out` are reused. Raises SceneError if an array does not fit.
     """
     arrays: dict[str, Array] = {}
     arguments: dict[str, DeviceArg] = {}
@@ -129,7 +192,7 @@ def results(
 def host_results(
     context: cl.Context, shares: bool, count: int, columns: Columns
 ) -> tuple[dict[str, NDArray[Any]], dict[str, DeviceArg]]:
-    """Return the same on the host, for a kernel that is waited for."""
+    """Return arrays on the host for the hits of `count` rays, and their arguments."""
     arrays: dict[str, NDArray[Any]] = {
         name: np.empty((count, width) if width else count, kind)
         for name, (width, kind) in columns.items()
@@ -138,5 +201,5 @@ def host_results(
 
 
 def offsets(arrays: Sequence[DeviceArg]) -> tuple[int, ...]:
-    """Return the kernels' `begins`: the offsets of eight arrays, 0 where there are fewer."""
+    """Return the kernels' `begins`: offsets of eight arrays, padded with 0."""
     return (*(array.offset for array in arrays), *[0] * (8 - len(arrays)))

@@ -1,4 +1,4 @@
-"""Many copies of meshes, each with its own transform, in one structure."""
+"""An acceleration structure over instances of meshes with transforms."""
 
 from __future__ import annotations
 
@@ -13,24 +13,23 @@ from ..device import Buffers, Events
 from ..errors import SceneError
 from ..records import INSTANCE
 from .accel import Accel
-from .arrays import ArrayInput, DeviceArg, device_arg, on_device
-from .batch import wrap_host
+from .batch import ArrayInput, DeviceArg, device_arg, on_device, wrap_host
 from .queries import Queries
 
 _ADVICE = "use fewer instances or smaller meshes"
 
 
 class InstancedAccel(Queries):
-    """Instances of meshes that rays can be sent at, on the caller's queue.
+    """Instances of meshes for ray queries, on the caller's queue.
 
-    accels: the meshes, in one context and of one layout; their trees are copied, so a mesh that
-    moves no more may be closed. prototypes: (k,) which mesh each instance is; transforms: (k, 4, 4)
+    accels: the meshes, with a common context and layout; their trees are copied, so a mesh may be
+    closed after its last move. prototypes: (k,) the mesh of each instance; transforms: (k, 4, 4)
     float32 from the mesh to the world, numpy or a PyOpenCL array. The `primitive` of a hit counts
     in its mesh, and `instance` is the instance; t is in units of the world's direction. wait_for:
-    events of the caller that come first.
+    the caller's events to wait for.
 
-    Raises SceneError for meshes that do not fit together, and for a transform that is singular or
-    moves a mesh beyond 1e12.
+    Raises SceneError for meshes of different contexts or layouts, and for a transform that is
+    singular or moves a mesh beyond 1e12.
     """
 
     instanced = True
@@ -50,7 +49,7 @@ class InstancedAccel(Queries):
         self.count = len(which) if which.ndim == 1 else 0
         self._check(which)
         buffers = Buffers(self.device)
-        sizes = np.array([[one.buffers[n].size for n in ("nodes", "leaves")] for one in accels])
+        sizes = np.array([[mesh.buffers[n].size for n in ("nodes", "leaves")] for mesh in accels])
         self._offsets = np.cumsum(sizes, axis=0) - sizes
         self._tree_buffers = {
             name: buffers.allocate("the trees of instances", int(whole), _ADVICE)
@@ -68,7 +67,7 @@ class InstancedAccel(Queries):
         self._stream.after(wait_for)
         self._copy_trees(range(len(accels)))
         self._transforms = self._input(transforms)
-        self.tree = self._built(buffers)
+        self.tree = self._build_tree(buffers)
         self._refitting = bvh.Building(self.device, stream=self._stream)
         self._trees = {
             **self._tree_buffers,
@@ -76,8 +75,8 @@ class InstancedAccel(Queries):
             "instances": self._arrays["instances"],
         }
 
-    def _built(self, buffers: Buffers) -> bvh.Bvh:
-        """Place the instances, and return the tree over them. Raises SceneError."""
+    def _build_tree(self, buffers: Buffers) -> bvh.Bvh:
+        """Compute the instances' boxes, and return the tree over them. Raises SceneError."""
         self._place_instances()
         boxes = self._arrays["boxes"]
         corners = self._stream.read(boxes, np.empty((self.count, 2, 3), np.float32))
@@ -93,42 +92,42 @@ class InstancedAccel(Queries):
         return tree
 
     def update(self, transforms: ArrayInput | None = None, *, wait_for: Events = None) -> cl.Event:
-        """Enqueue that instances move, and that meshes are as their `update` left them.
+        """Enqueue moves of instances, and of meshes after their `update`.
 
-        transforms: (k, 4, 4) float32, those before by default; leave an array on the device alone
-        until the event. An instance whose transform is singular is met by no ray.
+        transforms: (k, 4, 4) float32, by default the former; do not change an array on the device
+        before the event. No ray hits an instance with a singular transform.
         """
         with self._lock:
             self._opened()
             self._stream.after(wait_for)
             if transforms is not None:
                 self._transforms = self._input(transforms)
-            moved = [i for i, one in enumerate(self.accels) if one.moved is not self._moved[i]]
+            moved = [i for i, mesh in enumerate(self.accels) if mesh.moved is not self._moved[i]]
             self._copy_trees(moved)
             self._place_instances()
             bvh.refit_boxes(self._refitting, self.tree, self._arrays["boxes"])
             return self._stream.mark()
 
     def close(self) -> None:
-        """Give the device's memory back; the meshes are left alone."""
+        """Free the device's memory, except the meshes'."""
         super().close()
         self._arrays.clear()
         self._tree_buffers.clear()
 
     def _check(self, which: np.ndarray) -> None:
-        """Raise SceneError if the parts do not fit together."""
-        for i, one in enumerate(self.accels):
-            if one.layout != self.layout or one.queue.context != self.queue.context:
+        """Raise SceneError for meshes of another context or layout, or wrong prototypes."""
+        for i, mesh in enumerate(self.accels):
+            if mesh.layout != self.layout or mesh.queue.context != self.queue.context:
                 raise SceneError("it has another layout or context", where=f"accels[{i}]")
         if not self.count or which.dtype.kind not in "iu":
-            message = f"one whole number or more is wanted, not {which.shape} {which.dtype}"
+            message = f"whole numbers (k,) with k > 0 are wanted, not {which.shape} {which.dtype}"
             raise SceneError(message, where="prototypes")
         if which.min() < 0 or which.max() >= len(self.accels):
             message = f"{which.max()} is none of {len(self.accels)} meshes"
             raise SceneError(message, where="prototypes")
 
     def _input(self, transforms: ArrayInput) -> DeviceArg:
-        """Transforms as an argument, checked; the next command waits for their events."""
+        """Check transforms and return them as an argument; the next command awaits their events."""
         if on_device(transforms):
             shape = getattr(transforms, "shape", ())
             flat = transforms.reshape(-1, 16) if shape[1:] == (4, 4) else transforms
@@ -147,16 +146,16 @@ class InstancedAccel(Queries):
         return argument
 
     def _copy_trees(self, numbers: Sequence[int]) -> None:
-        """Enqueue that the trees of meshes are copied into those of all."""
+        """Enqueue copies of meshes' trees into the common buffers."""
         for i in numbers:
-            one = self.accels[i]
-            self._stream.after([one.moved] if one.moved else None)
-            self._moved[i] = one.moved
+            mesh = self.accels[i]
+            self._stream.after([mesh.moved] if mesh.moved else None)
+            self._moved[i] = mesh.moved
             for name, offset in zip(("nodes", "leaves"), self._offsets[i].tolist(), strict=True):
-                self._stream.copy(self._tree_buffers[name], one.buffers[name], dst_offset=offset)
+                self._stream.copy(self._tree_buffers[name], mesh.buffers[name], dst_offset=offset)
 
     def _place_instances(self) -> None:
-        """Enqueue rows and boxes of all instances."""
+        """Enqueue the computation of all instances' rows and boxes."""
         bound = self._bind(
             "place_instances",
             {

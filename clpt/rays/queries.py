@@ -30,7 +30,7 @@ from ..device import (
 from ..errors import DeviceError, SceneError
 from ..records import INSTANCE, QUERY_SIZES
 from . import batch
-from .arrays import ArrayInput, DeviceArg
+from .batch import ArrayInput, DeviceArg
 
 _GROUP = 64  # rays of a work-group
 _BATCH = QUERY_SIZES["rays"]  # rays of a work-item
@@ -39,10 +39,10 @@ _HITS: batch.Columns = {
     "primitive": (0, np.int32),
     "barycentrics": (2, np.float32),
 }
-_ONE_BY_ONE, _INTERLEAVED = "bvh/query.cl", "bvh/query_interleaved.cl"
-_PROGRAMS = {  # of a kernel: its program, and whether it finds all triangles that a ray meets
-    "query_closest": (_ONE_BY_ONE, False),
-    "query_occluded": (_ONE_BY_ONE, False),
+_SEQUENTIAL, _INTERLEAVED = "bvh/query.cl", "bvh/query_interleaved.cl"
+_PROGRAMS = {  # by kernel: its program, and whether it finds all hits of a ray
+    "query_closest": (_SEQUENTIAL, False),
+    "query_occluded": (_SEQUENTIAL, False),
     "query_count": ("bvh/query_all_hits.cl", True),
     "query_all_hits": ("bvh/query_all_hits.cl", True),
     "place_instances": ("bvh/place.cl", False),
@@ -53,12 +53,12 @@ _Self = TypeVar("_Self", bound="Queries")
 
 @dataclass(frozen=True)
 class Hits:
-    """The first hits of rays, in arrays of numpy or PyOpenCL as the rays were.
+    """The first hits of rays, in numpy or PyOpenCL arrays like the rays.
 
-    t: (n,) float32 in units of the direction, inf where nothing is met; primitive: (n,) int32 row
-    of `faces`, -1 where nothing is met; barycentrics: (n, 2) float32 of the face's second and third
-    vertex; instance: (n,) int32, or -1, and None for meshes without instances; event: after which
-    the arrays are valid.
+    t: (n,) float32 in units of the direction, inf without a hit; primitive: (n,) int32 row of
+    `faces`, -1 without a hit; barycentrics: (n, 2) float32 of the face's second and third vertex;
+    instance: (n,) int32, -1 without a hit, None for meshes without instances; event: the arrays
+    are valid after it.
     """
 
     t: Any
@@ -70,9 +70,9 @@ class Hits:
 
 @dataclass(frozen=True)
 class AllHits:
-    """All that rays meet, by ray and then by distance, in numpy arrays.
+    """All hits of rays, by ray and then by distance, in numpy arrays.
 
-    ray: (k,) int64, which one; t: (k,) float32; primitive: (k,) int32; barycentrics: (k, 2)
+    ray: (k,) int64 number of the ray; t: (k,) float32; primitive: (k,) int32; barycentrics: (k, 2)
     float32, see `Hits`.
     """
 
@@ -85,18 +85,18 @@ class AllHits:
 class Queries:
     """The queries of an acceleration structure.
 
-    Every method may be called from any thread; calls on one object run one after the other.
+    Any thread may call the methods; calls of an object run in turn.
     """
 
     instanced = False
 
     def __new__(cls, queue: object = None, *_: Any, **__: Any) -> Queries:
         if not isinstance(queue, cl.CommandQueue):  # before Python counts the other arguments
-            found = f"its first argument is a pyopencl.CommandQueue, not {type(queue).__name__}"
+            problem = f"its first argument is a pyopencl.CommandQueue, not {type(queue).__name__}"
             advice = "clpt.device.choose().queue is one"
             if hasattr(queue, "vertices") and hasattr(queue, "faces"):
                 advice += f"; of a mesh, {cls.__name__}(queue, mesh.vertices, mesh.faces)"
-            raise TypeError(f"{cls.__name__}: {found}; {advice}")
+            raise TypeError(f"{cls.__name__}: {problem}; {advice}")
         return super().__new__(cls)
 
     def __init__(self, queue: cl.CommandQueue, layout: str | None):
@@ -122,13 +122,13 @@ class Queries:
         out: Hits | None = None,
         wait_for: Events = None,
     ) -> Hits:
-        """Return the first hit of each ray, at t_min < t < t_max but for a rounding.
+        """Return the first hit of each ray, at t_min < t < t_max within rounding.
 
         origins, directions: (n, 3) float32, directions of any length; t_min, t_max: numbers or (n,)
-        float32. If origins or directions are on the device, so are the hits, and all is only
-        enqueued: leave the arrays alone until the event. Otherwise it waits, and hits are numpy's.
-        A single vector of the host stands for all rays. Rays that are not finite or have no
-        direction meet nothing. out: hits of as many rays on the device, to be written again.
+        float32. If origins or directions are on the device, so are the hits, and the call returns
+        at once: do not change the arrays before the event. Otherwise it waits and returns numpy
+        arrays. A single vector of the host counts for all rays. Rays that are not finite or have no
+        direction hit nothing. out: hits of as many rays on the device, to be overwritten.
 
         Raises SceneError for arrays of wrong shapes or types, DeviceError when closed.
         """
@@ -148,10 +148,10 @@ class Queries:
         out: Array | None = None,
         wait_for: Events = None,
     ) -> Any:
-        """Whether each ray meets anything at t_min < t < t_max: (n,) uint8, 1 or 0.
+        """Return whether each ray hits anything at t_min < t < t_max: (n,) uint8, 1 or 0.
 
-        Quicker than `intersect`, otherwise like it; an array on the device is valid when the last
-        of its `events` is. out: such an array to be written again.
+        Faster than `intersect`, otherwise like it; an array on the device is valid after its last
+        event. out: such an array, to be overwritten.
         """
         before = {} if out is None else {"met": out}
         rays = batch.rays(*self._memory, origins, directions, t_min, t_max)
@@ -160,15 +160,15 @@ class Queries:
 
     @property
     def buffers(self) -> dict[str, cl.Buffer]:
-        """The trees, by the names of BVH_ARGS in `clpt.kernel_source("bvh")`, for own kernels.
+        """The trees, by the names of BVH_ARGS in `clpt.kernel_source("bvh")`, for custom kernels.
 
-        They stay the same when the triangles move. Raises DeviceError when closed.
+        The buffers stay when triangles move. Raises DeviceError when closed.
         """
         with self._lock:
             return dict(self._opened())
 
     def close(self) -> None:
-        """Give the device's memory back; arrays of the caller are left alone."""
+        """Free the device's memory, except the caller's arrays."""
         with self._lock:
             for buffer in (self._trees or {}).values():
                 buffer.release()
@@ -194,7 +194,7 @@ class Queries:
         out: Mapping[str, Any],
         wait_for: Events,
     ) -> tuple[Mapping[str, Any], cl.Event]:
-        """Enqueue a kernel, and wait for it if rays are the host's; its results and its event."""
+        """Enqueue a kernel, wait if rays are on the host, and return its results and its event."""
         with self._lock:
             self._opened()
             if rays.from_host:
@@ -217,18 +217,18 @@ class Queries:
         arrays: Mapping[str, NDArray[Any]],
         outputs: Mapping[str, DeviceArg],
     ) -> cl.Event:
-        """Run a kernel that writes arrays of the host."""
+        """Run a kernel that writes arrays of the host; wait for it."""
         event = self._enqueue(name, rays, outputs)
         for key, array in arrays.items():
-            if array.size:  # onto itself, where the device works in the host's memory
+            if array.size:  # a copy to itself if the device uses the host's memory
                 event = self._stream.read_later(outputs[key].buffer, array)
         wait(event)
-        if rays.count:  # the kernel lets go of the host's memory
+        if rays.count:  # drop the kernel's references to host memory
             self._kernels[name].set_args(**dict.fromkeys([*_RAY_ARRAYS, *outputs]))
         return event
 
     def _enqueue(self, name: str, rays: batch.Rays, outputs: Mapping[str, DeviceArg]) -> cl.Event:
-        """Enqueue a kernel for every ray, after the events of its arrays."""
+        """Enqueue a kernel for all rays, after the events of its arrays."""
         arrays = [*rays.arrays, *outputs.values()]
         self._stream.after([event for array in arrays for event in array.events])
         if not rays.count:
@@ -246,7 +246,7 @@ class Queries:
         return self._stream.run(bound, (-(-rays.count // _GROUP) * _GROUP,), (_GROUP,))
 
     def _bind(self, name: str, arguments: Mapping[str, Any]) -> BoundKernel:
-        """A kernel with its arguments, made once."""
+        """Return a kernel with its arguments; create it on first use."""
         bound = self._kernels.get(name)
         if bound is None:
             bound = self._kernels[name] = self._program(name).kernel(name).bind(**arguments)
@@ -255,7 +255,6 @@ class Queries:
         return bound
 
     def _program(self, kernel: str) -> Program:
-        """The program of a kernel, for the layout."""
         root, all_hits = self._root_of(kernel), _PROGRAMS[kernel][1]
         texts: Virtual = {
             "generated/layout.cl": traversal_text(self.layout, all_hits),
@@ -273,10 +272,9 @@ class Queries:
         return build(self.device, assemble(root, texts, defines))
 
     def _root_of(self, kernel: str) -> str:
-        """The file of the program that has a kernel."""
         root = _PROGRAMS[kernel][0]
-        return _INTERLEAVED if self._interleaved and root == _ONE_BY_ONE else root
+        return _INTERLEAVED if self._interleaved and root == _SEQUENTIAL else root
 
     def _instances_text(self) -> str:
-        """Return the text that traversal of instances includes."""
+        """Return the generated text for the traversal of instances."""
         return ""

@@ -1,4 +1,4 @@
-"""Ray queries for trimesh: the methods of its own `mesh.ray`, with the same results.
+"""Ray queries for trimesh: the methods of `mesh.ray`, with the same results.
 
 >>> mesh.ray = clpt.rays.trimesh_ray.RayMeshIntersector(mesh)
 """
@@ -20,8 +20,8 @@ from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.rays import Accel
 
-ROUNDING = 1e-6  # of the reach, by which a ray may miss an edge and still meet what shares it
-SAME = 1e-10  # of the reach, by which points of edges differ that are one
+ROUNDING = 1e-6  # of the reach: the largest distance of a ray to an edge that it hits
+SAME = 1e-10  # of the reach: the largest distance of equal points on edges
 CHUNK = 1 << 17  # hits compared at a time: they take 1 kB each
 GRAZING = 1e-9  # cosine below which the plane of a triangle does not locate a hit
 
@@ -38,12 +38,12 @@ class _DeviceMesh:
 class RayMeshIntersector:
     """Answers ray queries about a `trimesh.Trimesh`, also as its attribute `ray`.
 
-    queue: a `pyopencl.CommandQueue` to run on; by default that of the first device that works. The
-    tree is built on first use, and again when the mesh has changed. The mesh is translated to the
-    origin in float64 first, so that its coordinates may be large; hits are located in float64.
+    queue: a `pyopencl.CommandQueue`; by default of the first working device. The tree is built on
+    first use, and again after changes of the mesh. The mesh is first translated to the origin in
+    float64, so that its coordinates may be large; hits are located in float64.
     scale_to_box: a parameter of trimesh's intersector, without effect.
 
-    Raises SceneError for an object that is not a Trimesh. A copy of the mesh has trimesh's own
+    Raises SceneError for an object that is not a Trimesh. A copy of the mesh has trimesh's
     intersector.
     """
 
@@ -58,9 +58,9 @@ class RayMeshIntersector:
     def intersects_location(
         self, ray_origins: ArrayLike, ray_directions: ArrayLike, multiple_hits: bool = True
     ) -> tuple[Floats, Integers, Integers]:
-        """Where rays meet the surface: locations (k, 3), index_ray (k,), index_tri (k,).
+        """Return intersections: locations (k, 3), index_ray (k,), index_tri (k,).
 
-        The parameters are those of `intersects_id`.
+        Parameters: see `intersects_id`.
         """
         index_tri, index_ray, locations = self.intersects_id(
             ray_origins, ray_directions, multiple_hits, return_locations=True
@@ -75,11 +75,11 @@ class RayMeshIntersector:
         max_hits: int = 100,
         return_locations: bool = False,
     ) -> tuple[NDArray[Any], ...]:
-        """Which triangles rays meet: index_tri (k,), index_ray (k,), and locations (k, 3) if asked.
+        """Return hits: index_tri (k,), index_ray (k,), and locations (k, 3) if requested.
 
         ray_origins, ray_directions: (n, 3), directions of any length. multiple_hits: all hits of a
-        ray, up to max_hits, ray by ray in the order of their distance; else the first. A ray
-        through an edge or a corner meets one of the triangles there that face it alike.
+        ray, up to max_hits, ray by ray in the order of distance; else the first. At an edge or a
+        corner only one of the triangles that face the ray alike counts.
 
         Raises SceneError for arrays of other shapes.
         """
@@ -96,8 +96,8 @@ class RayMeshIntersector:
             cosines, distances = self._planes(triangles, origins[rays], directions[rays], t)
         if multiple_hits:
             order = np.lexsort((distances, rays))
-            again = self._again(rays, triangles, cosines < 0, order, origins, directions)
-            order = order[~again]
+            duplicate = self._duplicates(rays, triangles, cosines < 0, order, origins, directions)
+            order = order[~duplicate]
             rays, triangles, distances = rays[order], triangles[order], distances[order]
             few = np.arange(len(rays)) - np.searchsorted(rays, rays) < max_hits
             rays, triangles, distances = rays[few], triangles[few], distances[few]
@@ -106,19 +106,19 @@ class RayMeshIntersector:
         return triangles, rays, origins[rays] + distances[:, None] * directions[rays]
 
     def intersects_first(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> Integers:
-        """Return the triangle that each ray meets first: (n,), -1 for none."""
+        """Return the first triangle of each ray: (n,), -1 without a hit."""
         scaled = self._scaled(*_rays(ray_origins, ray_directions))
         return self._on_device.accel.intersect(*scaled).primitive.astype(np.int64)
 
     def intersects_any(
         self, ray_origins: ArrayLike, ray_directions: ArrayLike
     ) -> NDArray[np.bool_]:
-        """Return whether each ray meets anything: (n,)."""
+        """Return whether each ray hits anything: (n,)."""
         scaled = self._scaled(*_rays(ray_origins, ray_directions))
         return np.asarray(self._on_device.accel.occluded(*scaled), np.bool_)
 
     def contains_points(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether points (n, 3) are inside of a closed mesh, by rays from them."""
+        """Return whether points (n, 3) are inside a closed mesh, by rays from the points."""
         points = _floats(points, "points")
         if points.ndim != 2 or points.shape[1] != 3:
             raise SceneError(f"(n, 3) is wanted, not {points.shape}", where="points")
@@ -128,7 +128,7 @@ class RayMeshIntersector:
 
     @cache_decorator  # type: ignore[untyped-decorator]
     def _on_device(self) -> _DeviceMesh:
-        """The mesh on the device; a power of two scales without rounding."""
+        """The mesh on the device, scaled by a power of two, which does not round."""
         empty = not len(self.mesh.faces)
         size = 1.0 if empty else float(self.mesh.scale)
         scale = 2.0 ** -round(math.log2(size)) if 0 < size < math.inf else 1.0
@@ -143,7 +143,7 @@ class RayMeshIntersector:
     def _planes(
         self, triangles: Integers, origins: Floats, directions: Floats, t: NDArray[np.float32]
     ) -> tuple[Floats, Floats]:
-        """n . d, and the distance to the triangle's plane; t where the ray is parallel to it."""
+        """Return n . d, and the distance to the triangle's plane; t for parallel rays."""
         normals = self.mesh.face_normals[triangles]
         corners = self.mesh.vertices[self.mesh.faces[triangles, 0]]
         cosines = (normals * directions).sum(axis=1)
@@ -154,7 +154,7 @@ class RayMeshIntersector:
         )
         return cosines, distances
 
-    def _again(
+    def _duplicates(
         self,
         rays: Integers,
         triangles: Integers,
@@ -163,16 +163,16 @@ class RayMeshIntersector:
         origins: Floats,
         directions: Floats,
     ) -> NDArray[np.bool_]:
-        """Return for each hit in `order` whether a hit before it is at the same edge or corner.
+        """Return for each hit in `order` whether an earlier hit is at the same edge or corner.
 
-        The device finds all triangles that share an edge or a corner which the ray meets: of those
-        that face it alike the first counts. Triangles are not compared by their distance, for other
-        surfaces may be as near.
+        The device finds all triangles around an edge or a corner on the ray. Among triangles that
+        face the ray alike the first counts. Distances are not compared, since other surfaces may
+        be as near.
         """
-        again = np.zeros(len(order), np.bool_)
+        duplicate = np.zeros(len(order), np.bool_)
         key = 2 * rays[order] + facing[order]
         places = np.flatnonzero(_shared(key))
-        found = []
+        chunks = []
         for some in np.split(places, range(CHUNK, len(places), CHUNK)):
             hits = order[some]
             o, d = origins[rays[hits]], directions[rays[hits]]
@@ -180,8 +180,8 @@ class RayMeshIntersector:
             corners = np.asarray(self.mesh.vertices)[np.asarray(self.mesh.faces)[triangles[hits]]]
             at, near = _borders(corners - o[:, None], d, ROUNDING * reach)
             there = near.any(axis=1)
-            found.append((some[there], at[there], near[there], reach[there]))
-        places, at, near, reach = (np.concatenate(part) for part in zip(*found, strict=True))
+            chunks.append((some[there], at[there], near[there], reach[there]))
+        places, at, near, reach = (np.concatenate(part) for part in zip(*chunks, strict=True))
         together = np.argsort(key[places], kind="stable")
         places, at, near, reach = places[together], at[together], near[together], reach[together]
         for step in range(1, len(places)):
@@ -192,11 +192,11 @@ class RayMeshIntersector:
             apart = np.linalg.norm(at[first, :, None] - at[second, None], axis=3)
             both = near[first, :, None] & near[second, None]
             same = (both & (apart < SAME * reach[first, None, None])).any(axis=(1, 2))
-            again[places[second[same]]] = True
-        return again
+            duplicate[places[second[same]]] = True
+        return duplicate
 
     def __getstate__(self) -> dict[str, Any]:
-        """Only the mesh: an unpickled intersector has the default queue."""
+        """Return the mesh only: an unpickled intersector has the default queue."""
         return {"mesh": self.mesh}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -207,7 +207,7 @@ class RayMeshIntersector:
 
 
 def _rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Floats]:
-    """Rays (n, 3) in float64, directions of unit length or zero. Raises SceneError."""
+    """Return rays (n, 3) in float64, with unit or zero directions. Raises SceneError."""
     o, d = _floats(origins, "rays"), _floats(directions, "rays")
     if not o.size and not d.size:
         return np.zeros((0, 3)), np.zeros((0, 3))
@@ -226,10 +226,10 @@ def _floats(values: ArrayLike, where: str) -> Floats:
 def _borders(
     corners: Floats, directions: Floats, rounding: Floats
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Where rays pass the edges of triangles: the points (n, 3, 3), and whether within rounding.
+    """Return rays' nearest points on triangles' edges (n, 3, 3), and whether within rounding.
 
     corners: (n, 3, 3) relative to the rays' origins; directions: (n, 3) unit; rounding: (n,). A
-    point within rounding of a corner is that corner.
+    point within rounding of a corner becomes the corner.
     """
     edges = np.roll(corners, -1, axis=1) - corners
     d = directions[:, None]
@@ -245,6 +245,6 @@ def _borders(
 
 
 def _shared(keys: Integers) -> NDArray[np.bool_]:
-    """Whether others have the same key (n,)."""
+    """Return whether a key occurs more than once (n,)."""
     _, inverse, counts = np.unique(keys, return_inverse=True, return_counts=True)
     return np.asarray(counts[inverse] > 1)

@@ -23,8 +23,7 @@ from clpt.render.edit.scene_edit import MaterialKey, ShapeKey
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
 from clpt.render.film.layer_channels import write_picture
-from clpt.render.film.picture_form import PictureForm
-from clpt.render.film.pictures import Pictures
+from clpt.render.film.pictures import PictureForm, Pictures
 from clpt.render.film.saved_film import (
     classes_text,
     other_devices,
@@ -420,14 +419,14 @@ class FilmRenderer(FilmOwner, Pictures):
         return maker
 
     @synchronized
-    def _developed(self, *words: str) -> Developed:
-        """Return the pictures of the film as it is now, which then stay; see `Pictures`."""
-        return Developed(self._brought().words(*words), self._form)
+    def developed(self, *words: str) -> Developed:
+        """Wait for the film; return its present pictures; see `Pictures.developed`."""
+        return Developed(self._brought().words(*words), self.form)
 
     @property
     @synchronized
-    def _form(self) -> PictureForm:  # type: ignore[override]
-        """The way from the film's words to a picture."""
+    def form(self) -> PictureForm:  # type: ignore[override]
+        """The form of the picture."""
         form = self._maker.home.form
         with_noise = form.adaptive or self._known.adaptive is not None
         return dataclasses.replace(form, adaptive=with_noise)

@@ -69,7 +69,7 @@ class ResumableRenderer(FilmRenderer):
 
         Raises SceneError for a file that cannot be written: the former one is then as it was.
         """
-        saved = self._saved_film()
+        saved = self.saved_film()
         try:
             film_file.write(path, saved)
         except OSError as error:
@@ -124,7 +124,7 @@ class ResumableRenderer(FilmRenderer):
 
     @synchronized
     def _hold(self) -> None:
-        """Keep a copy of the film where it is, as it is now, for `_saved_film`.
+        """Keep a copy of the film where it is, as it is now, for `saved_film`.
 
         So a render that is stopped in the middle of a `run` can be saved as it was before: without
         samples that some pixels have and others have not. Raises MemoryBudgetError.
@@ -136,12 +136,12 @@ class ResumableRenderer(FilmRenderer):
             raise
         except Exception as error:
             log.debug("a film cannot be held where it is: %s", error)
-            self._held = self._saved_film()
+            self._held = self.saved_film()
         else:
             self._held = held, so_far
 
     @synchronized
-    def _saved_film(self, *, held: bool = False) -> SavedFilm:
+    def saved_film(self, *, held: bool = False) -> SavedFilm:
         """Return the film with all that it takes to go on with it; wait for the device.
 
         held: as it was at the last `_hold`. Raises SceneError for a scene that cannot be read,
@@ -165,7 +165,7 @@ class ResumableRenderer(FilmRenderer):
             if held.taken != self._known.taken:
                 message = f"a device has failed that had a part of the film: {error}"
                 raise SceneError(message) from error
-        return self._saved_film()  # nothing was added since
+        return self.saved_film()  # nothing was added since
 
     def _progress(self) -> dict[str, Any]:
         """Return what a saved film has beside its words, counts and origin."""
@@ -179,7 +179,7 @@ class ResumableRenderer(FilmRenderer):
         return {"sessions": (*now.sessions, *sessions), "adaptive": arrays}
 
     def _saved(self, film: FilmState, counts: Counts, so_far: dict[str, Any]) -> SavedFilm:
-        return SavedFilm(film, self._origin(), self._form, dict(vars(counts)), **so_far)
+        return SavedFilm(film, self._origin(), self.form, dict(vars(counts)), **so_far)
 
     def _emptied(self, *, seed: int | None = None, recover: bool = False) -> Contents:
         emptied = super()._emptied(seed=seed, recover=recover)

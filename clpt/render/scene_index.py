@@ -9,16 +9,14 @@ from typing import Any
 from clpt.geometry import instancing, shapes
 from clpt.geometry.instancing import Placed, Prototype
 from clpt.geometry.motion import Motions
-from clpt.render.camera import find as cameras
-from clpt.render.film import filters
 from clpt.render.records import GridFeatures, custom_materials
 from clpt.scene import Film, Scene
 from clpt.scene import materials as mt
-from clpt.scene.cameras import Camera, Lens
+from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Auto, Direct, Integrator, ParticleTracer, Path, Vcm
 from clpt.scene.layers import LAYERS
 from clpt.scene.lights import Light
-from clpt.scene.media import Grid, Lattice, Medium, Mixture
+from clpt.scene.media import Grid, Medium
 from clpt.scene.phases import LEAVES
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
@@ -107,12 +105,12 @@ class SceneIndex:
         media, emitting = self.media, self.emitting
         grids = [medium for medium in media if isinstance(medium, Grid)]
         return GridFeatures(
-            present=any(isinstance(medium, Lattice) for medium in media),
-            emissive=any(isinstance(medium, Lattice) for medium in emitting),
+            present=any(medium.lattice is not None for medium in media),
+            emissive=any(medium.lattice is not None for medium in emitting),
             hot=any(one.temperature is not None for one in emitting if isinstance(one, Grid)),
             tinted=any(one.albedo_grid is not None for one in grids),
             coloured=any(one.color_grid is not None for one in grids),
-            mixed=max((len(one.parts) for one in media if isinstance(one, Mixture)), default=0),
+            mixed=max((len(medium.parts) for medium in media if medium.is_mixture), default=0),
             bytes=any(one.bits == 8 for one in grids),
         )
 
@@ -154,8 +152,8 @@ class SceneIndex:
     def lit_ghosts(self) -> bool:
         """Whether light paths are ghosts of the lens, of light straight from lights."""
         camera, integrator, before = self.scene.camera, self.scene.integrator, self.lit_before
-        wanted = isinstance(camera, Lens) and camera.ghosts > 0.0
-        ghosts = isinstance(camera, Lens) and (wanted if before is None else before)
+        wanted = camera.has_ghosts
+        ghosts = camera.traced_lens is not None and (wanted if before is None else before)
         alone = isinstance(integrator, (Path, Direct)) and not integrator.guiding
         return ghosts and alone and not self.light_layers and not self.emitting
 
@@ -180,9 +178,9 @@ class SceneIndex:
     def joined(self) -> bool:
         """Whether paths that start at lights are joined to the camera."""
         if not isinstance(self.scene.integrator, Vcm):
-            return cameras.is_connected(self.scene.camera, self.scene.film.mode)
+            return self.scene.camera.is_connected(self.mode)
         wanted = self.scene.integrator.light_tracing
-        return wanted and cameras.is_connected(self.scene.camera, self.scene.film.mode)
+        return wanted and self.scene.camera.is_connected(self.mode)
 
     @property
     def merged(self) -> bool:
@@ -223,13 +221,13 @@ class SceneIndex:
         film = self.scene.film
         wanted = film.filtering != "importance" and self.scene.noise is None
         wanted = wanted and not self.light_layers
-        reaches = filters.reach(film.filter) > 0 and wanted
+        reaches = film.filter.reach > 0 and wanted
         return reaches or self.light_paths
 
     @property
     def spread(self) -> tuple[int, int]:
         """The spread of light along an axis [pixels]: how many it may serve, and how far away."""
-        return filters.taps(self.scene.film.filter), filters.reach(self.scene.film.filter)
+        return self.film.filter.taps, self.film.filter.reach
 
     @property
     def filter_taps(self) -> int:

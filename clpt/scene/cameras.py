@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from dataclasses import InitVar, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from clpt import lenses, transforms
+from clpt import lenses, spectra, transforms
+from clpt.arrays import fits_single
 from clpt.errors import SceneError
 from clpt.lenses import Prescription
+from clpt.lenses.focusing import MARGIN, FocusedLens, focused_lens
 from clpt.scene import roles
 from clpt.scene.media import Medium
 from clpt.scene.motion import Keys, Shutter
 from clpt.scene.params import Kind, Shorthand, choice, flag, host, index, real
 from clpt.scene.roles import Param
 from clpt.scene.values import IndexLike, Matrix4, Vector3
+from clpt.spectra import Constant, Spectrum
 
 MOST_BLADES = 24
+DESIGN_WAVELENGTH = 587.56  # [nm], the helium line d, at which a lens's focal length is given
 
 
 def _looking(
@@ -42,9 +49,29 @@ LOOK_AT = Shorthand(
 )
 
 
+@dataclass(frozen=True)
+class View:
+    """The view from one point.
+
+    origin: the point (3,) [m]; axis: from it to the film's middle (3,), unit length; width: of the
+    film at a distance of 1 m [m]; angle: between the axis and the film's corners [rad].
+    """
+
+    origin: NDArray[np.float64]
+    axis: NDArray[np.float64]
+    width: float
+    angle: float
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Camera(Kind):
-    """Base of all cameras."""
+    """Base of all cameras.
+
+    A kind whose record holds `to_world` and `extent` sees from the one point of that matrix.
+    """
+
+    connects: ClassVar[bool] = False  # whether light paths can be joined to the camera
+    has_axis: ClassVar[bool] = False  # whether the layers z and motion have a meaning
 
     shorthands: ClassVar[tuple[Shorthand, ...]] = (LOOK_AT,)
     if TYPE_CHECKING:  # arguments only: they stand for `to_world`
@@ -59,17 +86,184 @@ class Camera(Kind):
         None, "when the film gets light; None: at 0 s only", form="shutter"
     )
 
+    @property
+    def dispersive_glasses(self) -> tuple[Spectrum, ...]:
+        """The different indices of refraction of its glasses that depend on the wavelength."""
+        return ()
+
+    @property
+    def reflects(self) -> bool:
+        """Whether surfaces of its lens reflect a part of the light."""
+        return False
+
+    @property
+    def has_ghosts(self) -> bool:
+        """Whether samples follow light that two surfaces of its lens reflect."""
+        return False
+
+    @property
+    def traced_lens(self) -> Lens | None:
+        """The lens whose surfaces its rays pass one by one; None if it has a formula instead."""
+        return None
+
+    def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
+        """Return the members of its record in `clpt.render.records.camera_rows` by name.
+
+        A traced lens has only those that need no table. width, height: of the film [pixels].
+        Raises SceneError for planes, a matrix, a glass or a lens that cannot be used.
+        """
+        raise NotImplementedError
+
+    def checked_members(self, width: int, height: int) -> dict[str, Any]:
+        """Return `record_members`; raise SceneError for a value beyond float32."""
+        members = self.record_members(width, height)
+        for name, value in members.items():
+            if not fits_single(value):
+                raise SceneError("is beyond float32, 3.4e38", where=f"{self.kind}.{name}")
+        return members
+
+    def view_point(self, width: int, height: int) -> NDArray[np.float64]:
+        """Return the point (3,) [m] from which it sees, before `motion`.
+
+        A camera without such a point returns the middle of its film, a lens its front. width,
+        height: of the film [pixels].
+        """
+        return np.asarray(self.checked_members(width, height)["to_world"], np.float64)[:3, 3]
+
+    def view_of(self, width: int, height: int) -> View | None:
+        """Return its view in the middle of the shutter; None if it does not see from one point.
+
+        width, height: of the film [pixels].
+        """
+        members = self.checked_members(width, height)
+        if not {"to_world", "extent"} <= members.keys():
+            return None
+        matrix, extent = members["to_world"], members["extent"]
+        if self.motion is not None:
+            shutter = self.shutter or Shutter(0.0, 0.0)
+            matrix = self.motion.at((shutter.open + shutter.close) / 2.0) @ matrix
+        return View(matrix[:3, 3], matrix[:3, 2], extent[0], math.atan(math.hypot(*extent) / 2.0))
+
+    def half_height(self, aspect: float) -> float:
+        """Return half the height of the film at a distance of 1, or across parallel rays [m].
+
+        aspect: the film's width over its height. 1 for a camera without a film in front of it.
+        """
+        return 1.0
+
+    def pixel_camera(self, width: int, height: int, x: int, y: int) -> Camera | None:
+        """Return a camera whose film of one pixel is the pixel (x, y) of a film; None if none is.
+
+        width, height: of the film [pixels].
+        """
+        return None
+
+    def moved(self, motion: NDArray[np.float64]) -> Camera:
+        """Return the camera after a motion of the world (4, 4) that takes it along."""
+        return dataclasses.replace(self, to_world=motion @ np.asarray(self.to_world, float))
+
+    def enlarged(self, factor: float) -> Camera | None:
+        """Return a camera of parallel rays with a film `factor` as wide; None for other cameras."""
+        return None
+
+    def is_connected(self, mode: str) -> bool:
+        """Return whether light paths can be joined to it, in the mode of a film."""
+        return self.connects and (mode == "rgb" or not self.dispersive_glasses)
+
+    def affine_matrix(self) -> NDArray[np.float64]:
+        """Return `to_world`. Raises SceneError if it has no inverse, or projects."""
+        matrix = self._invertible("to_world", self.to_world)
+        if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+            raise SceneError("its last row must be 0 0 0 1", where=f"{self.kind}.to_world")
+        return matrix
+
+    def rigid_matrix(self) -> NDArray[np.float64]:
+        """Return `to_world`. Raises SceneError also if it scales or shears: angles would change."""
+        matrix = self.affine_matrix()
+        linear = matrix[:3, :3]
+        if not np.allclose(linear.T @ linear, np.eye(3), atol=1e-3):
+            raise SceneError("must not scale or shear", where=f"{self.kind}.to_world")
+        return matrix
+
+    def _invertible(self, name: str, values: Matrix4) -> NDArray[np.float64]:
+        where = f"{self.kind}.{name}"
+        try:
+            matrix = np.asarray(values, np.float64)
+        except (TypeError, ValueError):
+            matrix = np.zeros(0)
+        if matrix.shape != (4, 4):
+            raise SceneError("must be a 4x4 matrix", where=where)
+        if transforms.is_singular(matrix) or not fits_single(matrix):
+            raise SceneError("must have an inverse and be finite", where=where)
+        return matrix
+
+
+def _check_planes(camera: Perspective | Orthographic) -> None:
+    if not camera.near < camera.far:
+        message = f"near must be below far, not {camera.near:g} and {camera.far:g}"
+        raise SceneError(message, where=camera.kind)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Perspective(Camera):
     """A pinhole."""
 
+    connects: ClassVar[bool] = True
+    has_axis: ClassVar[bool] = True
+
     fov: float = real(45.0, "field of view along `fov_axis`", "degrees", 1e-3, 179.999)
     fov_axis: str = choice("x", "which side `fov` spans", ("x", "y", "smaller", "larger"))
     near: float = real(1e-2, "nearest distance seen", "m", low=0.0)
     far: float = real(1e4, "farthest distance seen", "m", low=0.0)
-    offset_x: float = real(0.0, "of the principal point, in widths of the film")
-    offset_y: float = real(0.0, "of the principal point, in heights of the film")
+    offset_x: float = real(
+        0.0, "the principal point lies at 1/2 less this from the left, in widths of the film"
+    )
+    offset_y: float = real(
+        0.0, "the principal point lies at 1/2 less this from the top, in heights of the film"
+    )
+
+    def extent(self, width: float, height: float) -> tuple[float, float]:
+        """Return width and height of the film at a distance of 1 m [m].
+
+        width, height: of the film [pixels]. All that depends on the field of view follows from it.
+        """
+        side = 2.0 * np.tan(np.radians(self.fov) / 2.0)
+        smaller, larger = ("x", "y") if width <= height else ("y", "x")
+        if width == height:
+            larger = "x"
+        axis = {"smaller": smaller, "larger": larger}.get(self.fov_axis, self.fov_axis)
+        pixel = side / (width if axis == "x" else height)
+        return pixel * width, pixel * height
+
+    def half_height(self, aspect: float) -> float:
+        """Return half the height of the film at a distance of 1 m [m]."""
+        return 0.5 * float(self.extent(aspect, 1.0)[1])
+
+    def pixel_camera(self, width: int, height: int, x: int, y: int) -> Camera | None:
+        """Return a camera that sees a pixel alone; None if the pixel's angle is too small."""
+        wanted = np.array(self.extent(width, height)) / [width, height]
+        fov = math.degrees(2.0 * math.atan(0.5 * wanted[0]))
+        if fov < 1e-3:
+            return None
+        pixel = dataclasses.replace(
+            self,
+            fov=fov,
+            fov_axis="x",
+            offset_x=0.5 - width * (0.5 - self.offset_x) + x,
+            offset_y=0.5 - height * (0.5 - self.offset_y) + y,
+        )
+        return pixel if np.allclose(pixel.extent(1, 1), wanted, rtol=1e-6, atol=0.0) else None
+
+    def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
+        """Return its matrix, the film's extent at a distance of 1 m, and its planes."""
+        _check_planes(self)
+        return {
+            "to_world": self.rigid_matrix(),
+            "extent": list(self.extent(width, height)),
+            "offset": [self.offset_x, self.offset_y],
+            "near": self.near,
+            "far": self.far,
+        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,6 +279,28 @@ class ThinLens(Perspective):
         1.5, "of the lens; one that disperses focuses each wavelength elsewhere"
     )
     focal_length: float = real(0.05, "of the lens at 587.56 nm; matters to `glass`", "m", low=1e-6)
+
+    @property
+    def dispersive_glasses(self) -> tuple[Spectrum, ...]:
+        """The index of its glass if it depends on the wavelength."""
+        glass: Any = self.glass
+        index_ = spectra.index(glass)
+        return () if isinstance(index_, Constant) else (index_,)
+
+    def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
+        """Return the members of a pinhole, its aperture, and its refractive power."""
+        glass = self.dispersive_glasses
+        power = float(glass[0].sample(DESIGN_WAVELENGTH)) - 1.0 if glass else 1.0
+        if power < 1e-3:
+            message = f"its index must be above 1, not {power + 1.0:.4g}"
+            raise SceneError(message, where="thin_lens.glass")
+        return {
+            **super().record_members(width, height),
+            "aperture_radius": self.aperture_radius,
+            "focus_distance": self.focus_distance,
+            "focal_length": self.focal_length,
+            "power": power,
+        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,6 +345,49 @@ class Lens(Camera):
         return self.losses or self.ghosts > 0.0
 
     @property
+    def has_ghosts(self) -> bool:
+        """Whether `ghosts` gets a share of the samples."""
+        return self.ghosts > 0.0
+
+    @property
+    def traced_lens(self) -> Lens:
+        """This camera."""
+        return self
+
+    @property
+    def dispersive_glasses(self) -> tuple[Spectrum, ...]:
+        """The different indices of its glasses that depend on the wavelength."""
+        glasses = (surface.glass for surface in self.prescription.surfaces)
+        return tuple(dict.fromkeys(glass for glass in glasses if not isinstance(glass, Constant)))
+
+    def focused(self, aspect: float) -> FocusedLens:
+        """Return its lens at its f-number and focus; aspect: of the film, height over width.
+
+        Raises SceneError for a lens that cannot be used.
+        """
+        unit = self.unit
+        radius = MARGIN * 0.5 * self.film_width * math.hypot(1.0, aspect) / unit
+        return focused_lens(
+            self.prescription, self.f_number, self.focus_distance / unit, self.film_shift / unit,
+            radius,
+        )  # fmt: skip
+
+    def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
+        """Return its matrix, the film's extent [m] and its distance from the lens [m]."""
+        matrix, lens = self.rigid_matrix(), self.focused(height / width)
+        extent = [self.film_width, self.film_width * height / width]
+        return {"to_world": matrix, "extent": extent, "back": lens.back * self.unit}
+
+    def view_of(self, width: int, height: int) -> None:
+        """Return None: each point of the film has its own pupil."""
+
+    def view_point(self, width: int, height: int) -> NDArray[np.float64]:
+        """Return the point (3,) [m] where its axis meets its front: light enters there."""
+        lens = self.focused(height / width)
+        front = [0.0, 0.0, (lens.back + lens.prescription.length) * self.unit]
+        return np.asarray(transforms.transform_points(self.rigid_matrix(), front), np.float64)
+
+    @property
     def prescription(self) -> Prescription:
         """Its surfaces, from the library if `lens` is a name. Raises SceneError."""
         if isinstance(self.lens, str):
@@ -142,8 +401,32 @@ class Lens(Camera):
 class Orthographic(Camera):
     """Parallel rays along +z; the film spans [-1, 1] in x, scaled by `to_world`."""
 
+    has_axis: ClassVar[bool] = True
+
     near: float = real(1e-2, "nearest distance seen", "m", low=0.0)
     far: float = real(1e4, "farthest distance seen", "m", low=0.0)
+
+    def half_height(self, aspect: float) -> float:
+        """Return half the height of the film [m]."""
+        return float(np.linalg.norm(np.asarray(self.to_world, float)[:3, 1])) / aspect
+
+    def pixel_camera(self, width: int, height: int, x: int, y: int) -> Camera:
+        """Return a camera that sees a pixel alone."""
+        centre = [1.0 - (2 * x + 1) / width, (height - (2 * y + 1)) / width, 0.0]
+        scale = np.diag([1.0 / width, 1.0 / width, 1.0, 1.0])
+        matrix = np.asarray(self.to_world, float) @ transforms.translate(centre) @ scale
+        return dataclasses.replace(self, to_world=matrix)
+
+    def enlarged(self, factor: float) -> Camera:
+        """Return the camera with a film `factor` as wide and as high."""
+        scale = np.diag([factor, factor, 1.0, 1.0])
+        return dataclasses.replace(self, to_world=np.asarray(self.to_world, float) @ scale)
+
+    def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
+        """Return its matrix, the film's aspect and its planes."""
+        _check_planes(self)
+        planes = {"near": self.near, "far": self.far}
+        return {"to_world": self.affine_matrix(), "aspect": height / width, **planes}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -154,6 +437,10 @@ class Spherical(Camera):
     pi i / (h - 1), from pole to pole: a film of few rows that becomes one is stretched by half a
     row at the poles, by 3 % of the height with 16 rows and nothing to see with 1024.
     """
+
+    def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
+        """Return its matrix."""
+        return {"to_world": self.rigid_matrix()}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -169,5 +456,44 @@ class Matrix(Camera):
     view: Matrix4 = host(np.eye(4), "world to eye, (4, 4), eye space looks along -z")
     projection: Matrix4 = host(np.eye(4), "eye to clip, (4, 4)")
 
+    def moved(self, motion: NDArray[np.float64]) -> Camera:
+        """Return the camera after a motion of the world (4, 4) that takes it along."""
+        view = np.asarray(self.view, float) @ np.linalg.inv(motion)
+        return dataclasses.replace(self, view=view)
+
+    def pixel_camera(self, width: int, height: int, x: int, y: int) -> Camera:
+        """Return a camera that sees a pixel alone."""
+        zoom = np.eye(4)
+        zoom[0, 0], zoom[0, 3] = width, width - (2 * x + 1)
+        zoom[1, 1], zoom[1, 3] = height, (2 * y + 1) - height
+        return dataclasses.replace(self, projection=zoom @ np.asarray(self.projection, float))
+
+    def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
+        """Return a ray's direction and its homogeneous near point, both affine in film x and y.
+
+        A clip point at depth z comes from p(z) = A + z B with A = M (x, y, 0, 1) and
+        B = M (0, 0, 1, 0), where M is the inverse. The derivative of p.xyz / p.w by z is a positive
+        multiple of B A.w - A B.w, which does not depend on z. So no far plane is needed, and large
+        terms cancel here in float64.
+        """
+        projection = self._invertible("projection", self.projection)
+        forward = projection @ self._invertible("view", self.view)
+        if transforms.is_singular(forward):
+            raise SceneError("projection @ view must have an inverse", where="matrix.projection")
+        x, y, b, a = np.linalg.inv(forward).T
+        scale = 1.0 / np.abs(np.stack([x, y, b, a])).max()  # keeps tiny scenes off float32's limits
+        x, y, b, a = x * scale, y * scale, b * scale, a * scale
+        parts = [b[:3] * column[3] - column[:3] * b[3] for column in (a, x, y)]
+        length = max(np.linalg.norm(parts[0]), 1e-300)
+        names = ("direction", "direction_x", "direction_y")
+        directions = {name: part / length for name, part in zip(names, parts, strict=True)}
+        return {**directions, "near": a - b, "near_x": x, "near_y": y}
+
+    def view_point(self, width: int, height: int) -> NDArray[np.float64]:
+        """Return the middle (3,) [m] of its near plane."""
+        near = np.asarray(self.checked_members(width, height)["near"], np.float64)
+        return near[:3] / near[3]
+
 
 KINDS = (Perspective, ThinLens, Lens, Orthographic, Spherical, Matrix)
+CONNECTED = tuple(camera.kind for camera in KINDS if camera.connects)

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, TypeAlias, cast
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -43,6 +43,7 @@ ARRAYS: dict[str, DTypeLike] = {  # how the lowering reads what a host parameter
     "rows2": np.float32, "rows3": np.float32, "rows4": np.float32, "normals": np.float32,
     "attributes": np.float32, "grid": np.float32, "triangles": np.uint32, "lengths": np.int64,
 }  # fmt: skip
+NAMELESS = (bool, int, float, type(None), np.ndarray, np.generic)  # hold no name of a file
 FILES = ("image", "cube_images")  # forms of host parameters that may name files
 PIECE = 1 << 20  # bytes of a file that are read at once
 
@@ -177,21 +178,21 @@ def named_files(whole: object) -> set[str]:
     """Return the paths of the files that the images of a scene, or of a part, are read from."""
     found: set[str] = set()
     seen: dict[int, object] = {}
-    waiting = [(whole, "")]
+    waiting: list[tuple[Any, str]] = [(whole, "")]
     while waiting:
         thing, form = waiting.pop()
-        if isinstance(thing, (str, os.PathLike)):
-            if form in FILES:
-                found.add(os.fspath(thing))
-        elif id(thing) not in seen:
-            if dataclasses.is_dataclass(thing):
-                held = fields_of(cast("Kind", thing))
-                waiting += ((held[name], one) for name, one in _plan(cast("Kind", type(thing))))
-            elif isinstance(thing, Mapping):
-                waiting += ((one, form) for one in thing.values())
-            elif isinstance(thing, (list, tuple)) and form not in ARRAYS:
-                waiting += ((one, form) for one in thing if not isinstance(one, (int, float)))
-            seen[id(thing)] = thing
+        if isinstance(thing, NAMELESS) or id(thing) in seen:
+            continue
+        seen[id(thing)] = thing
+        if form in FILES and isinstance(thing, (str, os.PathLike)):
+            found.add(os.fspath(thing))
+        elif hasattr(thing, "__dataclass_fields__"):
+            held = fields_of(thing)
+            waiting += [(held[name], one) for name, one in _plan(thing.__class__)]
+        elif isinstance(thing, dict):
+            waiting += [(one, form) for one in thing.values()]
+        elif isinstance(thing, (list, tuple)) and form not in ARRAYS:
+            waiting += [(one, form) for one in thing]
     return found
 
 

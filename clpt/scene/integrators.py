@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clpt import scalars
+from clpt.arrays import Floats
 from clpt.choices import AUTO, MOST_LIGHT_PATHS
 from clpt.errors import SceneError, UnknownKindError
 from clpt.scalars import is_number, is_whole, plain, whole, wholes
@@ -22,6 +25,7 @@ from clpt.spectra.spaces import TEMPERATURES
 from clpt.spectra.spectrum import LONGEST, SHORTEST
 
 MOST_BANDS = 1024
+GAUSSIAN_CUT = 4.0  # standard deviations at which a Gaussian without a radius ends
 FEWEST_LIGHT_PATHS = 1.0 / 64
 MOST_GUIDE_PATHS = 1 << 24  # sums of what they carry have 32 bits
 DEEPEST = 4000  # path state has 12 bits for the depth
@@ -263,14 +267,54 @@ class Independent(Sampler):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Filter(Kind):
-    """Base of the pixel filters; see `Film.filtering` for how samples meet them."""
+    """Base of the pixel filters; see `Film.filtering` for how samples meet them.
+
+    A filter is the product of a function of x and the same function of y. Definitions are Mitsuba
+    3's, so that equal names give equal images.
+    """
+
+    is_constant: ClassVar[bool] = False
+
+    if TYPE_CHECKING:
+        radius: float
+
+    @property
+    def half_width(self) -> float:
+        """The distance from its centre at which it ends [pixels]."""
+        return self.radius
+
+    @property
+    def reach(self) -> int:
+        """The number of pixels beside its own that a sample may serve, to each side of an axis."""
+        return max(math.ceil(self.half_width - 0.5), 0)
+
+    @property
+    def taps(self) -> int:
+        """The largest number of pixels of an axis whose filters hold a point."""
+        return math.ceil(2.0 * self.half_width)
+
+    def profile(self, distances: Floats) -> Floats:
+        """Return its values (n,), not normalised, at distances within `half_width` [pixels]."""
+        raise NotImplementedError
+
+    def value(self, distance: ArrayLike) -> Floats:
+        """Return its values at signed distances from the centre [pixels], not normalised."""
+        x = np.abs(np.asarray(distance, np.float64))
+        inside = x <= self.half_width
+        return np.where(inside, self.profile(np.where(inside, x, 0.0)), 0.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Box(Filter):
     """Constant over the pixel."""
 
+    is_constant: ClassVar[bool] = True
+
     radius: float = real(0.5, "half width", "pixels", 0.01, 16.0)
+
+    def profile(self, distances: Floats) -> Floats:
+        """Return 1 everywhere."""
+        return np.ones_like(distances)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -279,6 +323,10 @@ class Tent(Filter):
 
     radius: float = real(1.0, "half width", "pixels", 0.01, 16.0)
 
+    def profile(self, distances: Floats) -> Floats:
+        """Return a line from 1 to 0."""
+        return 1.0 - distances / self.radius
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Gaussian(Filter):
@@ -286,6 +334,16 @@ class Gaussian(Filter):
 
     stddev: float = real(0.5, "standard deviation", "pixels", 0.01, 4.0)
     radius: float = real(0.0, "half width; 0: four standard deviations", "pixels", 0.0, 16.0)
+
+    @property
+    def half_width(self) -> float:
+        """Its radius, or `GAUSSIAN_CUT` standard deviations [pixels]."""
+        return self.radius or GAUSSIAN_CUT * self.stddev
+
+    def profile(self, distances: Floats) -> Floats:
+        """Return the bell less its value at the radius: so it ends at zero."""
+        end = self.half_width / self.stddev
+        return np.exp(-0.5 * (distances / self.stddev) ** 2) - np.exp(-0.5 * end**2)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -296,6 +354,14 @@ class Mitchell(Filter):
     c: float = real(1 / 3, "ringing")
     radius: float = real(2.0, "half width", "pixels", 0.01, 16.0)
 
+    def profile(self, distances: Floats) -> Floats:
+        """Return Mitchell and Netravali 1988 eq. 8."""
+        b, c, x = self.b, self.c, distances * (2.0 / self.radius)
+        near = (12 - 9 * b - 6 * c) * x**3 + (-18 + 12 * b + 6 * c) * x**2 + (6 - 2 * b)
+        far = (-b - 6 * c) * x**3 + (6 * b + 30 * c) * x**2
+        far = far + (-12 * b - 48 * c) * x + (8 * b + 24 * c)
+        return np.where(x < 1.0, near, far) / 6.0
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lanczos(Filter):
@@ -304,12 +370,21 @@ class Lanczos(Filter):
     radius: float = real(3.0, "half width", "pixels", 0.01, 16.0)
     lobes: float = real(3.0, "where the window would end", "pixels", 0.01, 16.0)
 
+    def profile(self, distances: Floats) -> Floats:
+        """Return a sinc in the main lobe of another that is `lobes` wide (Duchon 1979)."""
+        return np.sinc(distances) * np.sinc(distances / self.lobes)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BlackmanHarris(Filter):
     """The Blackman-Harris window; radius 1.5."""
 
     radius: float = real(1.5, "half width", "pixels", 0.01, 16.0)
+
+    def profile(self, distances: Floats) -> Floats:
+        """Return the four-term window of Harris 1978, -92 dB."""
+        t = np.pi * (distances / self.radius + 1.0)
+        return 0.35875 - 0.48829 * np.cos(t) + 0.14128 * np.cos(2 * t) - 0.01168 * np.cos(3 * t)
 
 
 def _width_and_height(size: tuple[int, int]) -> dict[str, int]:

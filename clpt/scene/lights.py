@@ -5,11 +5,12 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.scene.motion import Keys
 from clpt.scene.params import (
@@ -23,15 +24,33 @@ from clpt.scene.params import (
     real,
     reflectance,
 )
-from clpt.scene.roles import EMISSION
-from clpt.scene.textures import Texture
+from clpt.scene.pixels import pixels
+from clpt.scene.roles import EMISSION, REFLECTANCE
+from clpt.scene.textures import Bitmap, Texture
 from clpt.scene.values import ImageLike, Matrix4, SpectrumLike, Textured, Vector3
 from clpt.spectra import Blackbody, RGBIlluminant, Spectrum, lumens, scaled, watts
 
 RADIANCE = "W m^-2 sr^-1 nm^-1"
 SPOT_EDGES = ("linear", "smooth")
+NARROW = 0.02  # [rad] around a cone that holds all rays of a point
 CONE_RINGS = 4096  # of equal width, over which a spot's intensity is summed
 Reach = Literal["surface", "placed", "distant", "infinite"]
+
+
+@dataclass(frozen=True)
+class LightBounds:
+    """The box that a light lies in, and the cone of its rays (Conty Estevez and Kulla 2018, 4.1).
+
+    low, high: corners (3,) [m]; axis (3,): of unit length; theta_o: largest angle between the axis
+    and a normal of the light [rad]; theta_e: largest angle between a normal and a ray [rad], at
+    most pi / 2. By default rays leave to all sides.
+    """
+
+    low: Floats
+    high: Floats
+    axis: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    theta_o: float = math.pi
+    theta_e: float = math.pi / 2.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,11 +65,33 @@ class Light(Kind):
     reach: ClassVar[Reach] = "placed"
     falloff = True  # irradiance falls with the distance
     two_sided = False
+    visible = True
 
     motion: Keys | None = host(
         None, "moves it after its place, or None; an area light moves with its shape", form="keys"
     )
     group: str = host("", "lights of one name share a layer of `light_groups`")
+
+    def bounds(self) -> LightBounds | None:
+        """Return the box around all points that emit, and the cone of their rays, before `motion`.
+
+        None if the light is infinitely far away, does not fall with the distance, or does not know
+        its bounds: such a light has the same chance to be sampled at every point. A tree over
+        lights samples a bounded light by its distance; a point or ray outside of the bounds would
+        be dark.
+        """
+        return None
+
+    def sampling_power(self, strength: float, scene_radius: float, image_mean: float) -> float:
+        """Estimate the power that the light sends into the scene [W/nm], to share out samples.
+
+        strength: mean of its intensity, irradiance or radiance; scene_radius: [m]; image_mean: of
+        the image that its light passes, 1 without an image.
+        """
+        if self.reach == "placed":
+            return 4.0 * math.pi * strength
+        disk = math.pi * scene_radius**2
+        return disk * strength if self.reach == "distant" else 4.0 * math.pi * disk * strength
 
 
 def _to_the_eye(doc: str, unit: str) -> Any:
@@ -162,6 +203,9 @@ class Area(PoweredLamp):
     radiance: Textured = emission(1.0, "emitted radiance", RADIANCE, textured=True)
     nits: float | None = _to_the_eye("its luminance", "cd/m^2")
     two_sided: bool = flag(False, "True: its back emits too")
+    visible: bool = flag(
+        True, "False: no ray sees it shine; as with a point, only what it shines on shows its light"
+    )
 
     def extent(self, area: float) -> float:
         """Return pi times the area that emits [m^2 sr]."""
@@ -200,6 +244,20 @@ class Point(PoweredLamp):
         """Return the solid angle of all directions [sr]."""
         return 4.0 * math.pi
 
+    def bounds(self) -> LightBounds | None:
+        """Return its position if its irradiance falls with the distance."""
+        position = np.asarray(self.position, np.float64)
+        return LightBounds(position, position) if self.falloff else None
+
+
+def _cone(
+    to_world: Matrix4, theta_o: float = math.pi, theta_e: float = math.pi / 2.0
+) -> LightBounds:
+    """Return the bounds of a point that emits about +z of `to_world`."""
+    matrix = np.asarray(to_world, np.float64)
+    origin, axis = matrix[:3, 3], matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+    return LightBounds(origin, origin, axis, theta_o, theta_e)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Spot(PoweredLamp):
@@ -230,6 +288,15 @@ class Spot(PoweredLamp):
             across = x * x * (3.0 - 2.0 * x)
         return 2.0 * math.pi * float(across @ np.sin(theta)) * cutoff / CONE_RINGS
 
+    def bounds(self) -> LightBounds:
+        """Return its position and its cone."""
+        return _cone(self.to_world, math.radians(self.cutoff), NARROW)
+
+    def sampling_power(self, strength: float, scene_radius: float, image_mean: float) -> float:
+        """Estimate its power [W/nm] from the middle between its full beam and its cutoff."""
+        edge = np.radians([min(self.beam_width, self.cutoff), self.cutoff])
+        return 2.0 * math.pi * (1.0 - float(np.cos(edge).mean())) * strength
+
     def check(self) -> None:
         super().check()
         if isinstance(self.image, Texture) and self.cutoff >= 90.0:
@@ -248,6 +315,23 @@ class Projector(Lamp):
     fov: float = real(45.0, "angle that the image's width takes", "degrees", 1e-3, 179.0)
     aspect: float = real(0.0, "width over height; 0: that of the image, 1 if it has none", low=0.0)
     to_world: Matrix4 = host(np.eye(4), "placement, (4, 4), without a shear")
+
+    @property
+    def image_aspect(self) -> float:
+        """Width of the image over its height."""
+        if self.aspect > 0.0 or not isinstance(self.image, Bitmap):
+            return self.aspect or 1.0
+        height, width = pixels(self.image, REFLECTANCE).shape[:2]
+        return width / height
+
+    def bounds(self) -> LightBounds:
+        """Return its position and the half space in front of it."""
+        return _cone(self.to_world, math.pi / 2.0, NARROW)
+
+    def sampling_power(self, strength: float, scene_radius: float, image_mean: float) -> float:
+        """Estimate its power [W/nm] from the area of its image a metre away."""
+        half = float(np.tan(np.radians(self.fov) / 2.0))
+        return 4.0 * half * half / self.image_aspect * strength * image_mean
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -268,6 +352,14 @@ class Goniometric(PoweredLamp):
     def extent(self, area: float) -> float:
         """Return the solid angle of all directions, before the image takes its share [sr]."""
         return 4.0 * math.pi
+
+    def bounds(self) -> LightBounds:
+        """Return its position; it emits to all sides."""
+        return _cone(self.to_world)
+
+    def sampling_power(self, strength: float, scene_radius: float, image_mean: float) -> float:
+        """Estimate its power [W/nm] over all directions."""
+        return 4.0 * math.pi * strength * image_mean
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,6 +52,8 @@ RADIANCE = "W m^-2 sr^-1 nm^-1"
 class Medium(Kind):
     """Base of all media."""
 
+    is_mixture: ClassVar[bool] = False  # `parts` are other media
+
     name: str = host("", "for messages and for references in scene files")
     phase: Phase = host(Isotropic(), "what a point of it sends where", form="phase")
 
@@ -59,6 +61,11 @@ class Medium(Kind):
     def parts(self) -> tuple[Medium, ...]:
         """The media that fill its place together: itself, or those of a mixture."""
         return (self,)
+
+    @property
+    def lattice(self) -> Lattice | None:
+        """The medium itself if a density on a lattice multiplies its coefficients, else None."""
+        return None
 
     @property
     def glows(self) -> bool:
@@ -93,6 +100,10 @@ class Medium(Kind):
         spectral: whether they are for wavelengths, or for three numbers.
         """
         raise NotImplementedError
+
+    def of_parts(self, spectral: bool) -> list[tuple[Spectrum, Spectrum]]:
+        """Return the `coefficients` of each of `parts`."""
+        return [self.coefficients(spectral)]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -266,6 +277,20 @@ class Lattice(Medium):
     to_world: Matrix4 = host(np.eye(4), "takes the unit cube to the grid's box")
 
     @property
+    def lattice(self) -> Lattice:
+        return self
+
+    @property
+    def bits(self) -> int:
+        """The bits of a point's density on the device: 16 or 8."""
+        return 16
+
+    @property
+    def noise(self) -> tuple[float, ...] | None:
+        """The numbers of the noise by which kernels make the density, None for an array."""
+        return None
+
+    @property
     def size(self) -> tuple[int, ...]:
         """The number of points along x, y and z."""
         raise NotImplementedError
@@ -320,6 +345,11 @@ class Cloud(Lattice, Homogeneous):
             message = f"must be 0 to {CLOUD_FINEST}, not {self.resolution!r}"
             raise SceneError(message, where=f"{self.kind}.resolution")
         super().check()
+
+    @property
+    def noise(self) -> tuple[float, ...]:
+        """Density, wispiness and frequency, see kernels/stage/cloud_density.cl."""
+        return self.density, self.wispiness, self.frequency
 
     @property
     def _sides(self) -> NDArray[np.float64]:
@@ -533,6 +563,8 @@ class Mixture(Lattice):
     Raises SceneError for parts that give out light, that have a dye, colours on a grid or another
     box than the first grid, and for a `phase` beside those of the parts.
     """
+
+    is_mixture = True
 
     parts: tuple[Medium, ...] = host(
         (Homogeneous(),), f"the media that it is made of, up to {MOST_PARTS}", form="media"

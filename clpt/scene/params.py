@@ -205,16 +205,6 @@ class Shorthand:
     spell: Callable[..., dict[str, Any]]
 
 
-class classproperty:
-    """A read-only property of a class."""
-
-    def __init__(self, function: Callable[[Any], str]):
-        self.function = function
-
-    def __get__(self, _: object, owner: type) -> str:
-        return self.function(owner)
-
-
 class KindType(type):
     """The type of kinds: what all of them do with the arguments that they are called with.
 
@@ -270,10 +260,18 @@ def _spelled_out(kind: type[Kind], given: dict[str, object]) -> dict[str, object
     return plain
 
 
+def _snake(name: str) -> str:
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Kind(metaclass=KindType):
-    """Base of all kinds; the class name gives the name in files and kernels."""
+    """Base of all kinds; the class name gives the name in files and kernels.
 
+    kind: that name, RoughConductor -> rough_conductor.
+    """
+
+    kind: ClassVar[str] = "kind"
     shorthands: ClassVar[tuple[Shorthand, ...]] = ()
     needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has `lambdas`
     # Where all numbers of one of these are above 0, its struct has the `luminance` of `base_color`,
@@ -283,12 +281,8 @@ class Kind(metaclass=KindType):
     _size: ClassVar[tuple[int, int]] = (1, 1)  # of an object: its parts, and how deep they lie
 
     def __init_subclass__(cls) -> None:
+        cls.kind = _snake(cls.__name__)
         cls.__repr__ = Kind.__repr__  # type: ignore[method-assign]  # `dataclass` leaves it then
-
-    @classproperty
-    def kind(cls) -> str:
-        """The name in scene files and kernels: RoughConductor -> rough_conductor."""
-        return _snake(cls.__name__)  # type: ignore[attr-defined]
 
     def __post_init__(self) -> None:
         parts, depth = 1, 0
@@ -323,10 +317,6 @@ class Texture(Kind):
 
 
 @cache
-def _snake(name: str) -> str:
-    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
-
-
 @cache  # thousands of objects ask
 def _declared(cls: type[Kind]) -> Mapping[str, Param]:
     fields = dataclasses.fields(cls)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Protocol, TypeVar, cast
 
 from clpt.errors import SceneError, nearest
@@ -24,6 +24,7 @@ NUMBERS = ("spp", "noise", "seed")
 MOST_NAMED = 10_000  # shapes, of which more go by their places alone
 STEP = re.compile(r"\.([^.\[\]]+)|\[(\d+)\]")
 
+MOST_LISTED = 8  # names of parts in a message
 Key = str | int
 
 
@@ -154,8 +155,7 @@ def _walked(
     roots = _roots(scene)
     root = max((name for name in roots if _begins(path, name)), key=len, default="")
     if not root:
-        first = re.split(r"[.\[]", path)[0]
-        raise SceneError(f"a scene has no {first!r}{nearest(first, _shown(roots))}", where=path)
+        raise SceneError(_no_root(path, scene, roots), where=path)
     chain: list[tuple[Key, object]] = []
     key: Key = root
     thing = roots[root]
@@ -171,6 +171,20 @@ def _walked(
             raise SceneError(message, where=path)
         thing = known.get(key)
     return chain, key
+
+
+def _no_root(path: str, scene: Parts, roots: dict[str, object]) -> str:
+    """Return what to say of a path whose beginning is no part of a scene."""
+    first = re.split(r"[.\[]", path)[0]
+    lists: dict[str, Sequence[object]] = {"shapes": scene.shapes, "lights": scene.lights}
+    if first not in lists:
+        return f"a scene has no {first!r}{nearest(first, _shown(roots))}"
+    parts = {id(one) for one in lists[first]}
+    known = [name for name, one in roots.items() if id(one) in parts]
+    listed = ", ".join(map(repr, known[:MOST_LISTED])) + (", ..." if known[MOST_LISTED:] else "")
+    number = re.match(r"[^.]*", path)
+    head = number[0] if number else first
+    return f"a scene has no {head!r}; its {first} are {listed or 'none'}"
 
 
 def _shown(roots: dict[str, object]) -> Iterator[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +30,7 @@ class Shape(Kind):
     """Base of all shapes; placed by `to_world`."""
 
     is_tree = False  # it holds trees side by side
+    is_open: ClassVar[bool] = False  # no shape of this kind encloses a volume by itself
     # of a kind without such parameters
     attributes = NO_ATTRIBUTES
     normals = cast(Any, None)
@@ -182,10 +183,14 @@ class Spheres(Shape):
 class Rectangle(Shape):
     """The square [-1, 1]^2 in the plane z = 0, facing +z; uv run from 0 to 1."""
 
+    is_open = True
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Disk(Shape):
     """The unit disk in the plane z = 0, facing +z; u is the radius, v the azimuth over 2 pi."""
+
+    is_open = True
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -196,6 +201,8 @@ class Cube(Shape):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cylinder(Shape):
     """An open tube around the line from p0 to p1, facing outward; u azimuth, v along the line."""
+
+    is_open = True
 
     p0: Vector3 = host((0.0, 0.0, 0.0), "start of the axis", "m")
     p1: Vector3 = host((0.0, 0.0, 1.0), "end of the axis", "m")
@@ -214,6 +221,8 @@ class Curves(Shape):
     that emit light, that deform, that a transform stretches, or that more than 16 instances share
     become tubes of triangles, which are open at the ends; others end in half spheres.
     """
+
+    is_open = True
 
     points: Any = host(None, "(n, 4) of all strands: x y z and the radius", "m", form="rows4")
     lengths: Any = host(

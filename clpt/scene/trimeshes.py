@@ -8,15 +8,15 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import images
+from clpt import images, scalars
+from clpt.scene import gltf_material
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Area, Light
-from clpt.scene.materials import Diffuse, GltfSurface, Mask, Material, NormalMap, TwoSided
-from clpt.scene.params import Texture
-from clpt.scene.textures import Bitmap, MeshAttribute, Product
-from clpt.scene.values import Textured, TexturedNumber
+from clpt.scene.materials import Diffuse, GltfSurface, Material, TwoSided
+from clpt.scene.textures import Bitmap, MeshAttribute
+from clpt.scene.values import TexturedNumber
 
-WHITE = (1.0, 1.0, 1.0)
+UNSAID = (102 / 255, 102 / 255, 102 / 255, 1.0)  # of a SimpleMaterial without a colour
 _EYE_TO_CAMERA = np.diag([-1.0, 1.0, -1.0, 1.0])  # trimesh's camera looks along -z, +x right
 
 
@@ -54,7 +54,8 @@ def coloured(name: str) -> Material:
 def material_of(visual: object) -> tuple[Material, Light | None] | None:
     """Return the material of a mesh with uvs and its light, None where it has no material.
 
-    A `PBRMaterial` becomes what clpt.load makes of glTF, a `SimpleMaterial` a matt surface.
+    A `PBRMaterial` becomes what clpt.load makes of glTF, a `SimpleMaterial` a matt surface. Beside
+    an image the colour that trimesh gives to what has none counts as white.
     """
     given = _of(visual, "material", object)
     if given is None:
@@ -62,50 +63,40 @@ def material_of(visual: object) -> tuple[Material, Light | None] | None:
     name = _of(given, "name", str) or ""
     if hasattr(given, "baseColorFactor"):
         return _physical(given, name)
-    image = _image(given, "image")
-    shown: Textured = _levels(given, "diffuse", (0.5,) * 3) if image is None else image
+    image, colour = _image(given, "image"), _levels(given, "diffuse", (0.5,) * 3)
+    if image is not None and colour == UNSAID:
+        colour = gltf_material.WHITE
+    shown = gltf_material.tinted(image, colour[:3])
     return TwoSided(front=Diffuse(reflectance=shown, name=name)), None
 
 
 def _physical(given: object, name: str) -> tuple[Material, Light | None]:
     """Return the material and the light of a `PBRMaterial`."""
-    rough = {"b": "metallic", "g": "roughness"}
     numbers: dict[str, TexturedNumber] = {}
-    for channel, parameter in rough.items():
-        share = _of(given, f"{parameter}Factor", (float, int))
-        value = 1.0 if share is None else float(share)
+    for channel, parameter in (("b", "metallic"), ("g", "roughness")):
         image = _image(given, "metallicRoughnessTexture", raw=True, channel=channel)
-        numbers[parameter] = value if image is None else _times(image, value)
-    base, factor = _image(given, "baseColorTexture"), _levels(given, "baseColorFactor", WHITE)
-    colour: Textured = factor if base is None else _times(base, factor)
-    front: Material = GltfSurface(
-        base_color=colour, metallic=numbers["metallic"], roughness=numbers["roughness"], name=name
-    )
-    bent = _image(given, "normalTexture", raw=True)
-    if bent is not None:
-        front = NormalMap(material=front, map=bent, along_v=True)
-    made: Material = TwoSided(front=front)
-    if base is not None and _of(given, "alphaMode", str) in ("MASK", "BLEND"):
-        opacity = _image(given, "baseColorTexture", raw=True, channel="a")
-        assert opacity is not None
-        made = Mask(material=made, opacity=opacity)
-    return made, _glow(given)
+        value = _number(given, f"{parameter}Factor", 1.0)
+        numbers[parameter] = gltf_material.times(image, value)
+    base = _image(given, "baseColorTexture")
+    factor = _levels(given, "baseColorFactor", (1.0,) * 4)
+    inner: Material = GltfSurface(
+        base_color=gltf_material.tinted(base, factor[:3]), metallic=numbers["metallic"],
+        roughness=numbers["roughness"], name=name,
+    )  # fmt: skip
+    inner = gltf_material.with_normals(inner, _image(given, "normalTexture", raw=True))
+    cutoff = _number(given, "alphaCutoff", gltf_material.CUTOFF)
+    mode, alpha = _of(given, "alphaMode", str) or "OPAQUE", (*factor, 1.0)[3]
+    share = gltf_material.opacity(mode, alpha, base, cutoff)
+    both = bool(_of(given, "doubleSided", (bool, np.bool_)))
+    return gltf_material.finished(inner, share, _glow(given, both), both=both)
 
 
-def _glow(given: object) -> Light | None:
+def _glow(given: object, both: bool) -> Area | None:
     """Return the light of a material that is emissive."""
     image, factor = _image(given, "emissiveTexture"), _levels(given, "emissiveFactor", (0.0,) * 3)
     if max(factor) == 0.0:
         return None
-    return Area(radiance=factor if image is None else _times(image, factor))
-
-
-def _times(image: Bitmap, factor: float | tuple[float, ...]) -> Texture:
-    """Return an image times a number or a colour."""
-    if factor in (1.0, WHITE):
-        return image
-    grey = isinstance(factor, float) or max(factor) == min(factor)
-    return Product(first=image, second=factor, rgb=not grey)
+    return Area(radiance=gltf_material.tinted(image, factor[:3]), two_sided=both)
 
 
 def _image(
@@ -115,10 +106,9 @@ def _image(
     image = _of(given, name, object)
     if image is None:
         return None
-    modes = ("L", "RGB", "RGBA")
-    mode = _of(image, "mode", str)
-    if mode not in modes and hasattr(image, "convert"):
-        image = image.convert("RGBA" if channel == "a" else "RGB")
+    if hasattr(image, "convert") and _of(image, "mode", str) not in ("L", "RGB", "RGBA"):
+        clear = _of(image, "has_transparency_data", bool)
+        image = image.convert("RGBA" if clear else "RGB")
     return Bitmap(image=np.asarray(image), raw=raw, channel=channel)
 
 
@@ -129,7 +119,13 @@ def _levels(given: object, name: str, default: tuple[float, ...]) -> tuple[float
         return default
     numbers = np.asarray(value)
     numbers = numbers / 255.0 if numbers.dtype.kind in "iu" else numbers.astype(float)
-    return tuple(float(one) for one in np.clip(numbers[:3], 0.0, None))
+    return tuple(float(one) for one in np.clip(numbers, 0.0, None))
+
+
+def _number(given: object, name: str, default: float) -> float:
+    """Return a number of a material."""
+    value = _of(given, name, object)
+    return default if value is None else scalars.number(value, f"material.{name}")
 
 
 _T = TypeVar("_T")

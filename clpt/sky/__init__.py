@@ -1,1 +1,1 @@
-"""Light of the sky: air over a round earth, and sunlight that it scatters; numpy alone."""
+"""Light of the sky: sunlight scattered by the air over a round earth; numpy alone."""

@@ -1,6 +1,6 @@
-"""The air over a round earth: what scatters and absorbs in it, how deep it is along a ray.
+"""The air over a round earth: its columns along rays, and its phase functions.
 
-Lengths are in km. What is in the air: `clpt.spectra.air`. Air does not bend rays here.
+Lengths are in km. `clpt.spectra.air` has the air's constituents. Rays are straight.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ from numpy.typing import ArrayLike, NDArray
 from clpt.arrays import Floats
 from clpt.spectra.air import DEPOLARISED, EARTH, densities
 
-TOP = EARTH + 100.0  # beyond, there is nothing
+TOP = EARTH + 100.0  # radius of the top of the air
 NODES = 32  # of a column to the top
 
 
 def to_top(radius: Floats, cosine: Floats) -> Floats:
-    """Return the way to the top [km] of rays from a radius, with a cosine to the vertical."""
+    """Return distances to the top [km] of rays from a radius, with a cosine to the vertical."""
     square = np.maximum(TOP**2 - radius**2 * (1.0 - cosine**2), 0.0)
     return np.maximum(np.sqrt(square) - radius * cosine, 0.0)
 
 
 def columns(radius: ArrayLike, cosine: ArrayLike) -> Floats:
-    """Columns (3, ...) from a radius [km] up to the top, in those straight up from the sea.
+    """Return columns (3, ...) from a radius [km] to the top, over the vertical columns at the sea.
 
     cosine: to the vertical, 0 to 1.
     """
@@ -38,18 +38,18 @@ def columns(radius: ArrayLike, cosine: ArrayLike) -> Floats:
 
 
 def sun_columns(radius: ArrayLike, cosine: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
-    """Columns (3, ...) toward the sun, and whether it is seen past the earth.
+    """Return columns (3, ...) toward the sun, and whether the earth leaves it visible.
 
     cosine: of the sun's direction to the vertical, -1 to 1.
     """
     r, mu = np.broadcast_arrays(np.asarray(radius, np.float64), np.asarray(cosine, np.float64))
     nearest = r * np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
     seen = (mu >= 0.0) | (nearest > EARTH)
-    found = columns(r, np.abs(mu))
+    depths = columns(r, np.abs(mu))
     past = (mu < 0.0) & seen
     if past.any():
-        found[:, past] = 2.0 * columns(nearest[past], np.zeros(int(past.sum()))) - found[:, past]
-    return found, seen
+        depths[:, past] = 2.0 * columns(nearest[past], np.zeros(int(past.sum()))) - depths[:, past]
+    return depths, seen
 
 
 def rayleigh_phase(cosine: ArrayLike) -> Floats:

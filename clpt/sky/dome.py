@@ -1,7 +1,7 @@
 """Images of a sky: the dome and the ground below it, and the sun's disc, at LAMBDAS.
 
-How they lie around the observer: kernels/lights/kinds/sky.cl. Limb darkening of the sun: a power of
-the cosine at its surface, Hestroffer and Magnan 1998.
+kernels/lights/kinds/sky.cl says how they lie around the observer. Limb darkening of the sun is a
+power of the cosine at its surface (Hestroffer and Magnan 1998).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Unscaled = Callable[[tuple[float, ...], tuple[float, ...]], tuple[Floats, Floats
 
 
 def numbers(lamp: Sky) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return what a sky follows from: its parameters, and the albedo of the ground at LAMBDAS."""
+    """Return the numbers that determine a sky: parameters, and the ground's albedo at LAMBDAS."""
     albedo: Any = lamp.ground
     ground = np.clip(albedo.sample(LAMBDAS), 0.0, 1.0)
     return (
@@ -38,7 +38,7 @@ def numbers(lamp: Sky) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 
 def height(altitude: float) -> float:
-    """The observer's height in the tables [km], of an altitude [m]."""
+    """Return the observer's height in the tables [km] from an altitude [m]."""
     return max(altitude / 1000.0, LOWEST)
 
 
@@ -63,25 +63,30 @@ def directions(at: float, row: ArrayLike, column: ArrayLike) -> Floats:
 
 
 def sky_image(lamp: Sky) -> tuple[Floats, Floats]:
-    """Radiance at LAMBDAS of the dome and the ground (2, rows + 1, columns / 2 + 1, n),
-    and of the sun's disc (rows, columns, n) [W m^-2 sr^-1 nm^-1]."""
+    """Return radiance at LAMBDAS [W m^-2 sr^-1 nm^-1] of the dome with the ground, and of the sun.
+
+    (2, rows + 1, columns / 2 + 1, n), and (rows, columns, n) over the sun's disc.
+    """
     return images(unscaled, *numbers(lamp))
 
 
 def images(
-    made: Unscaled, given: tuple[float, ...], ground: tuple[float, ...]
+    unscaled_images: Unscaled, parameters: tuple[float, ...], ground: tuple[float, ...]
 ) -> tuple[Floats, Floats]:
-    """Return what `sky_image` does, of the `numbers` of a sky; made: `unscaled`, or kept of it."""
-    *physical, sky, sun = given
-    around, disc = made(tuple(physical), ground)
+    """Return the images of `sky_image` from a sky's `numbers`.
+
+    unscaled_images: `unscaled`, or a cache in front of it.
+    """
+    *physical, sky, sun = parameters
+    around, disc = unscaled_images(tuple(physical), ground)
     return np.maximum(around * (sky * SUNLIGHT), 0.0), disc * sun
 
 
-@lru_cache(maxsize=4)  # it takes seconds, and a sky's scene is often made again
+@lru_cache(maxsize=4)  # it takes seconds, and a sky's scene is often rebuilt
 def unscaled(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
-    """Return both images without their factors: that of the dome per irradiance of the sun [1/sr].
+    """Return both images without their scales: the dome per irradiance of the sun [1/sr].
 
-    numbers, ground: those that `numbers` tells, without the two scales.
+    numbers, ground: from `numbers`, without the two scales.
     """
     elevation, altitude, aerosol, exponent, share, asymmetry, ozone = numbers
     air = Atmosphere(aerosol, exponent, share, asymmetry, ozone)
@@ -97,7 +102,7 @@ def unscaled(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Flo
 
 
 def _disc(air: Atmosphere, elevation: float, at: float, high: float) -> Floats:
-    """The sun's disc, darker toward its edge, through the air of each row."""
+    """Return the sun's disc, darker toward its edge, seen through each row's air."""
     rows = elevation + SUN_RADIUS * np.linspace(-1.0, 1.0, SUN_ROWS)
     cosine = np.linspace(0.0, 1.0, SUN_COLUMNS)
     power = -0.023 + 292.0 / LAMBDAS

@@ -1,10 +1,10 @@
 """Radiance of the sky: sunlight scattered once along each ray, and all further orders.
 
-Light scattered once is integrated along each ray. What comes after is a field of its own: at
-heights and sun angles around the observer, its moments in spherical harmonics up to DEGREE, which
-are all that air needs and most of what haze does. It is found order by order on rays from those
-places. The ground reflects evenly. Lengths are in km, radiance is per irradiance of the sun above
-the air [1/sr]. How far that is from walks of light: docs/sky.md, tests/sky.
+Light scattered once is integrated along each ray. All higher orders are a field: its moments in
+spherical harmonics up to DEGREE, at heights and sun angles around the observer. Air needs no higher
+degree, haze hardly. The field is computed in orders of scattering, along rays from these points.
+The ground is diffuse. Lengths are in km, radiance is per irradiance of the sun above the air
+[1/sr]. docs/sky.md and tests/sky compare it with random walks of light.
 """
 
 from __future__ import annotations
@@ -21,20 +21,23 @@ from clpt.spectra.air import DEPOLARISED, EARTH, LAMBDAS, Atmosphere, densities
 
 DEGREE = 5  # of the harmonics
 HEIGHTS = np.array([0, 0.5, 1.5, 3, 6, 10, 16, 23, 32, 45, 60, 99.0])  # [km]
-AROUND, BETWEEN = 15.0, 2.5  # sun angles: on either side of the observer's, apart [degrees]
-DUSK, AT_DUSK = 89.0, 1.25  # from what sun angle light falls off fast; apart from there [degrees]
-SIDE_ANGLES, TURNS = 6, 6  # directions at a place: above and below its horizon, around
-FAR_NODES, VIEW_NODES = 8, 24  # of a ray's part: from places of the field, from the observer
+AROUND, BETWEEN = 15.0, 2.5  # sun angles [degrees]: range on either side of the observer's, step
+DUSK, AT_DUSK = 89.0, 1.25  # light falls off fast beyond this sun angle; the step there [degrees]
+SIDE_ANGLES, TURNS = 6, 6  # directions at a point: on each side of the horizon, around
+FAR_NODES, VIEW_NODES = 8, 24  # quadrature points of a ray: from the field, from the observer
 COARSE = np.array([360, 390, 420, 460, 500, 550, 575, 603, 640, 700, 830.0])  # [nm], of the field
-HAZY = 12.0  # below, haze counts in the field [km]
+HAZY = 12.0  # the field has haze below this height [km]
 CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))  # of a cell
-PIECE = 4096  # points that are worked on at a time
-ORDERS, ENOUGH = 24, 1e-3  # at most; the share of an order at which they end
+PIECE = 4096  # points per block
+ORDERS, ENOUGH = 24, 1e-3  # most orders; the last order's share of the light that ends them
 
 
 class Air(NamedTuple):
-    """Optical depths straight up (3, n) of what extincts and (2, n) of what scatters, the moments
-    of both phase functions (2, DEGREE + 1), and g of the aerosol."""
+    """The air at n wavelengths.
+
+    Vertical optical depths: extinct (3, n), scatter (2, n); moments of both phase functions
+    (2, DEGREE + 1); asymmetry: g of the aerosol.
+    """
 
     extinct: Floats
     scatter: Floats
@@ -42,22 +45,21 @@ class Air(NamedTuple):
     asymmetry: float
 
 
-def air(given: Atmosphere, lambdas: Floats) -> Air:
-    """The air at wavelengths."""
-    extinct, gamma = given.depths(lambdas), DEPOLARISED
+def air(contents: Atmosphere, lambdas: Floats) -> Air:
+    extinct, gamma = contents.depths(lambdas), DEPOLARISED
     rayleigh = np.zeros(DEGREE + 1)
     rayleigh[0], rayleigh[2] = 1.0, (1.0 - gamma) / (10.0 * (1.0 + 2.0 * gamma))
-    moments = np.stack([rayleigh, given.asymmetry ** np.arange(DEGREE + 1)])
-    scatter = np.stack([extinct[0], given.aerosol_albedo * extinct[1]])
-    return Air(extinct, scatter, moments, given.asymmetry)
+    moments = np.stack([rayleigh, contents.asymmetry ** np.arange(DEGREE + 1)])
+    scatter = np.stack([extinct[0], contents.aerosol_albedo * extinct[1]])
+    return Air(extinct, scatter, moments, contents.asymmetry)
 
 
 class Rays(NamedTuple):
-    """Points on rays, those of a ray one after the other.
+    """Quadrature points on rays, grouped by ray.
 
-    ray (m,): whose; t (m,): how far [km]; weight (m,): the length that it stands for [km]; first:
-    of each ray; columns (3, m): from its start; ground (n,): where a ray meets the ground, or -1;
-    below (3, n): columns to there.
+    ray (m,): the point's ray; t (m,): its distance [km]; weight (m,): its length of the ray [km];
+    columns (3, m): from the ray's start; ground (n,): distance of the ground, or -1; below (3, n):
+    columns to the ground.
     """
 
     ray: NDArray[np.int64]
@@ -69,10 +71,10 @@ class Rays(NamedTuple):
 
 
 def rays(radius: Floats, mu: Floats, count: int, after: Floats | None = None) -> Rays:
-    """Points on rays from radii (n,) [km] with cosines (n,) to the vertical there.
+    """Return points on rays from radii (n,) [km] with cosines (n,) to the vertical.
 
-    They are dense near a ray's lowest point. after (n,): where it begins to count, of rays that
-    go up.
+    They are dense near a ray's lowest point. after (n,): the distance where the integral along a
+    rising ray begins.
     """
     lowest = np.maximum(radius * np.sqrt(np.maximum(1.0 - mu * mu, 0.0)), 0.0)
     down = mu < 0.0
@@ -100,24 +102,24 @@ def rays(radius: Floats, mu: Floats, count: int, after: Floats | None = None) ->
     passing = down & ~hits
     middle[:, passing] = 2.0 * atmosphere.columns(lowest[passing], np.zeros(int(passing.sum())))
     rising = cosine >= 0.0
-    found = np.where(
+    depths = np.where(
         down[ray],
         np.where(rising, middle[:, ray] - there, there) - start[:, ray],
         start[:, ray] - there,
     )
     slope = np.sqrt(np.maximum(1.0 - (lowest / EARTH) ** 2, 0.0))
     below = np.where(hits, atmosphere.columns(np.full_like(slope, EARTH), slope) - start, 0.0)
-    return Rays(ray, t, weight, np.maximum(found, 0.0), ground, np.maximum(below, 0.0))
+    return Rays(ray, t, weight, np.maximum(depths, 0.0), ground, np.maximum(below, 0.0))
 
 
 def _along(radius: Floats, mu: Floats, t: Floats) -> tuple[Floats, Floats]:
-    """Radius and cosine to the vertical at a distance on rays."""
+    """Return radius and cosine to the vertical at a distance along rays."""
     r = np.sqrt(np.maximum(radius * radius + t * t + 2.0 * radius * mu * t, EARTH**2))
     return r, np.clip((radius * mu + t) / r, -1.0, 1.0)
 
 
 def harmonics(mu: Floats, turn: Floats) -> Floats:
-    """Real spherical harmonics, even in the turn from the sun, (k, ...) of cosines (...).
+    """Return real spherical harmonics that are even in azimuth, (k, ...), at cosines (...).
 
     They are ordered by degree, then by order from 0.
     """
@@ -149,8 +151,8 @@ DEGREES = np.array([n for n in range(DEGREE + 1) for _ in range(n + 1)])  # of e
 class Places(NamedTuple):
     """Points on rays, each value (m,).
 
-    height [km]; cosines: sun and mu, of the sun and of the ray to the vertical; turn: of the ray's
-    azimuth from the sun's; angle: of the ray to the sun.
+    height [km]; cosines: sun and mu, of the sun and the ray to the vertical; turn, of the azimuth
+    between them; angle, between the ray and the sun.
     """
 
     height: Floats
@@ -161,18 +163,20 @@ class Places(NamedTuple):
 
 
 def places(radius: Floats, sun: Floats, mu: Floats, turn: Floats, t: Floats) -> Places:
-    """Return points (m,) at a distance t, from their rays' start radius, sun and direction."""
+    """Return points (m,) at distances t along rays with a start radius, sun and direction."""
     across, side = np.sqrt(1.0 - np.minimum(mu * mu, 1.0)), np.sqrt(1.0 - np.minimum(sun * sun, 1))
     angle = np.clip(mu * sun + across * side * turn, -1.0, 1.0)
-    r, own = _along(radius, mu, t)
+    r, ray_cosine = _along(radius, mu, t)
     there = np.clip((radius * sun + t * angle) / r, -1.0, 1.0)
-    below = np.sqrt(np.maximum(1.0 - own * own, 0.0) * np.maximum(1.0 - there * there, 0.0))
-    turned = np.where(below > 1e-9, (angle - own * there) / np.maximum(below, 1e-9), 1.0)
-    return Places(r - EARTH, there, own, np.clip(turned, -1.0, 1.0), angle)
+    below = np.sqrt(
+        np.maximum(1.0 - ray_cosine * ray_cosine, 0.0) * np.maximum(1.0 - there * there, 0.0)
+    )
+    turned = np.where(below > 1e-9, (angle - ray_cosine * there) / np.maximum(below, 1e-9), 1.0)
+    return Places(r - EARTH, there, ray_cosine, np.clip(turned, -1.0, 1.0), angle)
 
 
 def once(a: Air, way: Rays, at: Places, count: int) -> Floats:
-    """Sunlight scattered once into rays, (count, n) [1/sr]."""
+    """Return sunlight scattered once into rays, (count, n) [1/sr]."""
     toward, seen = atmosphere.sun_columns(at.height + EARTH, at.sun)
     out = np.zeros((count, a.extinct.shape[1]))
     kept = np.flatnonzero(seen)
@@ -194,10 +198,11 @@ def _add(out: Floats, ray: NDArray[np.int64], values: Floats) -> None:
 
 
 class Plan(NamedTuple):
-    """A plan by which points on rays read a field of light, float32.
+    """Interpolation of a field of light at points on rays, float32.
 
-    corners, shares: of the cells around the points, 4 of (m,); harmonics: those that count; look
-    (m, 1, harmonics): by a phase function; weights (m, n): the share that reaches a ray's start.
+    corners, shares: 4 of (m,), of the cell around each point; harmonics: the numbers of the used
+    harmonics; look (m, 1, harmonics): their values in the ray's direction, times the phase
+    function's moments; weights (m, n): scattering times transmittance to the ray's start.
     """
 
     ray: NDArray[np.int64]
@@ -209,40 +214,43 @@ class Plan(NamedTuple):
 
 
 def plans(a: Air, angles: Floats, way: Rays, at: Places) -> list[Plan]:
-    """Return plans by which points on rays read a field of sun angles: for air, then for haze."""
+    """Return the interpolation of a field of sun angles at points on rays: for air, then haze."""
     dense = densities(at.height)[:2] * way.weight
     h, x = _between(HEIGHTS, at.height)
     s, y = _between(angles, np.arccos(at.sun))
     share = np.exp(-(way.columns.T @ a.extinct))
     look = harmonics(at.mu, at.turn)
-    made = []
+    reading_plans = []
     for kind, low in enumerate((at.height < TOP, at.height < HAZY)):
-        own = np.flatnonzero(low)
+        selected = np.flatnonzero(low)
         seen = np.flatnonzero(a.moments[kind][DEGREES] != 0.0)
-        if not (len(own) and a.scatter[kind].any()):
+        if not (len(selected) and a.scatter[kind].any()):
             continue
         by = [
-            (i, j, x[own] if i else 1.0 - x[own], y[own] if j else 1.0 - y[own]) for i, j in CORNERS
+            (i, j, x[selected] if i else 1.0 - x[selected], y[selected] if j else 1.0 - y[selected])
+            for i, j in CORNERS
         ]
-        shown = (look[seen][:, own] * a.moments[kind][DEGREES[seen], None]).T[:, None]
-        made.append(
+        shown = (look[seen][:, selected] * a.moments[kind][DEGREES[seen], None]).T[:, None]
+        reading_plans.append(
             Plan(
-                way.ray[own],
-                [(h[own] + i) * len(angles) + s[own] + j for i, j, _, _ in by],
+                way.ray[selected],
+                [(h[selected] + i) * len(angles) + s[selected] + j for i, j, _, _ in by],
                 [(u * v).astype(np.float32) for _, _, u, v in by],
                 seen,
                 np.ascontiguousarray(shown, np.float32),
-                (share[own] * dense[kind, own, None] * a.scatter[kind]).astype(np.float32),
+                (share[selected] * dense[kind, selected, None] * a.scatter[kind]).astype(
+                    np.float32
+                ),
             )
         )
-    return made
+    return reading_plans
 
 
 class Field(NamedTuple):
-    """Moments of all light that was scattered, and what falls on the ground.
+    """Moments of the scattered radiance, and its irradiance of the ground.
 
-    angles: of the sun to the vertical [rad], ascending; moments (heights, angles, harmonics, n),
-    ground (angles, n): irradiance there.
+    angles: of the sun to the vertical [rad], ascending; moments (heights, angles, harmonics, n);
+    ground (angles, n).
     """
 
     angles: Floats
@@ -250,24 +258,24 @@ class Field(NamedTuple):
     ground: Floats
 
     def scattered(self, seen: list[Plan], count: int) -> Floats:
-        """The light of this field that is scattered into rays, (count, n)."""
+        """Return this field's light scattered into rays, (count, n)."""
         out = np.zeros((count, self.moments.shape[-1]))
         for plan in seen:
             flat = self.moments[:, :, plan.harmonics].astype(np.float32)
             flat = flat.reshape(-1, *flat.shape[2:])
             for first in range(0, len(plan.ray), PIECE):
-                own = slice(first, first + PIECE)
+                piece = slice(first, first + PIECE)
                 there = np.zeros((1, 1, 1), np.float32)
                 for i, w in zip(plan.corners, plan.shares, strict=True):
-                    there = there + w[own, None, None] * flat[i[own]]
-                value = np.matmul(plan.look[own], there)[:, 0] * plan.weights[own]
-                _add(out, plan.ray[own], value.astype(np.float64))
+                    there = there + w[piece, None, None] * flat[i[piece]]
+                value = np.matmul(plan.look[piece], there)[:, 0] * plan.weights[piece]
+                _add(out, plan.ray[piece], value.astype(np.float64))
         return np.maximum(out, 0.0)
 
     def reflected(
         self, a: Air, way: Rays, sun: Floats, albedo: Floats, mu: Floats, turn: Floats, r: Floats
     ) -> Floats:
-        """Light of the ground at the end of rays; sun, mu, turn, r (n,): of their starts."""
+        """Return the ground's light along rays; sun, mu, turn, r (n,): at the rays' starts."""
         hit = way.ground >= 0.0
         out = np.zeros((len(hit), a.extinct.shape[1]))
         if not hit.any():
@@ -283,13 +291,13 @@ class Field(NamedTuple):
 
 
 def _between(grid: Floats, x: Floats) -> tuple[NDArray[np.int64], Floats]:
-    """The cells of a grid in which values lie, and where in them, 0 to 1."""
+    """Return each value's cell of a grid, and its fraction of the cell, 0 to 1."""
     i = np.clip(np.searchsorted(grid, x, "right") - 1, 0, len(grid) - 2)
     return i, np.clip((x - grid[i]) / (grid[i + 1] - grid[i]), 0.0, 1.0)
 
 
 def _places_around(sun: float) -> Floats:
-    """Return angles of the sun to the vertical (n,) at places around one of `sun` [rad]."""
+    """Return angles of the sun to the vertical (n,) around `sun` [rad]."""
     low = max(np.degrees(sun) - AROUND, 0.0)
     high = min(np.degrees(sun) + AROUND, 180.0)
     apart = BETWEEN if np.degrees(sun) < DUSK else AT_DUSK
@@ -315,16 +323,15 @@ def _heights_of_directions(radii: Floats) -> tuple[Floats, Floats]:
 
 
 def field(a: Air, albedo: Floats, sun: float) -> Field:
-    """The light that was scattered once or more, around a place where the sun is at an angle [rad]
-    to the vertical; albedo (n,): of the ground."""
+    """Return all orders of scattered light; sun: its zenith angle [rad]; albedo (n,): ground."""
     angles = _places_around(sun)
     turns = np.cos(np.pi * (np.arange(TURNS) + 0.5) / TURNS)
     radii = np.maximum(HEIGHTS, 1e-3) + EARTH
     mu, span = _heights_of_directions(radii)
     shape = (len(radii), len(angles), 2 * SIDE_ANGLES, TURNS)
-    one = rays(np.repeat(radii, 2 * SIDE_ANGLES), mu.ravel(), FAR_NODES)
+    template = rays(np.repeat(radii, 2 * SIDE_ANGLES), mu.ravel(), FAR_NODES)
     number = np.arange(len(radii) * 2 * SIDE_ANGLES).reshape(len(radii), 1, -1, 1)
-    way = _spread(one, np.broadcast_to(number, shape).ravel())
+    way = _spread(template, np.broadcast_to(number, shape).ravel())
     starts = (
         radii[:, None, None, None],
         np.cos(angles)[:, None, None],
@@ -338,40 +345,43 @@ def field(a: Air, albedo: Floats, sun: float) -> Field:
     look = harmonics(cosines, turned).reshape(-1, *shape)
     solid = np.broadcast_to((span * 2.0 * np.pi / TURNS)[:, None, :, None], shape)
     above = np.maximum(mu[0], 0.0)[None, :, None, None] * solid[0][..., None]
-    found = Field(
+    light_field = Field(
         angles,
         np.zeros((len(radii), len(angles), len(look), bands)),
         np.zeros((len(angles), bands)),
     )
     for _ in range(ORDERS):
-        light = single + found.scattered(seen, count)
-        light += found.reflected(a, way, suns, albedo, cosines, turned, radius)
+        light = single + light_field.scattered(seen, count)
+        light += light_field.reflected(a, way, suns, albedo, cosines, turned, radius)
         light = light.reshape(*shape, bands)
         moments = np.einsum("kpsdt,psdt,psdtn->pskn", look, solid, light, optimize=True)
         ground = (light[0] * above).sum(axis=(1, 2))
-        change = np.abs(moments - found.moments).max()
-        found = Field(angles, moments, ground)
+        change = np.abs(moments - light_field.moments).max()
+        light_field = Field(angles, moments, ground)
         if change <= ENOUGH * np.abs(moments).max():
             break
-    return found
+    return light_field
 
 
-def _spread(one: Rays, source: NDArray[np.int64]) -> Rays:
-    """Rays anew, those of numbers (n,) among `one`."""
-    total = len(one.ground)
-    first, each = np.searchsorted(one.ray, np.arange(total)), np.bincount(one.ray, minlength=total)
+def _spread(template: Rays, source: NDArray[np.int64]) -> Rays:
+    """Return the rays of numbers (n,) of `template`; a ray may repeat."""
+    total = len(template.ground)
+    first, each = (
+        np.searchsorted(template.ray, np.arange(total)),
+        np.bincount(template.ray, minlength=total),
+    )
     counts = each[source]
     ray = np.repeat(np.arange(len(source)), counts)
     inside = np.arange(len(ray)) - np.repeat(np.cumsum(counts) - counts, counts)
     pick = np.repeat(first[source], counts) + inside
     return Rays(
-        ray, one.t[pick], one.weight[pick], one.columns[:, pick],
-        one.ground[source], one.below[:, source],
+        ray, template.t[pick], template.weight[pick], template.columns[:, pick],
+        template.ground[source], template.below[:, source],
     )  # fmt: skip
 
 
 def radiance(
-    given: Atmosphere,
+    contents: Atmosphere,
     albedo: Floats,
     sun: float,
     height: float,
@@ -379,30 +389,30 @@ def radiance(
     turn: Floats,
     lambdas: Floats = LAMBDAS,
 ) -> Floats:
-    """Radiance of the sky and the ground per irradiance of the sun, (n, m) [1/sr] at lambdas (m,).
+    """Return radiance of sky and ground per irradiance of the sun, (n, m) [1/sr] at lambdas (m,).
 
     albedo (m,): of the ground; sun: its angle to the vertical [rad]; height: of the observer [km];
-    mu, turn (n,): cosines of directions to the vertical, and of their turn from the sun.
+    mu, turn (n,): cosines of the directions' angle to the vertical and azimuth from the sun.
     """
     coarse = COARSE[(lambdas.min() <= COARSE) & (lambdas.max() >= COARSE)]
     coarse = coarse if len(coarse) > 1 and len(lambdas) > len(coarse) else lambdas
-    dim = air(given, coarse)
+    dim = air(contents, coarse)
     low = np.interp(coarse, lambdas, albedo)
-    found = field(dim, low, sun)
+    light_field = field(dim, low, sun)
     radius, suns = np.full(len(mu), EARTH + height), np.full(len(mu), np.cos(sun))
     steep, which = np.unique(mu, return_inverse=True)
     way = _spread(rays(radius[: len(steep)], steep, VIEW_NODES // 2), which)
     at = places(radius[way.ray], suns[way.ray], mu[way.ray], turn[way.ray], way.t)
-    further = found.scattered(plans(dim, found.angles, way, at), len(mu))
-    further += found.reflected(dim, way, suns, low, mu, turn, radius)
-    fine = air(given, lambdas)
+    further = light_field.scattered(plans(dim, light_field.angles, way, at), len(mu))
+    further += light_field.reflected(dim, way, suns, low, mu, turn, radius)
+    fine = air(contents, lambdas)
     way = rays(radius, mu, VIEW_NODES, _shadow(radius, suns, mu, turn))
     at = places(radius[way.ray], suns[way.ray], mu[way.ray], turn[way.ray], way.t)
     return once(fine, way, at, len(mu)) + _refined(further, coarse, lambdas)
 
 
 def _refined(values: Floats, coarse: Floats, lambdas: Floats) -> Floats:
-    """Values (n, k) at coarse wavelengths as those (n, m) at lambdas, linear in the logarithm."""
+    """Return values (n, k) at coarse wavelengths interpolated to lambdas (n, m), by logarithms."""
     if len(coarse) == len(lambdas):
         return values
     i, x = _between(coarse, lambdas)
@@ -411,7 +421,7 @@ def _refined(values: Floats, coarse: Floats, lambdas: Floats) -> Floats:
 
 
 def _shadow(radius: Floats, sun: Floats, mu: Floats, turn: Floats) -> Floats:
-    """Where rays that go up leave the earth's shadow, 0 for those that begin outside of it [km]."""
+    """Return distances along rising rays to the end of the earth's shadow [km]; 0 outside of it."""
     across, side = np.sqrt(1.0 - np.minimum(mu * mu, 1.0)), np.sqrt(1.0 - np.minimum(sun * sun, 1))
     angle = mu * sun + across * side * turn
     inside = (sun < 0.0) & (radius * side < EARTH) & (mu >= 0.0)

@@ -1,4 +1,4 @@
-"""The air: how deep each of its parts is by wavelength, and how dense by height.
+"""The air: optical depth by wavelength and density by height of gas, aerosol and ozone.
 
 Heights are in km. Extinction has three parts: air that scatters after Rayleigh, aerosol, and ozone,
 which absorbs. Air: Bodhaine et al. 1999, its depolarisation 0.0279 too. Aerosol: exponential, power
@@ -17,7 +17,7 @@ from clpt.arrays import Floats
 from clpt.spectra.data import table
 
 EARTH = 6371.0  # radius [km]
-AEROSOL_HEIGHT = 1.2  # in which its density falls to 1/e [km]
+AEROSOL_HEIGHT = 1.2  # scale height: the density falls to 1/e [km]
 OZONE_MIDDLE, OZONE_WIDTH = 23.25, 4.63  # of the layer [km]
 DOBSON = 2.687e20  # molecules over a square metre
 DEPOLARISED = 0.0279 / (2.0 - 0.0279)  # gamma of the phase function of air
@@ -32,7 +32,7 @@ LAMBDAS, SUNLIGHT, OZONE = _solar()  # [nm], [W m^-2 nm^-1] above the air, [m^2]
 
 
 def _shares() -> tuple[Floats, Floats]:
-    """Heights [km], and the logarithm of the share of the column in a km, linear in between."""
+    """Return heights [km] and the logarithm of the column's share per km; linear in between."""
     height, density = table("air.csv").T
     fall = np.diff(np.log(density))
     return height, np.log(density / (np.diff(density) / fall * np.diff(height)).sum())

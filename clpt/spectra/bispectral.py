@@ -1,4 +1,4 @@
-"""Readers of measured fluorescence: BFC-450 matrices, and a table of our own."""
+"""Readers of measured fluorescence: BFC-450 matrices, and plain tables."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ from clpt.spectra.files import fields_of
 from clpt.spectra.reradiation import Donaldson
 from clpt.spectra.spectrum import Tabulated, _floats
 
-NOISE = 2.0  # standard deviations below which a measured value counts as none
-QUIET = 40.0  # [nm] on the short side of what excites it, where nothing can be but noise
+NOISE = 2.0  # a value below this many standard deviations counts as 0
+QUIET = 40.0  # [nm] below the exciting wavelength, where a measured value is noise
 
 
 def read_bispectral(path: str | Path) -> tuple[Tabulated, Donaldson]:
     """Read reflectance and re-radiation from a matrix of a Labsphere BFC-450, by its `.BFC` text.
 
-    A row is a wavelength out, a column one in, and a value the share of energy per band of the
-    instrument. The two are told apart as follows. Values at a longer wavelength in than out are
-    noise, and so is all below two standard deviations of what lies 40 nm off there. The diagonal is
-    reflectance, less half of its neighbour on the side of fluorescence: where that ends, it falls
-    to zero within two bands. Below the first row the reflectance holds. Raises SceneError.
+    A row is a wavelength out, a column a wavelength in, and a value the share of energy per band
+    of the instrument. Reflectance and fluorescence are separated as follows. Values at a longer
+    wavelength in than out are noise; a value below two standard deviations of this noise, taken
+    40 nm off, counts as 0. The diagonal is reflectance, less half of its neighbour on the side of
+    fluorescence. Fluorescence falls to zero within two bands of its last value. Below the first
+    row the reflectance holds. Raises SceneError.
     """
     out, into, values = _matrix(path)
     gap = into - out[:, None]
@@ -45,8 +46,8 @@ def read_bispectral(path: str | Path) -> tuple[Tabulated, Donaldson]:
 def read_reradiation(path: str | Path) -> Donaldson:
     """Read a re-radiation matrix: a `.BFC` file, or a table of values [1/nm] as text.
 
-    The table's first line is a label and the wavelengths in; every other one a wavelength out and
-    its row; separated by blanks, commas or semicolons; `#` starts a comment. Raises SceneError.
+    The table's first line is a label and the wavelengths in; every other line a wavelength out and
+    its row. Blanks, commas or semicolons separate fields; `#` starts a comment. Raises SceneError.
     """
     if Path(path).suffix.lower() == ".bfc":
         return read_bispectral(path)[1]
@@ -58,7 +59,7 @@ def read_reradiation(path: str | Path) -> Donaldson:
 
 
 def _matrix(path: str | Path) -> tuple[Floats, Floats, Floats]:
-    """The wavelengths of the rows and of the columns, and the values, of a BFC file."""
+    """Return a BFC file's wavelengths of rows and of columns [nm], and its values."""
     lines = _lines(path)
     start = next((i for i, (_, f) in enumerate(lines) if f[0].lower().startswith("r:c")), None)
     if start is None:
@@ -72,15 +73,15 @@ def _matrix(path: str | Path) -> tuple[Floats, Floats, Floats]:
 
 
 def _lines(path: str | Path) -> list[tuple[int, list[str]]]:
-    """Line numbers and fields of the lines that hold any; `;` begins a line of remarks."""
-    found = []
+    """Return number and fields of each line that is not empty; `;` begins a comment line."""
+    numbered_fields = []
     for number, line in enumerate(text_files.read(path).splitlines(), 1):
         fields = [] if line.startswith(";") else fields_of(line, path, number)
         if fields:
-            found.append((number, fields))
-    if len(found) < 3:
+            numbered_fields.append((number, fields))
+    if len(numbered_fields) < 3:
         raise SceneError("holds no matrix of two rows or more", file=path)
-    return found
+    return numbered_fields
 
 
 def _numbers(fields: list[str], path: str | Path, line: int) -> list[float]:
@@ -92,7 +93,7 @@ def _numbers(fields: list[str], path: str | Path, line: int) -> list[float]:
 
 
 def _donaldson(path: str | Path, out: Any, into: Any, rows: Any) -> Donaldson:
-    """A matrix, whose complaints name the file."""
+    """Return the matrix; an error names the file."""
     try:
         return Donaldson(_floats(out), _floats(into), tuple(_floats(row) for row in rows))
     except SceneError as error:

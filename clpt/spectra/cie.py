@@ -109,7 +109,7 @@ def wavelength_pdf(
 
 
 def tanh_ends(lo: float, hi: float) -> tuple[float, float]:
-    """The distribution function's tanh at both ends of a range [nm]. Raises SceneError."""
+    """Return the distribution function's tanh at both ends of a range [nm]. Raises SceneError."""
     if not 0.0 < lo < hi:
         raise SceneError(f"the range of wavelengths [{lo}, {hi}] nm is empty or not positive")
     first, last = np.tanh(SAMPLING_SLOPE * (np.array([lo, hi]) - SAMPLING_CENTRE))

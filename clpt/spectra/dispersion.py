@@ -12,15 +12,15 @@ from clpt.errors import SceneError
 from clpt.spectra.spectrum import Cauchy, Sellmeier, Spectrum, Tabulated
 
 MICROMETRE = 1000.0  # [nm]
-POINTS = 2001  # at which a formula without a class of its own is tabulated
+POINTS = 2001  # of the table of a formula that has no Spectrum class
 HERZBERGER = 0.028  # [um^2], the fixed resonance of formula 7
-FIXED = {7: 6, 8: 4, 9: 6}  # coefficients of the formulas that are no sums of any length
+FIXED = {7: 6, 8: 4, 9: 6}  # formula: its number of coefficients, where this is fixed
 
 
 def from_formula(name: str, coefficients: list[float], ends: list[float]) -> Spectrum:
-    """Index by formula `name` with its coefficients, within `ends` [um] where it is tabulated.
+    """Return the index by formula `name`; where it must be tabulated, over `ends` [um].
 
-    Raises SceneError for an unknown formula or a number of coefficients that it does not take.
+    Raises SceneError for an unknown formula or a wrong number of coefficients.
     """
     if name not in tuple("123456789"):
         raise SceneError(f"dispersion formula {name!r} is not known; 1 to 9 are")
@@ -43,7 +43,7 @@ def from_formula(name: str, coefficients: list[float], ends: list[float]) -> Spe
 
 
 def _index(number: int, c: list[float], pairs: list[tuple[float, float]], um: Floats) -> Floats:
-    """Index by the formulas 3 to 9 at wavelengths [um]; zero where a square is negative."""
+    """Return the index by formulas 3 to 9 at wavelengths [um]; 0 where its square is negative."""
     l2 = um**2
     if number == 5:
         return sum((b * um**p for b, p in pairs), np.full(um.shape, c[0]))
@@ -56,7 +56,7 @@ def _index(number: int, c: list[float], pairs: list[tuple[float, float]], um: Fl
         squared = sum((b * um**p for b, p in pairs), np.full(um.shape, c[0]))
     elif number == 4:
         squared = _fourth(c + [0.0] * (9 - len(c)), um)
-    elif number == 8:  # of Lorentz and Lorenz: (n^2 - 1) / (n^2 + 2)
+    elif number == 8:  # Lorentz and Lorenz: (n^2 - 1) / (n^2 + 2)
         share = c[0] + c[1] * l2 / (l2 - c[2]) + c[3] * l2
         squared = (1.0 + 2.0 * share) / (1.0 - share)
     else:

@@ -1,4 +1,4 @@
-"""Lamps: what glows, what is excited, and the illuminants that go by a name."""
+"""Emission spectra: black bodies, spectral lines, LEDs and illuminants by name."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from clpt.spectra.spectrum import (
 
 # CODATA 2018, exact: Planck [J s], light [m/s], Boltzmann [J/K].
 PLANCK, LIGHT, BOLTZMANN = 6.62607015e-34, 299792458.0, 1.380649e-23
-LUMENS = 683.0  # of a watt of 555 nm, by which the candela is defined
-UNIT_LUMINANCE = LUMENS * cie.CIE_Y_INTEGRAL  # [cd/m^2] of a picture's luminance of 1
+LUMENS = 683.0  # [lm/W] at 555 nm: the candela's definition
+UNIT_LUMINANCE = LUMENS * cie.CIE_Y_INTEGRAL  # [cd/m^2] where a picture's luminance is 1
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Blackbody(Spectrum):
     """Planck's law at `kelvin`: radiance [W m^-2 sr^-1 nm^-1], or luminance 1 if `normalised`.
 
     Either is multiplied by `scale`. Raises SceneError for a temperature that is not positive, or
-    so low that nothing of what it glows could be normalised.
+    too low to have a luminance in float64.
     """
 
     kelvin: float
@@ -78,8 +78,8 @@ class Lines(Spectrum):
         width: float = 1.0,
         scale: float = 1.0,
     ) -> None:
-        given = {"wavelengths": wavelengths, "powers": powers}
-        for name, values in given.items():
+        lists = {"wavelengths": wavelengths, "powers": powers}
+        for name, values in lists.items():
             object.__setattr__(self, name, tuple(float(value) for value in values))
         object.__setattr__(self, "width", float(width))
         object.__setattr__(self, "scale", float(scale))
@@ -96,7 +96,7 @@ class Lines(Spectrum):
 
     @property
     def knots(self) -> tuple[Floats, Floats]:
-        """The feet and the tops of its lines."""
+        """Wavelengths [nm] and values at each line's two feet and its top."""
         at = np.unique(np.add.outer(self.wavelengths, [-self.width, 0.0, self.width]))
         return at, self.sample(at)
 
@@ -147,7 +147,7 @@ class Illuminant(Spectrum):
 
     @property
     def knots(self) -> tuple[Floats, Floats] | None:
-        """Wavelengths and values of the table or the lines that the illuminant stands for."""
+        """Wavelengths [nm] and values of the illuminant's table or lines."""
         known = _of_luminance_one(self.name).knots
         return None if known is None else (known[0], self.scale * known[1])
 
@@ -184,7 +184,7 @@ def _discharges() -> dict[str, Any]:
 
 
 def scaled(spectrum: Spectrum, factor: float) -> Spectrum:
-    """Return an emitted spectrum times a number; a colour is D65 times it, as everywhere."""
+    """Return an emitted spectrum times a number; a colour emits its spectrum times D65."""
     if factor == 1.0:
         return spectrum
     if isinstance(spectrum, (RGB, RGBUnbounded)):
@@ -208,12 +208,12 @@ def watts(spectrum: Spectrum) -> float:
 
 
 def lumens(spectrum: Spectrum) -> float:
-    """Return the light of an emitted spectrum to the eye: 683 lm/W times its integral with V."""
+    """Return the luminous flux of an emitted spectrum: 683 lm/W times its integral with V."""
     return LUMENS * float(_emitted(spectrum) @ cie.cie_xyz(cie.GRID)[:, 1])
 
 
 def _emitted(spectrum: Spectrum) -> Floats:
-    """An emitted spectrum around each whole nanometre from 360 to 830."""
+    """Return means of an emitted spectrum around each whole nanometre from 360 to 830."""
     if isinstance(spectrum, RGB):
         spectrum = RGBIlluminant(spectrum.r, spectrum.g, spectrum.b)
     return gridded(spectrum, cie.GRID)

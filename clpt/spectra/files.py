@@ -28,14 +28,14 @@ SITE_COLUMNS = (["wl", "n"], ["wl", "k"])  # titles in refractiveindex.info's CS
 def read_table(path: str | Path, outside: Outside = "zero") -> Tabulated:
     """Read `wavelength [nm], value` lines, separated by blanks, commas or semicolons.
 
-    `#` starts a comment; one line of column titles is allowed. Raises SceneError with the line.
+    `#` starts a comment; a line of column titles is allowed. Raises SceneError with the line.
     """
     (rows,) = _tables(path, text_files.read(path), (2,)).values()
     return _tabulated(path, rows, 1, outside)
 
 
 def read_columns(path: str | Path, count: int) -> tuple[Tabulated, ...]:
-    """Read rows of a wavelength [nm] and `count` values, in the form that `read_table` takes.
+    """Read rows of a wavelength [nm] and `count` values, in the form of `read_table`.
 
     Each column of values is a spectrum, zero outside. Raises SceneError with the line.
     """
@@ -44,7 +44,7 @@ def read_columns(path: str | Path, count: int) -> tuple[Tabulated, ...]:
 
 
 def read_index(path: str | Path, part: Literal["eta", "k"] = "eta") -> Spectrum:
-    """Read eta or k from what `read_refractive_index` takes, or the values of a two-column table.
+    """Read eta or k from a file of `read_refractive_index`, or the values of a two-column table.
 
     Raises SceneError.
     """
@@ -58,7 +58,7 @@ def read_index(path: str | Path, part: Literal["eta", "k"] = "eta") -> Spectrum:
 
 
 def read_absorption(path: str | Path) -> Spectrum:
-    """Read a coefficient [1/m]: 4 pi k / lambda of what `read_refractive_index` takes, or a table.
+    """Read a coefficient [1/m]: 4 pi k / lambda of a `read_refractive_index` file, or a table.
 
     A table has two columns, wavelength [nm] and coefficient. Raises SceneError.
     """
@@ -68,7 +68,7 @@ def read_absorption(path: str | Path) -> Spectrum:
 
 
 def _two_columns(path: str | Path, text: str) -> Tabulated | None:
-    """A plain table of wavelength and value; None where the file is of another form."""
+    """Return a plain table of wavelength and value; None if the file has another form."""
     if _is_page(path, text):
         return None
     tables = _tables(path, text, (2, 3))
@@ -80,8 +80,8 @@ def read_refractive_index(path: str | Path) -> tuple[Spectrum, Spectrum]:
     """Read eta and k; k is 0 where it is not given. Outside of a table its end values hold.
 
     The file is a page of refractiveindex.info's database (YAML) with a dispersion formula or tables
-    of n and k, the CSV that the site gives (columns `wl,n` and `wl,k` [um], one after the other),
-    or a table of wavelength [nm], eta and perhaps k. Raises SceneError with the line.
+    of n and k, the site's CSV (columns `wl,n`, then `wl,k` [um]), or a table of wavelength [nm],
+    eta and perhaps k. Raises SceneError with the line.
     """
     eta, k = _read_parts(path, text_files.read(path))
     if eta is None:
@@ -106,9 +106,9 @@ def _read_parts(path: str | Path, text: str) -> tuple[Spectrum | None, Spectrum]
 
 
 def _tables(path: str | Path, text: str, widths: tuple[int, ...]) -> dict[str, list[list[float]]]:
-    """Rows (n, widths) in nm of the tables in a text, by title: "", or "n" and "k" from the site.
+    """Return rows in nm of a text's tables by title: "", or the site's "n" and "k".
 
-    widths: how many columns a row may have. Raises SceneError with the line.
+    widths: the numbers of columns that a row may have. Raises SceneError with the line.
     """
     tables: dict[str, list[list[float]]] = {}
     title, titles_allowed, factor = "", True, 1.0
@@ -144,8 +144,7 @@ def _tables(path: str | Path, text: str, widths: tuple[int, ...]) -> dict[str, l
 def fields_of(line: str, path: str | Path, number: int) -> list[str]:
     """Split a line at blanks, commas or semicolons; `#` starts a comment.
 
-    Raises SceneError for a comma within a number, which a table has whose fields are separated
-    otherwise: it would begin another field.
+    Raises SceneError for a decimal comma: it would begin another field.
     """
     text = line.split("#")[0]
     comma = text_files.comma_message(text)
@@ -164,7 +163,7 @@ def _tabulated(
 
 
 def _page(path: str | Path, text: str) -> tuple[Spectrum | None, Spectrum]:
-    """Read eta, if there is one, and k from a page of the database."""
+    """Return eta, or None, and k from a page of the database."""
     page = _yaml(path, text)
     parts = page.get("DATA") if isinstance(page, dict) else None
     if not isinstance(parts, list) or not all(isinstance(part, dict) for part in parts):
@@ -194,7 +193,7 @@ def _page(path: str | Path, text: str) -> tuple[Spectrum | None, Spectrum]:
 
 
 def _yaml(path: str | Path, text: str) -> Any:
-    """A page as texts, lists and dictionaries. References, which grow without end, are refused."""
+    """Return a page as texts, lists and dictionaries; aliases, which can grow endlessly, raise."""
     import yaml  # takes as long to import as all of clpt.spectra
 
     class Loader(yaml.BaseLoader):

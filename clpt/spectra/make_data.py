@@ -13,11 +13,13 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
-from clpt.spectra import files
+from clpt.spectra import cie, files
 from clpt.spectra.data import ROOT
 from clpt.spectra.dispersion import POINTS
-from clpt.spectra.spectrum import Tabulated
+from clpt.spectra.spectrum import Tabulated, d65
 
 LAMPS = (
     *(f"F{i}" for i in range(1, 13)),
@@ -25,6 +27,8 @@ LAMPS = (
     *(f"LED-{name}" for name in ("B1", "B2", "B3", "B4", "B5", "BH1", "RGB1", "V1", "V2")),
 )
 METALS_WITHIN = (300.0, 1100.0)  # [nm]
+PRIMARIES_STEP = 5.0  # [nm]
+PRIMARIES_WEIGHT = 3e3  # of colours and sums against smoothness
 FORMULA_AT = np.arange(300.0, 1101.0, 20.0)  # [nm], where pages of formulas are tabulated
 
 
@@ -80,11 +84,11 @@ def rewrite_metals(database: Path) -> None:
         notes = [line[2:] for line in path.read_text("utf-8").splitlines()[:2]]
         page = notes[1].split(", ")[1]
         group, material, author = page.split("/")
-        found = sorted(database.glob(f"**/{group}/{material}/**/{author}"))
-        if not found:
+        pages = sorted(database.glob(f"**/{group}/{material}/**/{author}"))
+        if not pages:
             print(f"{page}: not in {database}, kept as it is")
             continue
-        eta, k = files.read_refractive_index(found[0])
+        eta, k = files.read_refractive_index(pages[0])
         lambdas = FORMULA_AT
         if isinstance(eta, Tabulated):
             known = np.array(eta.lambdas)
@@ -95,8 +99,36 @@ def rewrite_metals(database: Path) -> None:
         write_csv(path, notes, "lambda [nm], eta, k", rows[keep])
 
 
+def write_primaries() -> None:
+    at, values = primaries()
+    header = "wavelength [nm], reflectances of red, green and blue (make_data.py)"
+    np.savetxt(ROOT / "primaries.csv", np.vstack([at, values]).T, "%.7f", ",", header=header)
+
+
+def primaries() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return wavelengths (n,) [nm] and the primaries' reflectances (3, n).
+
+    They lie in [0, 1], have the colours of Rec. 709's primaries under D65, add up to 1 at every
+    wavelength, and are as smooth as that allows (Mallett and Yuksel 2019, eq. 6 to 9).
+    """
+    nodes = np.arange(cie.LAMBDA_MIN, cie.LAMBDA_MAX + 0.1, PRIMARIES_STEP)
+    n = len(nodes)
+    hats = np.stack([np.interp(cie.GRID, nodes, hat) for hat in np.eye(n)])
+    seen = cie.xyz_to_rgb(cie.spectrum_to_xyz(hats * d65().sample(cie.GRID))).T
+    colours = np.kron(np.eye(3), seen)
+    bends = np.kron(np.eye(3), np.diff(np.eye(n), 2, axis=0))
+    sums = np.hstack([np.eye(n)] * 3)
+    rows = np.vstack([PRIMARIES_WEIGHT * colours, bends, PRIMARIES_WEIGHT * sums])
+    at_colours, at_sums = PRIMARIES_WEIGHT * np.eye(3).reshape(-1), np.full(n, PRIMARIES_WEIGHT)
+    wanted = [at_colours, np.zeros(len(bends)), at_sums]
+    options = {"tol": 1e-14, "max_iter": 2000, "lsq_solver": "exact"}
+    solution = lsq_linear(rows, np.concatenate(wanted), (0.0, 1.0), **options)
+    return nodes, solution.x.reshape(3, n)
+
+
 if __name__ == "__main__":
     write_observers()
     write_illuminants()
+    write_primaries()
     if len(sys.argv) > 1:
         rewrite_metals(Path(sys.argv[1]))

@@ -21,12 +21,12 @@ NAMES = {  # of the elements, and of brass
 
 
 def metals() -> tuple[str, ...]:
-    """Names that `metal` knows: symbols, the names of elements, and none."""
+    """Return the names that `metal` takes: symbols, elements' names and "none"."""
     return (*data.names("metals"), *NAMES, "none")
 
 
 def glasses() -> tuple[str, ...]:
-    """Names that `glass` knows."""
+    """Return the names that `glass` takes."""
     return tuple(_glasses())
 
 
@@ -34,7 +34,7 @@ def glasses() -> tuple[str, ...]:
 def metal(name: str) -> tuple[Spectrum, Spectrum]:
     """Complex index (eta, k) of a metal, "gold" or "Au"; "none" reflects everything.
 
-    A suffix `_palik`, which tells two tables of one metal apart in Mitsuba, is ignored.
+    Mitsuba's suffix `_palik` is ignored.
     Raises UnknownKindError.
     """
     if name == "none":
@@ -50,8 +50,8 @@ def metal(name: str) -> tuple[Spectrum, Spectrum]:
 def glass(name: str, dispersion: bool = True) -> Constant | Sellmeier:
     """Index of a glass, liquid, crystal or gas, by its name in any case.
 
-    With `dispersion`, Sellmeier's formula where one is published here; otherwise, and for the
-    rest, the constant that Mitsuba and Hecht's Optics list. Raises UnknownKindError.
+    With `dispersion`, Sellmeier's formula where clpt has it; otherwise the constant that Mitsuba
+    and Hecht's Optics list. Raises UnknownKindError.
     """
     entry = _glasses().get(name.lower())
     if entry is None:

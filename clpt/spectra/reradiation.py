@@ -1,10 +1,10 @@
-"""Fluorescence: light that is taken in at one wavelength and given out at another.
+"""Fluorescence: light absorbed at a wavelength and emitted at a longer wavelength.
 
 A re-radiation matrix Phi(out, in) [1/nm] (Donaldson 1954) is the share of the energy that arrives
-at `in` and leaves again per nm at `out`. It holds fluorescence only; what keeps its wavelength is
-an ordinary reflectance. Light is never given out at a shorter wavelength than it had (Stokes
-1852), but for the steps of a table: what comes between two of its wavelengths may leave between
-them.
+at `in` and leaves again per nm at `out`. It holds fluorescence alone; light that keeps its
+wavelength belongs to the reflectance. Light never leaves at a shorter wavelength than it had
+(Stokes 1852), but for the step of a table: energy absorbed between two wavelengths of the table
+may leave between the same two.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from clpt.errors import SceneError
 from clpt.spectra import cie
 from clpt.spectra.spectrum import Spectrum, Tabulated, d65, extremes, gridded
 
-STEP = 5.0  # [nm] between the wavelengths at which a matrix is tabulated
+STEP = 5.0  # [nm] between a tabulated matrix's wavelengths
 GRID = np.arange(250.0, 900.0 + STEP, STEP)  # [nm], those of a Fluorophore
-LEAST_REST = 1e-3  # share of an emission below which no light is left to be given out
+LEAST_REST = 1e-3  # least share of an emission above `in`; below it, nothing is emitted
 
 
 class Reradiation(ABC):
@@ -44,7 +44,7 @@ class Reradiation(ABC):
         return np.where(inside & among, near * (1.0 - s) + far * s, 0.0)
 
     def on_nodes(self, nodes: Matrix) -> Matrix:
-        """Phi (n, n) [1/nm] at even wavelengths (n,) [nm], of which all that lies between is kept.
+        """Phi (n, n) [1/nm] at even wavelengths (n,) [nm]; the energy in between is kept.
 
         Rows are wavelengths out. See `clpt.spectra.spectrum.gridded`.
         """
@@ -53,13 +53,13 @@ class Reradiation(ABC):
         return np.stack([gridded(Tabulated(columns, row), nodes) for row in out])
 
     def emitted(self, into: ArrayLike) -> Matrix:
-        """Share of the energy that arrives at `into` [nm] and is given out, at any wavelength."""
+        """Share of the energy arriving at `into` [nm] that is re-emitted, at any wavelength."""
         rows, columns, values = self.table
         sums = _weights(rows) @ values
         return np.asarray(np.interp(np.asarray(into, float), columns, sums, 0.0, 0.0))
 
     def to_rgb(self, low: float = cie.LAMBDA_MIN, high: float = cie.LAMBDA_MAX) -> Matrix:
-        """Linear Rec.709 (3,) of what is given out under D65, of which [low, high] nm arrives.
+        """Linear Rec.709 (3,) of the light re-emitted under D65 that is limited to [low, high] nm.
 
         White paper has (1, 1, 1); a bright pigment may exceed it, and lie outside of the gamut.
         """
@@ -71,7 +71,7 @@ class Reradiation(ABC):
 
 @dataclass(frozen=True)
 class Donaldson(Reradiation):
-    """A measured matrix: rows [1/nm] at wavelengths `out`, a column for each wavelength `into`.
+    """A measured matrix: a row [1/nm] for each wavelength `out`, a column for each `into`.
 
     Raises SceneError where the wavelengths do not ascend, or a value is missing or below zero.
     """
@@ -100,13 +100,13 @@ class Donaldson(Reradiation):
 
 @dataclass(frozen=True)
 class Fluorophore(Reradiation):
-    """A dye: what it absorbs, the shape of what it emits, and how many photons it gives for one.
+    """A dye: its absorption, the shape of its emission, and its yield of photons.
 
     Phi(out, in) = quantum_yield absorption(in) in emission(out) / sum of (l emission(l) dl): a
     photon's energy falls with its wavelength, so energy is lost where `out` is longer than `in`.
-    absorption: share of the light in [0, 1]; emission: relative radiance per nm, of any scale; it
-    keeps its shape whatever excites it (Vavilov 1927; Kasha 1950), but for what would come out at
-    less than `in`, which is left out, and the rest scaled up so that the yield holds. Both are
+    absorption: share of the light in [0, 1]; emission: relative radiance per nm, of any scale. The
+    emission's shape does not depend on `in` (Vavilov 1927; Kasha 1950), but for its part below
+    `in`: this is cut off, and the part above is scaled up so that the yield holds. Both are
     averaged around wavelengths 5 nm apart, from 250 to 900 nm; narrow lines keep their area.
     Raises SceneError for numbers outside their limits.
     """
@@ -141,7 +141,7 @@ class Fluorophore(Reradiation):
         return self._matrix(grid)[inside, inside]
 
     def _matrix(self, grid: Matrix) -> Matrix:
-        """Phi (n, n) at even wavelengths that cover GRID; nothing happens outside of GRID."""
+        """Return Phi (n, n) at even wavelengths that cover GRID; it is 0 outside of GRID."""
         known = (grid >= GRID[0]) & (grid <= GRID[-1])
         absorbed, emitted = (
             np.where(known, gridded(part, grid), 0.0) for part in (self.absorption, self.emission)
@@ -160,7 +160,7 @@ def _weights(nodes: Matrix) -> Matrix:
 
 
 def _cells(nodes: Matrix, at: Matrix) -> tuple[NDArray[np.intp], Matrix, NDArray[np.bool_]]:
-    """The cell between nodes in which each wavelength lies, how far along it, whether in any."""
+    """Return each wavelength's cell between nodes, its fraction of the cell, whether inside."""
     cell = np.clip(np.searchsorted(nodes, at, "right") - 1, 0, len(nodes) - 2)
     along = (at - nodes[cell]) / (nodes[cell + 1] - nodes[cell])
     return cell, along, (at >= nodes[0]) & (at <= nodes[-1])

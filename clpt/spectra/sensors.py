@@ -1,4 +1,4 @@
-"""Sensors: what a film responds to. The CIE observers, and cameras by their sensitivities.
+"""Sensors: a film's spectral sensitivities. The CIE observers, and measured cameras.
 
 A response is the integral of radiance times a curve, over that of the 1931 observer's y
 (CIE_Y_INTEGRAL). A matrix takes the three responses to XYZ.
@@ -21,7 +21,7 @@ from clpt.spectra.spectrum import Spectrum, Tabulated, d65
 Rows = tuple[tuple[float, ...], ...]
 
 OBSERVERS = {f"cie{year}": year for year in cie.OBSERVERS}
-LEVELS = (0.05, 0.3, 0.6, 0.9)  # of red, green and blue in the reflectances that a fit is made to
+LEVELS = (0.05, 0.3, 0.6, 0.9)  # of red, green and blue in the fitted reflectances
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Sensor:
         return fitted(self) if self.matrix is None else np.array(self.matrix)
 
     def xyz(self, spectrum: Spectrum, lambdas: ArrayLike = cie.GRID) -> Matrix:
-        """XYZ (3,) that the sensor tells of a radiance; a sum over `lambdas` (n,), 1 nm apart."""
+        """XYZ (3,) that the sensor measures: a sum over `lambdas` (n,), 1 nm apart."""
         responses = spectrum.sample(lambdas) @ self.sample(lambdas) / cie.CIE_Y_INTEGRAL
         return self.to_xyz @ responses
 
@@ -91,22 +91,22 @@ def fitted(sensor: Sensor) -> Matrix:
     white = light @ sensor.sample(cie.GRID) / cie.CIE_Y_INTEGRAL
     wanted = cie.spectrum_to_xyz(reflected)
     # Per row m of the matrix: min |seen m - wanted|^2 with white . m = white's X, Y or Z.
-    scale = white.max()  # of the curves, which may be in any unit
+    scale = white.max()  # removes the curves' unit
     seen, white = seen / scale, white / scale
     normal = np.block([[seen.T @ seen, white[:, None]], [white[None, :], np.zeros((1, 1))]])
     right = np.vstack([seen.T @ wanted, cie.spectrum_to_xyz(light)])
     try:
-        found = np.linalg.solve(normal, right)[:3].T / scale
+        matrix = np.linalg.solve(normal, right)[:3].T / scale
     except np.linalg.LinAlgError:
         raise SceneError("the curves of a sensor must differ; or give its matrix") from None
-    found.setflags(write=False)
-    return found
+    matrix.setflags(write=False)
+    return matrix
 
 
 def read_sensor(path: str | Path) -> Sensor:
     """Read a camera's sensitivities: rows of a wavelength [nm] and three values, ascending.
 
-    Blanks, commas or semicolons separate them, `#` starts a comment, one line of column titles is
+    Blanks, commas or semicolons separate fields, `#` starts a comment, a line of column titles is
     allowed. Raises SceneError with the line.
     """
     red, green, blue = files.read_columns(path, 3)

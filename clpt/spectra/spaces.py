@@ -1,4 +1,4 @@
-"""Colour spaces that a picture can be in, and the adaptation of white.
+"""Colour spaces of pictures, and the adaptation of white.
 
 A space is linear; (1, 1, 1) is its white. XYZ is of the 1931 observer, the constant spectrum 1 has
 Y = 1. Spaces whose white is D65 take it as tabulated, so that grey under D65 stays exactly grey.
@@ -63,8 +63,8 @@ def from_xyz(space: str) -> Matrix:
 def bradford(source: ArrayLike, target: ArrayLike) -> Matrix:
     """The matrix (3, 3) that takes XYZ under the white `source` (3,) to XYZ under `target` (3,).
 
-    Cone responses are scaled one by one (von Kries 1902), those of Bradford (Lam 1985). Whites are
-    taken at Y = 1, so brightness stays.
+    Bradford's cone responses (Lam 1985) are scaled (von Kries 1902). Whites are taken at Y = 1, so
+    brightness stays.
     """
     whites = [np.asarray(w, np.float64) / np.asarray(w, np.float64)[1] for w in (source, target)]
     cones = [BRADFORD @ w for w in whites]
@@ -73,7 +73,7 @@ def bradford(source: ArrayLike, target: ArrayLike) -> Matrix:
 
 
 def between(source: str, target: str) -> Matrix:
-    """The matrix (3, 3) from one space to another, white to white by Bradford's transform."""
+    """The matrix (3, 3) between two spaces, white to white by Bradford's transform."""
     adapted = bradford(white(source), white(target))
     return from_xyz(target) @ adapted @ to_xyz(source)
 
@@ -89,10 +89,10 @@ def chromaticities(space: str) -> tuple[float, ...]:
 
 
 def to_rec709(stated: ArrayLike) -> Matrix | None:
-    """The matrix (3, 3) from colours of stated chromaticities to Rec. 709, None for those of it.
+    """Return the matrix (3, 3) from stated chromaticities to Rec. 709; None if they are Rec. 709's.
 
-    stated: as of `chromaticities`, of any primaries and white, which is adapted by Bradford's
-    transform; XYZ stays as it is. Raises SceneError where they span no colours.
+    stated: in the order of `chromaticities`. Bradford's transform adapts the white; XYZ stays as it
+    is. Raises SceneError if the chromaticities span no colours.
     """
     if _is_near(stated, "rec709"):
         return None
@@ -108,21 +108,21 @@ def stated_to_xyz(stated: ArrayLike) -> tuple[Matrix, Matrix]:
     for space in SPACES:
         if _is_near(stated, space):
             return to_xyz(space), white(space)
-    given = np.asarray(stated, np.float64).reshape(-1)
-    if given.shape != (8,) or not np.isfinite(given).all() or given[7] <= 0.0:
-        raise SceneError(f"the chromaticities {given.tolist()} span no colours")
-    xy, whole = given[:6].reshape(3, 2).T, xyz_of(given[6:])
+    numbers = np.asarray(stated, np.float64).reshape(-1)
+    if numbers.shape != (8,) or not np.isfinite(numbers).all() or numbers[7] <= 0.0:
+        raise SceneError(f"the chromaticities {numbers.tolist()} span no colours")
+    xy, whole = numbers[:6].reshape(3, 2).T, xyz_of(numbers[6:])
     primaries = np.vstack([xy, 1.0 - xy.sum(axis=0)])
     if abs(np.linalg.det(primaries)) < 1e-6:
-        raise SceneError(f"the chromaticities {given.tolist()} span no colours")
+        raise SceneError(f"the chromaticities {numbers.tolist()} span no colours")
     return primaries * np.linalg.solve(primaries, whole), whole
 
 
 def _is_near(stated: ArrayLike, space: str) -> bool:
-    """Whether stated chromaticities are those of a space, to four digits."""
-    given = np.asarray(stated, np.float64).reshape(-1)
+    """Return whether stated chromaticities equal a space's to four digits."""
+    numbers = np.asarray(stated, np.float64).reshape(-1)
     known = chromaticities(space)
-    return given.shape == (8,) and np.allclose(given, known, rtol=0.0, atol=1e-4)
+    return numbers.shape == (8,) and np.allclose(numbers, known, rtol=0.0, atol=1e-4)
 
 
 def xyz_of(xy: ArrayLike) -> Matrix:
@@ -134,7 +134,7 @@ def xyz_of(xy: ArrayLike) -> Matrix:
 def xy_of_temperature(kelvin: float) -> tuple[float, float]:
     """Chromaticity of a correlated colour temperature within TEMPERATURES.
 
-    From 4000 K on that of daylight (CIE 15:2004 eq. 3.3 and 3.4), below that of a black body.
+    From 4000 K on daylight's (CIE 15:2004 eq. 3.3 and 3.4), below 4000 K a black body's.
     """
     if kelvin < 4000.0:
         xyz = cie.spectrum_to_xyz(Blackbody(kelvin).sample(cie.GRID))

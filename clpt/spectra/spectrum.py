@@ -1,8 +1,8 @@
-"""Spectra as plain immutable data: what a scene holds, sampled in nm.
+"""Spectra as plain immutable data of a scene, sampled in nm.
 
-`to_rgb(role)` is what an RGB renderer uses in its place, by Mitsuba 3's rules: a "reflectance" is
-seen under D65 and clamped to [0, 1], an "unbounded" quantity (eta, k, extinction) is seen under D65
-and only kept from being negative, an "emission" is integrated as it is.
+`to_rgb(role)` is an RGB renderer's stand-in for a spectrum, by Mitsuba 3's rules: a "reflectance"
+is seen under D65 and clamped to [0, 1], an "unbounded" quantity (eta, k, extinction) is seen under
+D65 and clamped from below at 0, an "emission" is integrated as it is.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from clpt.spectra import cie, data, upsampling
 Role = Literal["reflectance", "unbounded", "emission"]
 Outside = Literal["zero", "hold"]
 
-SHORTEST, LONGEST = 200.0, 2000.0  # [nm], the ends of the widest range that a film can have
+SHORTEST, LONGEST = 200.0, 2000.0  # [nm], the ends of a film's widest range
 WIDEST = np.arange(SHORTEST, LONGEST + 0.5)  # that range, whole nanometres
 
 
@@ -46,8 +46,8 @@ class Spectrum(ABC):
     def knots(self) -> tuple[Floats, Floats] | None:
         """Wavelengths [nm] and values (n,) of a spectrum that is linear between them; else None.
 
-        The wavelengths ascend; where one stands twice is a step. The first and the last value hold
-        beyond the ends.
+        The wavelengths ascend; a wavelength that stands twice is a step. The first and the last
+        value hold beyond the ends.
         """
         return None
 
@@ -68,7 +68,7 @@ class Spectrum(ABC):
 
 @dataclass(frozen=True)
 class Constant(Spectrum):
-    """A spectrum with one value at every wavelength."""
+    """A spectrum with the same value at every wavelength."""
 
     value: float
 
@@ -84,7 +84,8 @@ class Constant(Spectrum):
 class Tabulated(Spectrum):
     """Linear between points; outside them zero, or the end values if `outside` is "hold".
 
-    Raises SceneError for wavelengths that do not ascend, or values that are not as many or finite.
+    Raises SceneError for wavelengths that do not ascend, and for values of another number or that
+    are not finite.
     """
 
     lambdas: tuple[float, ...]
@@ -155,7 +156,7 @@ class RGBUnbounded(_Colour):
 
 @dataclass(frozen=True)
 class RGBIlluminant(RGBUnbounded):
-    """Emission of that colour: an unbounded spectrum times D65, (1, 1, 1) having luminance 1."""
+    """Emission of a colour: its unbounded spectrum times D65; (1, 1, 1) has luminance 1."""
 
     def sample(self, lambdas: ArrayLike) -> Floats:
         return super().sample(lambdas) * d65().sample(lambdas)
@@ -211,7 +212,7 @@ def absorption(k: Spectrum) -> Spectrum:
 
 
 def check_reach(first: float, last: float) -> None:
-    """Raise SceneError for data from `first` to `last` [nm] of which no film can see anything."""
+    """Raise SceneError for data from `first` to `last` [nm] that lie outside every film's range."""
     if last < SHORTEST or first > LONGEST:
         raise SceneError(
             f"its wavelengths are {first:g} to {last:g} nm, but films lie within {SHORTEST:g} to"
@@ -225,8 +226,8 @@ def extremes(
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """The least and the largest value from `low` to `high` [nm], each with its wavelength [nm].
 
-    Of a table they are exact; of a formula they are those at whole nanometres and at the ends. A
-    value that is not a number counts as both.
+    A table's are exact; a formula is sampled at whole nanometres and at the ends. A value that is
+    not a number counts as both.
     """
     points = [low, *np.arange(np.ceil(low), high), high]
     if spectrum.knots is not None:
@@ -272,9 +273,9 @@ def with_luminance_one(rows: Floats) -> Tabulated:
 
 
 def on_grid(spectrum: Spectrum, lo: float, hi: float, step: float = 1.0) -> NDArray[np.float32]:
-    """Values at lo, lo + step, ... up to the first one at or past hi [nm], float32.
+    """Values of `gridded` at lo, lo + step, ... up to hi or the first step past it [nm], float32.
 
-    They are what `gridded` gives. Raises SceneError for a range or a step that is none.
+    Raises SceneError for an empty range or a step that is not above 0.
     """
     if not (0.0 < lo < hi and step > 0.0):
         raise SceneError(f"cannot tabulate a spectrum over [{lo}, {hi}] nm in steps of {step}")
@@ -286,8 +287,8 @@ def on_grid(spectrum: Spectrum, lo: float, hi: float, step: float = 1.0) -> NDAr
 def gridded(spectrum: Spectrum, grid: Floats) -> Floats:
     """The spectrum at the nodes of an even grid (n,) [nm], float64; linear between, it keeps power.
 
-    A spectrum of `knots` that are not all nodes is averaged around each node, see `hat_means`:
-    lines that lie between the nodes are kept. Any other is sampled.
+    A spectrum that has `knots` between the nodes is averaged around each node (`hat_means`), so
+    that lines between the nodes keep their power. Any other spectrum is sampled.
     """
     if spectrum.knots is None:
         return spectrum.sample(grid)
@@ -300,15 +301,15 @@ def gridded(spectrum: Spectrum, grid: Floats) -> Floats:
 
 
 def hat_means(at: Floats, values: Floats, grid: Floats) -> Floats:
-    """Means around the nodes of an even grid (n,), of what is linear between the points `at` (m,).
+    """Means around an even grid's nodes (n,) of a curve that is linear between points `at` (m,).
 
-    Weights fall linearly to 0 at the next nodes ("hats"). So the integral of what is linear between
-    the means is that of `values` (m,), from the first node to the last.
+    Weights fall linearly to 0 at the next nodes ("hats"). So the means, joined linearly, have the
+    same integral as `values` (m,) from the first node to the last.
     """
     points = np.union1d(grid, at[(at > grid[0]) & (at < grid[-1])])
     near, far = points[:-1], points[1:]
     width, step = far - near, grid[1] - grid[0]
-    # Ends of each piece from two values inside, as a step may stand at either end.
+    # A step may stand at either end of a piece: the ends follow from two values inside.
     p, q = (np.interp(near + share * width, at, values) for share in (0.25, 0.75))
     first, last = 1.5 * p - 0.5 * q, 1.5 * q - 0.5 * p
     cell = np.searchsorted(grid, near + 0.5 * width) - 1

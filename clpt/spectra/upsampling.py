@@ -1,4 +1,4 @@
-"""Rec.709 colours made smooth reflectance spectra (Jakob and Hanika 2019).
+"""Smooth reflectance spectra from Rec.709 colours (Jakob and Hanika 2019).
 
 S(lambda) = 1/2 + x / (2 sqrt(1 + x^2)),  x = (c0 lambda + c1) lambda + c2,  lambda in nm.
 
@@ -22,7 +22,7 @@ from clpt.arrays import Floats
 from clpt.spectra.data import ROOT
 
 NODES = 40
-QUANTUM = 1.0 / 2048.0  # of the table's values, which are stored as differences along each axis
+QUANTUM = 1.0 / 2048.0  # of the table's values; the file stores differences along each axis
 CENTRE, HALF_WIDTH = 595.0, 235.0  # [nm] of the unit coordinate
 DARKEST = 1e-9  # flat reflectances stay this far inside (0, 1), where x is finite
 EDGE = 1e-4  # the outermost layers, in place of black and white
@@ -85,11 +85,11 @@ def unbounded(rgb: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.float32]]
 
     def fill(start: int) -> None:
         part = slice(start, start + CHUNK)
-        own = np.maximum(np.nan_to_num(flat[part].astype(np.float64)), 0.0)
-        r, g, b = own.T
+        normalised = np.maximum(np.nan_to_num(flat[part].astype(np.float64)), 0.0)
+        r, g, b = normalised.T
         largest = 2.0 * np.maximum(np.maximum(r, g), b)
-        own /= np.where(largest > 0.0, largest, 1.0)[:, None]
-        coefficients[part] = _look_up(own, half=True)
+        normalised /= np.where(largest > 0.0, largest, 1.0)[:, None]
+        coefficients[part] = _look_up(normalised, half=True)
         scale[part] = largest
 
     starts = range(0, len(flat), CHUNK)
@@ -104,11 +104,11 @@ def unbounded(rgb: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.float32]]
 def evaluate(coefficients: ArrayLike, lambdas: ArrayLike) -> Floats:
     """Reflectances of coefficients (..., 3) at `lambdas` [nm], float64 in [0, 1].
 
-    Their shape is that of the colours and then that of the wavelengths, which may be one number.
+    The result's axes are the colours' axes, then the axes of `lambdas`, which may be a number.
     """
-    given, lambdas = np.asarray(coefficients, np.float64), np.asarray(lambdas, np.float64)
-    shape = given.shape[:-1] + (1,) * lambdas.ndim
-    c0, c1, c2 = (given[..., i].reshape(shape) for i in range(3))
+    polynomials, lambdas = np.asarray(coefficients, np.float64), np.asarray(lambdas, np.float64)
+    shape = polynomials.shape[:-1] + (1,) * lambdas.ndim
+    c0, c1, c2 = (polynomials[..., i].reshape(shape) for i in range(3))
     x = (c0 * lambdas + c1) * lambdas + c2
     return 0.5 + 0.5 * x / np.sqrt(1.0 + x * x)
 
@@ -128,7 +128,7 @@ def _smoothstep(x: Floats) -> Floats:
 
 @cache
 def _half_table() -> NDArray[np.float32]:
-    """The table where the largest component is a half, as in colours that `unbounded` looks up."""
+    """Return the table at a largest component of 1/2, the value that `unbounded` looks up."""
     nodes, table = node_values(), _table().reshape(3, NODES, -1, 3)
     below = int(np.searchsorted(nodes, 0.5, "right")) - 1
     t = np.float32((0.5 - nodes[below]) / (nodes[below + 1] - nodes[below]))
@@ -137,7 +137,7 @@ def _half_table() -> NDArray[np.float32]:
 
 
 def _look_up(rgb: Floats, *, half: bool = False) -> Floats:
-    """Coefficients (n, 3) of colours (n, 3); `half`: the largest component of each is 1/2 or 0."""
+    """Return coefficients (n, 3) of colours (n, 3); `half`: each largest component is 1/2 or 0."""
     r, g, b = rgb.T
     largest = np.where((b > r) & (b > g), 2, (g > r).astype(np.int64))
     rows = np.arange(len(rgb))
@@ -156,8 +156,8 @@ def _look_up(rgb: Floats, *, half: bool = False) -> Floats:
         t = (at - nodes[below]) / (nodes[below + 1] - nodes[below])
         weights.append(np.clip(t, 0.0, 1.0).astype(np.float32)[:, None])
     shrunk = shrinkage(rgb)
-    found = _blend(_half_table() if half else _table(), cell, weights)
-    a, b, c = found.T.astype(np.float64) / shrunk
+    scaled = _blend(_half_table() if half else _table(), cell, weights)
+    a, b, c = scaled.T.astype(np.float64) / shrunk
     grey = (others[0] == 1.0) & (others[1] == 1.0)  # not left to the table's last digit
     a[grey], b[grey] = 0.0, 0.0
     c[grey] = (value[grey] - 0.5) / shrunk[grey]
@@ -169,16 +169,17 @@ def _look_up(rgb: Floats, *, half: bool = False) -> Floats:
 
 @cache
 def _axis(kind: Callable[[], Floats]) -> tuple[Floats, NDArray[np.int64]]:
-    """The nodes (NODES,) of a kind, and how many are at or below each of PARTS in [0, 1], less 1.
+    """Return an axis's nodes (NODES,), and the last node at or below the start of each part.
 
-    A part has at most one node but for those at its begin, so that one comparison more decides.
+    [0, 1] has PARTS parts. A part has at most a node behind its start, so that a further
+    comparison decides.
     """
     nodes = kind()
     return nodes, np.searchsorted(nodes, np.arange(PARTS + 1) / PARTS, "right") - 1
 
 
 def _cells_of(nodes: Floats, parts: NDArray[np.int64], at: Floats) -> NDArray[np.int64]:
-    """The cell between nodes that each of (n,) in [0, 1] is in; nodes, parts: of `_axis`."""
+    """Return the cell between nodes of each value (n,) in [0, 1]; nodes, parts: from `_axis`."""
     below = parts.take((at * PARTS).astype(np.int64))
     below += at >= nodes.take(np.minimum(below + 1, NODES - 1))
     return np.minimum(np.maximum(below, 0), NODES - 2)
@@ -187,7 +188,7 @@ def _cells_of(nodes: Floats, parts: NDArray[np.int64], at: Floats) -> NDArray[np
 def _blend(
     table: NDArray[np.float32], cell: NDArray[np.int64], weights: list[NDArray[np.float32]]
 ) -> NDArray[np.float32]:
-    """Table entries (n, 3), linear along each axis: corners are halved by the last axis first."""
+    """Return interpolated table entries (n, 3): the last axis is reduced first."""
     steps = [(0, NODES**axis) for axis in reversed(range(len(weights)))]
     corners = [table.take(cell + sum(corner), axis=0) for corner in itertools.product(*steps)]
     for weight in reversed(weights):

@@ -1,4 +1,4 @@
-"""For authors of materials: the tests that clpt's own materials pass."""
+"""For authors of materials: the tests that clpt's materials pass."""
 
 from clpt.testing.material import check_material
 from clpt.testing.probe import Probe

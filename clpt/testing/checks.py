@@ -1,4 +1,4 @@
-"""Checks that the functions of every material pass; a check that fails raises AssertionError."""
+"""Checks of a material's functions; a check that fails raises AssertionError."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Random = np.random.Generator
 def samples_follow_the_pdf(probe: Probe, params: Params, rng: Random, significance: float) -> None:
     """Chi-square tests of `sample` against `pdf` over the sphere, at each of ANGLES.
 
-    significance: the chance that one of them fails where all is right.
+    significance: the chance that a test fails although the functions are right.
     """
     grid, solid = _fine_grid()
     for angle in ANGLES:
@@ -42,8 +42,10 @@ def samples_follow_the_pdf(probe: Probe, params: Params, rng: Random, significan
         counts = np.bincount(_bin_of(sampled["wi"][spread]), minlength=THETA * PHI)
         total = expected.sum()
         _hold(total < 1.005, f"pdf integrates to {total:.4f} at {angle} degrees", params)
-        rest = max(0.0, 1.0 - total)
-        p = _p_value(np.append(counts, SAMPLES - spread.sum()), SAMPLES * np.append(expected, rest))
+        missing = max(0.0, 1.0 - total)
+        p = _p_value(
+            np.append(counts, SAMPLES - spread.sum()), SAMPLES * np.append(expected, missing)
+        )
         message = f"sample does not follow pdf: p = {p:.1e} at {angle} degrees"
         _hold(p > significance, message, params)
 
@@ -62,20 +64,20 @@ def weight_is_eval_over_pdf(probe: Probe, params: Params, rng: Random) -> None:
 def lobes_are_told_truly(
     probe: Probe, params: Params, rng: Random, *, hero_alone: bool = False
 ) -> None:
-    """Sides, unit lengths and signs; where the pdf is 0 nothing is reflected.
+    """Assert sides, unit lengths and signs, and that eval is 0 where the pdf is 0.
 
-    hero_alone: the pdf is that of one wavelength, others may go where it cannot.
+    hero_alone: the pdf holds for the hero wavelength; other wavelengths may reach further.
     """
     wo, wi = pairs(rng, 2000)
     r = probe(params, wo, wi, rng.random((len(wo), 3)))
-    made = r["sampled_pdf"] > 0.0
-    crossed = (wo[:, 2] * r["wi"][:, 2] < 0.0)[made]
-    flagged = (r["lobe"][made] & TRANSMIT) != 0
+    valid = r["sampled_pdf"] > 0.0
+    crossed = (wo[:, 2] * r["wi"][:, 2] < 0.0)[valid]
+    flagged = (r["lobe"][valid] & TRANSMIT) != 0
     _hold(np.array_equal(crossed, flagged), "LOBE_TRANSMIT is not where wi crosses", params)
-    _hold(np.all(r["eta"][made][~crossed] == 1.0), "eta of a reflection is not 1", params)
-    delta = made & (r["lobe"] & DELTA != 0)
+    _hold(np.all(r["eta"][valid][~crossed] == 1.0), "eta of a reflection is not 1", params)
+    delta = valid & (r["lobe"] & DELTA != 0)
     _hold(np.all(r["sampled_pdf"][delta] <= 1.0), "a delta lobe's pdf is above 1", params)
-    lengths = np.linalg.norm(r["wi"][made], axis=1)
+    lengths = np.linalg.norm(r["wi"][valid], axis=1)
     _close(lengths, np.ones_like(lengths), "wi is not of unit length", params, atol=1e-5)
     for name in ("eval", "pdf"):
         _hold(np.all(r[name] >= 0.0), f"{name} is negative", params)
@@ -85,29 +87,71 @@ def lobes_are_told_truly(
 
 
 def flags_are_told_truly(probe: Probe, params: Params, rng: Random) -> None:
-    """The class tells the kernels what it does: by its flags and `transmits`."""
+    """Assert that the class declares to the kernels what `sample` does: flags and `transmits`."""
     cls = probe.cls
     wo, u = directions(rng, 1000), rng.random((1000, 3))
     r = probe(params, wo, wo, u)
-    made = r["sampled_pdf"] > 0.0
+    valid = r["sampled_pdf"] > 0.0
     if not (cls.uses_lobe_sample or cls.fluoresces):
         again = probe(params, wo, wo, np.where([True, True, False], u, rng.random((1000, 3))))
         same = np.array_equal(r["wi"], again["wi"]) and np.array_equal(r["lobe"], again["lobe"])
         _hold(same, "sample uses u.z: set uses_lobe_sample = True", params)
     if cls.delta:
-        _hold(np.all(r["lobe"][made] & DELTA), "a lobe is not delta, but delta is True", params)
+        _hold(np.all(r["lobe"][valid] & DELTA), "a lobe is not delta, but delta is True", params)
     if not (cls.disperses or cls.refracts):
-        alone = r["lobe"][made] & DISPERSE
+        alone = r["lobe"][valid] & DISPERSE
         _hold(not np.any(alone), "LOBE_DISPERSE is returned: set disperses = True", params)
     if cls.transmits is Material.transmits:
-        through = r["lobe"][made] & (TRANSMIT | DELTA) == TRANSMIT
+        through = r["lobe"][valid] & (TRANSMIT | DELTA) == TRANSMIT
         _hold(not np.any(through), "light goes through: define `transmits`", params)
     for name in (name for name, param in device_params(cls).items() if param.linear):
         _is_linear(probe, params, rng, name)
 
 
+def tangents_are_declared(probe: Probe, params: Params, rng: Random) -> None:
+    """Assert that a material without `uses_tangents` is the same when it turns about the normal.
+
+    `uses_tangents` is read from an instance of the class with these parameters. f and the pdf are
+    compared, and the directions of mirror-like lobes.
+    """
+    if _instance(probe.cls, params).uses_tangents:
+        return
+    (wo, wi), u = pairs(rng, 1000), rng.random((1000, 3))
+    angle = rng.uniform(0.0, 2.0 * np.pi, len(wo))
+    still = probe(params, wo, wi, u)
+    turned = probe(params, _turned(wo, angle), _turned(wi, angle), u)
+    message = "turns with the tangents: define `uses_tangents`"
+    for name in ("eval", "pdf"):
+        _close(turned[name], still[name], f"{name} {message}", params, rtol=1e-2, atol=1e-4)
+    delta = (still["lobe"] & turned["lobe"] & DELTA) != 0
+    delta &= (still["sampled_pdf"] > 0.0) & (still["lobe"] == turned["lobe"])
+    expected = _turned(still["wi"], angle)[delta]
+    _close(turned["wi"][delta], expected, f"a delta lobe {message}", params, atol=1e-3)
+
+
+def _instance(cls: type[Material], params: Params) -> Material:
+    """Return a material with the numbers, choices and data of `params`, and default spectra."""
+    declared: dict[str, Any] = {}
+    for name, param in device_params(cls).items():
+        if param.role is roles.REAL:
+            declared[name] = float(params[name])
+        elif param.role is roles.FLAG:
+            declared[name] = bool(params[name])
+        elif param.role is roles.CHOICE:
+            declared[name] = param.choices[int(params[name])]
+        elif param.role in (roles.MEASUREMENT, roles.MERL, roles.LAYERS):
+            declared[name] = params[name]
+    return cls(**declared)
+
+
+def _turned(w: NDArray, angle: NDArray) -> NDArray:
+    """Return directions (n, 3) turned about z by angles (n,) [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * w[:, 0] - s * w[:, 1], s * w[:, 0] + c * w[:, 1], w[:, 2]], axis=1)
+
+
 def _is_linear(probe: Probe, params: Params, rng: Random, name: str) -> None:
-    """Light is linear in a parameter, and directions and their chances do not depend on it."""
+    """Assert that light is linear in a parameter, and that directions and pdf ignore it."""
     (wo, wi), u = pairs(rng, 1000), rng.random((1000, 3))
     a, b = rng.random((2, probe.components))
     low, high, mean = (probe({**params, name: v}, wo, wi, u) for v in (a, b, (a + b) / 2))
@@ -121,12 +165,12 @@ def _is_linear(probe: Probe, params: Params, rng: Random, name: str) -> None:
 
 
 def lanes_agree(wide: Probe, narrow: Probe, params: Params, rng: Random) -> None:
-    """Two widths give the same numbers, as nearly as the device's compiler lets them."""
+    """Assert that two widths return the same numbers, as far as the device's compiler allows."""
     near = CONTRACTED if contracts(narrow.on) else {"rtol": 2e-5, "atol": 2e-6}
     wo, wi = pairs(rng, 500)
     u = rng.random((len(wo), 3))
-    made, again = (probe(params, wo, wi, u) for probe in (wide, narrow))
-    for name, value in made.items():
+    results, again = (probe(params, wo, wi, u) for probe in (wide, narrow))
+    for name, value in results.items():
         message = f"{name} differs between {wide.lanes} and {narrow.lanes} lanes"
         _close(again[name], value, message, params, **near)
 
@@ -134,24 +178,24 @@ def lanes_agree(wide: Probe, narrow: Probe, params: Params, rng: Random) -> None
 def albedos(
     probe: Probe, params: Params, rng: Random, angles: Sequence[float] = ALL_ANGLES
 ) -> tuple[NDArray, NDArray]:
-    """Share of energy that leaves, for light that comes in at each angle, and its standard error.
+    """Return the albedo for light from each angle and its standard error, (angles, components).
 
-    (angles, components) each, after the change of radiance by refraction has been undone.
+    The change of radiance by refraction is undone.
     """
     u = np.stack(np.meshgrid(*[(np.arange(64) + 0.5) / 64, (np.arange(128) + 0.5) / 128]), -1)
     u = np.concatenate([u.reshape(-1, 2), rng.permutation(LIT)[:, None] / LIT], axis=1)
     wo = np.repeat([tilted(angle) for angle in angles], LIT, axis=0)
     r = probe(params, wo, wo, np.tile(u, (len(angles), 1)))
-    made = (r["sampled_pdf"] > 0.0) * r["eta"] ** 2
-    energy = np.where(made[:, None] > 0.0, r["weight"] * made[:, None], 0.0)
+    scale = (r["sampled_pdf"] > 0.0) * r["eta"] ** 2
+    energy = np.where(scale[:, None] > 0.0, r["weight"] * scale[:, None], 0.0)
     energy = energy.reshape(len(angles), LIT, -1)
     return energy.mean(axis=1), energy.std(axis=1) / np.sqrt(LIT)
 
 
 def energy_is_not_made(probe: Probe, params: Params, rng: Random, tolerance: float = 2e-3) -> None:
-    """No more light leaves than comes, by more than a tolerance and four standard errors.
+    """Assert that the albedo exceeds 1 by at most a tolerance and four standard errors.
 
-    Indices are taken to be the same at all wavelengths, as else only the hero's are probabilities.
+    Indices are set equal at all wavelengths: otherwise the pdf is the hero's alone.
     """
     ends = {k: np.full_like(v, np.mean(v)) for k, v in params.items() if k.endswith("_ior")}
     params = {**params, **ends} if "int_ior" in params else params
@@ -162,7 +206,7 @@ def energy_is_not_made(probe: Probe, params: Params, rng: Random, tolerance: flo
 
 
 def delta_lobes_keep_energy(probe: Probe, params: Params, rng: Random) -> None:
-    """No mirror-like lobe makes light."""
+    """Assert that no mirror-like lobe makes light."""
     wo = directions(rng, 1000)
     r = probe(params, wo, wo, rng.random((1000, 3)))
     delta = (r["sampled_pdf"] > 0.0) & (r["lobe"] & DELTA != 0)
@@ -171,27 +215,27 @@ def delta_lobes_keep_energy(probe: Probe, params: Params, rng: Random) -> None:
 
 
 def is_reciprocal(probe: Probe, params: Params, rng: Random) -> None:
-    """f is the same with wo and wi exchanged."""
+    """Assert that f is the same with wo and wi exchanged."""
     wo, wi = clear_pairs(rng)
     there, back = both_ways(probe, params, wo, wi)
     _close(there, back, "f(wo, wi) is not f(wi, wo)", params, rtol=5e-3, atol=1e-4)
 
 
 def clear_pairs(rng: Random) -> tuple[NDArray, NDArray]:
-    """Pairs of uniform directions (n, 3) that are not grazing."""
+    """Return pairs of uniform directions (n, 3) that are not grazing."""
     wo, wi = directions(rng, 3000), directions(rng, 3000)
     keep = (np.abs(wo[:, 2]) > 0.02) & (np.abs(wi[:, 2]) > 0.02)
     return wo[keep], wi[keep]
 
 
 def both_ways(probe: Probe, params: Params, wo: NDArray, wi: NDArray) -> tuple[NDArray, NDArray]:
-    """f(wo, wi) and f(wi, wo), (n, components) each [1/sr]."""
+    """Return f(wo, wi) and f(wi, wo), (n, components) each [1/sr]."""
     there = probe(params, wo, wi, wo)["eval"] / np.abs(wi[:, 2:])
     return there, probe(params, wi, wo, wi)["eval"] / np.abs(wo[:, 2:])
 
 
 def extremes_are_finite(probe: Probe, rng: Random, **fixed: Any) -> None:
-    """No NaN at grazing directions, at the ends of each parameter, at random numbers 0 and near 1.
+    """Assert finite values at grazing directions, ends of parameters, random numbers near 0 and 1.
 
     fixed: parameters that are not drawn.
     """
@@ -206,14 +250,14 @@ def extremes_are_finite(probe: Probe, rng: Random, **fixed: Any) -> None:
         for name in ("eval", "pdf", "sampled_pdf", "albedo"):
             good = np.isfinite(r[name]) & (r[name] >= 0.0)
             _hold(np.all(good), f"{name} is not finite or negative", params)
-        made = r["sampled_pdf"] > 0.0
+        valid = r["sampled_pdf"] > 0.0
         for name in ("wi", "weight", "eta"):
-            _hold(np.all(np.isfinite(r[name][made])), f"{name} is not finite", params)
-        _hold(np.all(r["weight"][made] >= 0.0), "weight is negative", params)
+            _hold(np.all(np.isfinite(r[name][valid])), f"{name} is not finite", params)
+        _hold(np.all(r["weight"][valid] >= 0.0), "weight is negative", params)
 
 
 def _limits(cls: type) -> list[dict[str, Any]]:
-    """Parameters at the ends of what they may be, one by one and some together."""
+    """Return parameters at the ends of their ranges, singly and some together."""
     limits: list[dict[str, Any]] = [{}]
     declared = device_params(cls)
     for name, param in declared.items():
@@ -237,9 +281,9 @@ def _extreme_directions() -> NDArray:
 
 @cache
 def _fine_grid() -> tuple[NDArray, NDArray]:
-    """Midpoints of FINE x FINE cells in every bin of theta and phi; their solid angles (n,).
+    """Return midpoints of FINE x FINE cells in every bin of theta and phi; their solid angles (n,).
 
-    The midpoints are followed by any directions, so that they are (SAMPLES, 3).
+    The midpoints are padded to (SAMPLES, 3).
     """
     theta = (np.arange(THETA * FINE) + 0.5) / (THETA * FINE) * np.pi
     phi = (np.arange(PHI * FINE) + 0.5) / (PHI * FINE) * 2.0 * np.pi
@@ -250,7 +294,7 @@ def _fine_grid() -> tuple[NDArray, NDArray]:
 
 
 def _in_bins(values: NDArray) -> NDArray:
-    """Sums (THETA * PHI,) of values on the fine grid."""
+    """Return sums (THETA * PHI,) of values on the fine grid."""
     return values.reshape(THETA, FINE, PHI, FINE).sum(axis=(1, 3)).ravel()
 
 
@@ -261,7 +305,7 @@ def _bin_of(w: NDArray) -> NDArray:
 
 
 def _p_value(observed: NDArray, expected: NDArray) -> float:
-    """Chi-square with bins of few expected samples put together."""
+    """Return the p-value of a chi-square test; bins of few expected samples are joined."""
     order = np.argsort(expected)
     o, e = observed[order], expected[order]
     few = int(np.searchsorted(np.cumsum(e), 10.0)) + 1
@@ -273,7 +317,7 @@ def _p_value(observed: NDArray, expected: NDArray) -> float:
 
 
 def chi_square_tail(x: float, degrees: int) -> float:
-    """The chance of a chi-square above x (Abramowitz and Stegun 26.4.4 and 26.4.5)."""
+    """Return the chance of a chi-square above x (Abramowitz and Stegun 26.4.4 and 26.4.5)."""
     if x <= 0.0:
         return 1.0
     half, odd = 0.5 * x, degrees % 2
@@ -283,19 +327,20 @@ def chi_square_tail(x: float, degrees: int) -> float:
 
 
 def _hold(held: object, message: str, params: Params) -> None:
-    """Raise AssertionError with a message, and the parameters, where something is not so."""
     if not held:
         raise AssertionError(f"{message}, {params}")
 
 
 def _close(
-    found: NDArray,
+    actual: NDArray,
     expected: NDArray,
     message: str,
     params: Params,
     rtol: float = 0.0,
     atol: float = 0.0,
 ) -> None:
-    if not np.allclose(found, expected, rtol, atol, equal_nan=True):  # to tell params takes long
+    if not np.allclose(
+        actual, expected, rtol, atol, equal_nan=True
+    ):  # formatting params takes long
         said = f"{message}, {params}"
-        np.testing.assert_allclose(found, expected, rtol=rtol, atol=atol, err_msg=said)
+        np.testing.assert_allclose(actual, expected, rtol=rtol, atol=atol, err_msg=said)

@@ -1,4 +1,4 @@
-"""One material through every check."""
+"""A material through every check."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from clpt.testing import checks
 from clpt.testing.probe import LAMBDAS, Probe
 from clpt.testing.settings import settings, white
 
-SETTINGS = 4  # drawn parameters that a class is checked with
-CHANCE = 1e-3  # that any chi-square test of a material fails where all is right
+SETTINGS = 4  # random sets of parameters per class
+CHANCE = 1e-3  # that any chi-square test of a right material fails
 
 
 def check_material(
@@ -31,56 +31,61 @@ def check_material(
     device: device.Device | None = None,
     seed: int = 1,
 ) -> None:
-    """Check that a material's functions are those of one, as the kernels rely on.
+    """Check that a material's functions have the properties that the kernels rely on.
 
-    `sample` follows `pdf`, its weight is `eval` / `pdf`, with every reflectance at one no energy is
-    made, f is reciprocal, nothing is NaN at grazing directions and at the ends of the parameters,
-    all numbers of lanes give the same, and the class's flags are what `sample` does.
+    `sample` follows `pdf`, its weight is `eval` / `pdf`, no light is created, f is reciprocal,
+    values are finite, widths of lanes agree, and the class's flags, `transmits` and
+    `uses_tangents` agree with its functions. It takes some seconds.
 
-    material: a class, whose parameters are drawn within their limits, or an instance, of which only
-    textures are. reciprocal: whether f(wo, wi) is to be f(wi, wo). tolerance: how much more energy
-    may leave than comes. device: by default the first one; seed: of what is drawn. It takes some
-    seconds.
+    material: a class, whose parameters are drawn at random within their limits, or an instance,
+    whose textured parameters alone are drawn. reciprocal: whether f(wo, wi) must equal f(wi, wo).
+    tolerance: how far the albedo may exceed 1. device: by default the first; seed: of the random
+    parameters.
 
-    Raises AssertionError, telling what fails and for which parameters; KernelBuildError, with the
-    line of the author's file; SceneError for a class that is no material kind.
+    Raises AssertionError with the failed property; KernelBuildError; SceneError for a class that
+    is no material kind.
     """
     cls = material if isinstance(material, type) else type(material)
     if cls not in LEAVES:
         custom_materials.check(cls)
-    on = _chosen(device)
     for mode in modes:
         fixed = {} if isinstance(material, type) else _values(material, mode)
-        rng, probe = np.random.default_rng(seed), Probe(cls, mode, on=on)
+        rng, probe = np.random.default_rng(seed), Probe(cls, mode, on=_chosen(device))
         drawn = settings(cls, mode, rng, SETTINGS, **fixed)
         tests = len(modes) * SETTINGS * len(checks.ANGLES)
         for number, params in enumerate(drawn):
-            same = 2 * number < SETTINGS  # at all wavelengths
-            checks.lobes_are_told_truly(probe, params, rng, hero_alone=not same)
-            checks.flags_are_told_truly(probe, params, rng)
-            checks.weight_is_eval_over_pdf(probe, params, rng)
-            checks.samples_follow_the_pdf(probe, params, rng, CHANCE / tests)
-            checks.delta_lobes_keep_energy(probe, params, rng)
+            checks.lobes_are_told_truly(probe, params, rng, hero_alone=2 * number >= SETTINGS)
+            _check_functions(probe, params, rng, CHANCE / tests)
             if reciprocal:
                 checks.is_reciprocal(probe, params, rng)
         for params in settings(cls, mode, rng, SETTINGS, **{**fixed, **white(cls)}):
             checks.energy_is_not_made(probe, params, rng, tolerance)
         checks.extremes_are_finite(probe, rng, **fixed)
         for lanes in (1, 8):
-            checks.lanes_agree(probe, Probe(cls, mode, lanes, on), drawn[0], rng)
+            checks.lanes_agree(probe, Probe(cls, mode, lanes, probe.on), drawn[0], rng)
 
 
-def _chosen(given: device.Device | None) -> device.Device:
-    return device.choose() if given is None else given
+def _check_functions(
+    probe: Probe, params: checks.Params, rng: np.random.Generator, significance: float
+) -> None:
+    checks.flags_are_told_truly(probe, params, rng)
+    checks.tangents_are_declared(probe, params, rng)
+    checks.weight_is_eval_over_pdf(probe, params, rng)
+    checks.samples_follow_the_pdf(probe, params, rng, significance)
+    checks.delta_lobes_keep_energy(probe, params, rng)
+
+
+def _chosen(requested: device.Device | None) -> device.Device:
+    return device.choose() if requested is None else requested
 
 
 def _values(material: Material, mode: str) -> dict[str, Any]:
-    """The parameters of a material as the kernels get them; those of textures are left out."""
-    given, declared = fields_of(material), device_params(type(material))
+    """Return a material's parameters in the kernels' form, without textured parameters."""
+    values, declared = fields_of(material), device_params(type(material))
     return {
-        name: _value(given[name], param, mode)
+        name: _value(values[name], param, mode)
         for name, param in declared.items()
-        if not isinstance(given[name], Texture)
+        if not isinstance(values[name], Texture)
     }
 
 
@@ -113,7 +118,7 @@ def _spectrum(value: Any, param: Param, mode: str) -> Any:
     return np.asarray(spectrum.sample(np.array(LAMBDAS)))
 
 
-# the value of a parameter as kernels get it, by its role; else its numbers
+# a parameter's value in the kernels' form, by its role; `_numbers` for other roles
 VALUES: dict[Role, Callable[[Any, Param, str], Any]] = {
     **dict.fromkeys(roles.SPECTRA, _spectrum),
     **dict.fromkeys((roles.LAYERS, roles.MEASUREMENT, roles.MERL), _same),

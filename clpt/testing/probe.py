@@ -1,4 +1,4 @@
-"""The functions of a material kind, called on arrays through a small program around them."""
+"""The functions of a material kind, called on arrays through a small program."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from clpt.scene.roles import Param, Role
 from clpt.spectra.spectrum import primaries
 
 COMPONENTS = {"rgb": 3, "spectral": 4}
-LAMBDAS = (532.0, 590.0, 655.0, 441.0)  # [nm], of kinds that ask for them, and of layers
+LAMBDAS = (532.0, 590.0, 655.0, 441.0)  # [nm], for kinds with `needs_wavelengths`, and layers
 NOTHING = np.zeros(0)
 RESULTS = ("wi", "weight", "sampled_pdf", "eta", "lobe", "eval", "pdf", "eval_again", "pdf_again")
 
 
 def root_text(mode: str, files: tuple[str, ...] = ()) -> str:
-    """The includes of shading code in a mode ("rgb" or "spectral"), then of `files`."""
+    """Return the includes of shading code in a mode ("rgb" or "spectral"), then of `files`."""
     text = "\n".join(f'#include "{name}"' for name in (*BSDF, *files)) + "\n"
     return text.replace("generated/spectrum.cl", f"spectra/{mode}.cl")
 
@@ -40,21 +40,22 @@ def run(
     on: device.Device,
     virtual: device.Virtual,
     lanes: int,
-    given: NDArray,
+    streams: NDArray,
     rows: int,
     table: NDArray = NOTHING,
     options: Sequence[str] = (),
 ) -> NDArray[np.float32]:
     """Run `kernel void probe(global const float *in, global float *out, uint n)` of "probe.cl".
 
-    given: (k, n) float32, streams of `in`; table: what follows them there; virtual: the program's
-    files; options: more of the compiler's. Returns (rows, n) float32. n is padded to whole blocks.
+    streams: (k, n) float32, the start of `in`; table: the data behind them in `in`; virtual: the
+    program's files; options: further compiler options. Returns (rows, n) float32. n is padded to
+    whole blocks.
     """
     program = device.build(on, _source(tuple(virtual.items()), lanes), options)
-    n = given.shape[1]
+    n = streams.shape[1]
     padded = -(-n // 16) * 16
-    data = np.empty((given.shape[0], padded), np.float32)
-    data[:, :n], data[:, n:] = given, given[:, -1:]
+    data = np.empty((streams.shape[0], padded), np.float32)
+    data[:, :n], data[:, n:] = streams, streams[:, -1:]
     out = np.empty((rows, padded), np.float32)
     data = np.concatenate([data.ravel(), np.asarray(table, np.float32).ravel()])
     give, stream = device.Buffers(on), device.Stream(on.queue)
@@ -63,17 +64,16 @@ def run(
     return stream.read(memory["out"], out)[:, :n]
 
 
-@lru_cache(maxsize=64)  # one text is called with many arguments
+@lru_cache(maxsize=64)  # the same text is called with many arguments
 def _source(virtual: tuple[tuple[str, Any], ...], lanes: int) -> device.Source:
     files = {**rough_coat_table.virtual_files(), **dict(virtual)}
     return device.assemble("probe.cl", files, {"LANES": lanes})
 
 
 class Probe:
-    """The functions of one material kind in one mode, as functions of arrays.
+    """A material kind's functions in a mode, as functions of arrays.
 
-    on: the device that they run on, by default a context of their own on what `clpt.device.choose`
-    finds.
+    on: the device that runs them, by default a new context on the device of `clpt.device.choose`.
     """
 
     def __init__(
@@ -104,42 +104,42 @@ class Probe:
         if self.cls.needs_wavelengths:
             value = params.get("lambdas", LAMBDAS[: self.components])
             columns.append(np.broadcast_to(np.asarray(value, float), (n, self.components)))
-        given = np.concatenate(columns, axis=1).T.astype(np.float32)
+        streams = np.concatenate(columns, axis=1).T.astype(np.float32)
         c = self.components
-        extra = self._layers_text(len(layers), len(given))
+        extra = self._layers_text(len(layers), len(streams))
         if self._named(roles.ANGULAR):
-            extra = self._angular_text(params, len(given))
+            extra = self._angular_text(params, len(streams))
         elif self._named(roles.MEASUREMENT):
-            extra = self._measurement_text(params, len(given))
+            extra = self._measurement_text(params, len(streams))
         elif self._named(roles.MERL):
-            extra = self._merl_text(len(given))
+            extra = self._merl_text(len(streams))
         virtual: dict[str, str | device.Part] = {"probe.cl": self._text(*extra)}
         if self.cls.source is not None:
             virtual[f"{self.cls.folder}/{self.cls.kind}.cl"] = custom_materials.text(self.cls)
         table = self._table(params, layers)
-        out = run(self.on, virtual, self.lanes, given, 8 + 4 * c, table).T
+        out = run(self.on, virtual, self.lanes, streams, 8 + 4 * c, table).T
         parts = np.split(out, np.cumsum([3, c, 1, 1, 1, c, 1, c, 1]), axis=1)
         named = dict(zip((*RESULTS, "albedo"), parts, strict=True))
         named["lobe"] = named["lobe"].astype(int)
         return {k: v[:, 0] if v.shape[1] == 1 else v for k, v in named.items()}
 
     def _named(self, role: Role) -> str:
-        """The parameter of a role, "" where there is none."""
+        """Return the name of the parameter of a role, or ""."""
         return next((k for k, p in device_params(self.cls).items() if p.role is role), "")
 
     def _angular_text(self, params: Mapping[str, Any], rows: int) -> list[str]:
-        """Return the text that sets m's AngularTable, whose data follow the rows in `in`."""
+        """Return the text that sets m's AngularTable; its data stand behind the rows in `in`."""
         spectral = self.mode == "spectral"
         kind: Any = self.cls(**params)
         cosines, values, start, step = kind.device_rows(spectral)
         last = len(values) - 1
         at = (np.array(LAMBDAS) - start) / step if spectral else np.arange(3.0)
-        row = ", ".join(f"(real)({one:.9e}f)" for one in np.clip(at, 0.0, last) + 0.0)
+        row = ", ".join(f"(real)({position:.9e}f)" for position in np.clip(at, 0.0, last) + 0.0)
         counts = f"(integer)({len(cosines)}), (integer)({len(values)})"
-        made = f"{{in + {rows} * n, (integer)(0), {counts}, {{{row}}}}}"
+        initialiser = f"{{in + {rows} * n, (integer)(0), {counts}, {{{row}}}}}"
         return [
             '#include "materials/angular_table.cl"',
-            f"    AngularTable table = {made};\n    m.{self._named(roles.ANGULAR)} = table;",
+            f"    AngularTable table = {initialiser};\n    m.{self._named(roles.ANGULAR)} = table;",
         ]
 
     def _measurement(self, params: Mapping[str, Any]) -> measurements.Rows:
@@ -147,28 +147,30 @@ class Probe:
         return measurements.rows(params[self._named(roles.MEASUREMENT)], film)
 
     def _measurement_text(self, params: Mapping[str, Any], rows: int) -> list[str]:
-        """Return the text that sets m's Measurement, whose data follow the rows in `in`."""
+        """Return the text that sets m's Measurement; its data stand behind the rows in `in`."""
         nodes = self._measurement(params).wavelengths
         at = np.interp(LAMBDAS, nodes, np.arange(len(nodes))) if len(nodes) else np.arange(3.0)
-        row = ", ".join(f"(real)({one:.9e}f)" for one in at)
-        made = f"{{in + {rows} * n, (integer)(1), {{{row}}}}}"
+        row = ", ".join(f"(real)({position:.9e}f)" for position in at)
+        initialiser = f"{{in + {rows} * n, (integer)(1), {{{row}}}}}"
         name = self._named(roles.MEASUREMENT)
         return [
             '#include "materials/measurement.cl"',
-            f"    Measurement data = {made};\n    m.{name} = data;",
+            f"    Measurement data = {initialiser};\n    m.{name} = data;",
         ]
 
     def _merl_text(self, rows: int) -> list[str]:
-        """Return the text that sets m's MerlTable, whose data follow the rows in `in`."""
-        one = np.eye(3)
+        """Return the text that sets m's MerlTable; its data stand behind the rows in `in`."""
+        curves = np.eye(3)
         if self.mode == "spectral":
-            one = np.array([curve.sample(LAMBDAS) for curve in primaries()])
-        basis = [", ".join(f"(real)({value:.9e}f)" for value in curve) for curve in one]
-        made = f"{{in + {rows} * n, (integer)(1), {', '.join(f'{{{row}}}' for row in basis)}}}"
+            curves = np.array([curve.sample(LAMBDAS) for curve in primaries()])
+        basis = [", ".join(f"(real)({value:.9e}f)" for value in curve) for curve in curves]
+        initialiser = (
+            f"{{in + {rows} * n, (integer)(1), {', '.join(f'{{{row}}}' for row in basis)}}}"
+        )
         name = self._named(roles.MERL)
         return [
             '#include "materials/merl_table.cl"',
-            f"    MerlTable data = {made};\n    m.{name} = data;",
+            f"    MerlTable data = {initialiser};\n    m.{name} = data;",
         ]
 
     def _streamed(self) -> list[tuple[str, Param]]:
@@ -176,7 +178,7 @@ class Probe:
         return [(k, p) for k, p in device_params(self.cls).items() if p.role not in beside]
 
     def _table(self, params: Mapping[str, Any], layers: Sequence[Layer]) -> NDArray:
-        """Return the data that follow the streams in `in`: a table, layers, or layers' colours."""
+        """Return the data behind the streams in `in`: a table, layers, or layers' colours."""
         if self._named(roles.MEASUREMENT):
             return np.append(0.0, self._measurement(params).values)
         if name := self._named(roles.MERL):
@@ -187,7 +189,7 @@ class Probe:
         if not layers:
             return NOTHING
         if self.mode == "spectral":
-            constants: Sequence[Any] = layers  # whose values are no textures
+            constants: Sequence[Any] = layers  # without textures
             films = [[e.eta.value, e.k.value, e.thickness, e.profile] for e in constants]
             return np.array(films, np.float32)
         indices = {
@@ -199,7 +201,7 @@ class Probe:
         return film_colours(self.cls(**constant, layers=layers))  # type: ignore[arg-type, call-arg]
 
     def _layers_text(self, count: int, rows: int) -> list[str]:
-        """Layers that stand in `in` after its rows, and setting m.layers."""
+        """Return the text that declares layers, behind the rows in `in`, and sets m.layers."""
         if "layers" not in device_params(self.cls):
             return ["", ""]
         if not count:
@@ -225,7 +227,7 @@ class Probe:
         ]
 
     def _reads(self) -> list[str]:
-        """Return the rows that set a material's members from `in`, behind three vectors."""
+        """Return the lines that set a material's members from `in`, behind three vectors."""
         names = "xyzw"[: self.components]
         reads, at = [], 9
         for name, param in self._streamed():

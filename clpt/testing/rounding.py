@@ -1,4 +1,4 @@
-"""Rounding of one expression in two programs, and the tolerance that it asks for."""
+"""The tolerance for an expression that two programs may round differently."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from clpt import device
 from clpt.testing.probe import run
 
-CONTRACTED = {"rtol": 1e-3, "atol": 5e-5}  # of values about 1; twice what NVIDIA's needs
+CONTRACTED = {"rtol": 1e-3, "atol": 5e-5}  # for values about 1; twice NVIDIA's difference
 
 _TEXT = """
 kernel void probe(global const float *in, global float *out, uint n)
@@ -23,11 +23,11 @@ kernel void probe(global const float *in, global float *out, uint n)
 
 @cache
 def contracts(on: device.Device) -> bool:
-    """Return whether the device's compiler makes an fma of a product and a sum that stand apart.
+    """Return whether the device's compiler joins a product and a later sum to an fma.
 
-    Which of them it joins depends on the rest of the program. So one expression is rounded in two
-    ways in two programs, and lanes of two widths agree to CONTRACTED; elsewhere they agree to the
-    bit.
+    Whether it joins them depends on the remaining program. So two programs may round the same
+    expression differently: lanes of two widths agree to CONTRACTED. On other devices they agree to
+    the bit.
     """
-    given = np.array([[1 + 2.0**-12], [1 + 2.0**-11]])  # a number, and its square as rounded
-    return bool(run(on, {"probe.cl": _TEXT}, 1, given, 1)[0, 0] != 0.0)
+    streams = np.array([[1 + 2.0**-12], [1 + 2.0**-11]])  # a number, and its square as rounded
+    return bool(run(on, {"probe.cl": _TEXT}, 1, streams, 1)[0, 0] != 0.0)

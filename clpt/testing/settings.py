@@ -16,8 +16,8 @@ from clpt.scene.params import Kind, device_params
 from clpt.scene.roles import Param, Role
 from clpt.testing.probe import COMPONENTS
 
-# limits of what principled kinds, glTF's and hair would make too narrow lobes of for bins
-WIDE: dict[str, dict[str, Any]] = {
+# narrower lobes fall into too few bins of the chi-square test
+TESTED_RANGES: dict[str, dict[str, Any]] = {
     "roughness": {"low": 0.5},
     "anisotropic": {"high": 0.7},
     "anisotropy": {"high": 0.8},
@@ -30,13 +30,13 @@ WIDE: dict[str, dict[str, Any]] = {
 
 
 def directions(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Uniform on the sphere, (n, 3)."""
+    """Return uniform directions on the sphere, (n, 3)."""
     v = rng.normal(size=(n, 3))
     return v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
 def pairs(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of directions (n, 3): uniform ones, and pairs near mirror reflection."""
+    """Return pairs of directions (n, 3): uniform pairs, and pairs near mirror reflection."""
     wo, wi = directions(rng, n), directions(rng, n)
     near = wi * 0.3 + wo * [-1.0, -1.0, 1.0]
     near /= np.linalg.norm(near, axis=1, keepdims=True)
@@ -44,7 +44,7 @@ def pairs(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def tilted(degrees: float, azimuth: float = 0.7) -> np.ndarray:
-    """The direction (3,) at an angle to the normal; beyond 90 degrees it lies on the back."""
+    """Return the direction (3,) at an angle to the normal; beyond 90 degrees, on the back."""
     t = np.radians(degrees)
     return np.array([np.sin(t) * np.cos(azimuth), np.sin(t) * np.sin(azimuth), np.cos(t)])
 
@@ -52,12 +52,12 @@ def tilted(degrees: float, azimuth: float = 0.7) -> np.ndarray:
 def settings(
     cls: type[Kind], mode: str, rng: np.random.Generator, count: int, /, **fixed: Any
 ) -> list[dict[str, Any]]:
-    """Random valid parameters, by name: numbers and spectra (components,); `fixed` wins.
+    """Return `count` random valid sets of parameters: numbers and spectra (components,).
 
-    Indices of refraction are by turns near 1 and well above, in either order, as lobes refracted by
-    a ratio near one are too narrow for bins; an only one and that of a coat are well above. The
-    first half of them is equal at all wavelengths. Every other one has thin films, if the kind
-    takes them, which absorb nothing.
+    fixed: parameters that are not random. Indices of refraction alternate between near 1 and well
+    above 1, in either order: a ratio near 1 refracts into lobes too narrow for bins. A single index
+    and a coat's are well above 1. In the first half of the sets, indices are equal at all
+    wavelengths. Every second set has thin films that absorb nothing, if the kind takes films.
     """
     result = []
     indices = [k for k, p in device_params(cls).items() if p.role is roles.INDEX]
@@ -72,14 +72,14 @@ def settings(
             elif param.role is roles.LAYERS:
                 drawn[name] = _draw_layers(rng) if i % 2 else ()
             else:
-                drawn_from = dataclasses.replace(param, **WIDE.get(name, {}))
+                drawn_from = dataclasses.replace(param, **TESTED_RANGES.get(name, {}))
                 drawn[name] = _draw(drawn_from, mode, rng)
         result.append(drawn | {k: v for k, v in fixed.items() if k in drawn})
     return result
 
 
 def white(cls: type[Kind]) -> dict[str, float]:
-    """Values for `settings` that make every reflectance one, of light that keeps its wavelength."""
+    """Return values for `settings` that make every reflectance 1 and no light fluorescent."""
     kept = {roles.REFLECTANCE: 1.0, roles.RERADIATION: 0.0}
     return {k: kept[p.role] for k, p in device_params(cls).items() if p.role in kept}
 
@@ -96,20 +96,17 @@ def _draw_layers(rng: np.random.Generator) -> tuple[Layer, ...]:
 
 
 def _draw_measurement(rng: np.random.Generator) -> Measurement:
-    """A material that nobody has measured: random tables around a matt one, every other isotropic.
-
-    It is white where it is brightest.
-    """
+    """Return random tables around a matt material; about half of them are isotropic."""
     turns = [0.0] if rng.integers(2) else np.linspace(-np.pi, 0.0, 4)
     colour = rng.uniform(0.1, 1.0, 3) / np.pi
-    made = fit(
+    matt = fit(
         lambda wo, wi: np.broadcast_to(colour, wi.shape),
         theta_i=np.radians([0.0, 40.0, 85.0]), phi_i=turns, normals=12, size=8,
     )  # fmt: skip
-    noise = rng.uniform(0.2, 1.0, made.spectra.shape).astype(np.float32)
-    shares = rng.uniform(0.2, 1.0, made.luminance.shape).astype(np.float32)
+    noise = rng.uniform(0.2, 1.0, matt.spectra.shape).astype(np.float32)
+    shares = rng.uniform(0.2, 1.0, matt.luminance.shape).astype(np.float32)
     return dataclasses.replace(
-        made, spectra=made.spectra * noise, luminance=made.luminance * shares
+        matt, spectra=matt.spectra * noise, luminance=matt.luminance * shares
     )
 
 
@@ -118,7 +115,7 @@ def _draw_spectrum(param: Param, mode: str, rng: np.random.Generator) -> np.ndar
 
 
 def _draw_number(param: Param, mode: str, rng: np.random.Generator) -> np.ndarray:
-    high = min(param.high, param.low + 100.0)  # lobes no narrower than a grid of bins can tell
+    high = min(param.high, param.low + 100.0)  # lobes no narrower than a bin
     return np.array(param.low + rng.uniform(0.1, 1.0) * (high - param.low))
 
 
@@ -127,7 +124,7 @@ def _draw(param: Param, mode: str, rng: np.random.Generator) -> Any:
     return draw(param, mode, rng)
 
 
-# a random value of a parameter as kernels have it, by its role
+# a random value of a parameter in the kernels' form, by its role
 DRAWS: dict[Role, Callable[[Param, str, np.random.Generator], Any]] = {
     **dict.fromkeys((*roles.SPECTRA, roles.RERADIATION), _draw_spectrum),
     roles.REAL: _draw_number,

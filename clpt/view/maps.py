@@ -12,7 +12,7 @@ from clpt import images
 from clpt.arrays import Bytes, Image
 from clpt.denoise import oidn
 from clpt.images.colour.false_colours import SCALE, false_colours
-from clpt.render.film.layer_preview import viewable
+from clpt.render.film.layers import viewable
 from clpt.scene.layers import LAYERS
 
 PICTURE, SAMPLES, ERROR, DENOISED = "picture", "samples", "error", "denoised"

@@ -66,7 +66,7 @@ def denoised(source: Pictures, display: Display) -> NDArray[np.uint8]:
 
     Raises SceneError where the denoiser is not installed.
     """
-    form = source._form
+    form = source.form
     colours = images.to_rec709(DenoisedPicture(source, METHOD).colours(), form.output_space)
     stops = display.exposure + form.display_exposure
     if display.tone == OF_VIEW:

@@ -14,11 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import transforms
 from clpt.device import Device
 from clpt.render.renderer import Renderer
-from clpt.scene import Film, Scene
-from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective
+from clpt.scene import Scene
 from clpt.scene.integrators import Box, Direct, Integrator, Path, Whitted, shared
 from clpt.view.bare import bare, each
 from clpt.view.messages import Reply, answering
@@ -30,40 +28,9 @@ LAYERS = ("depth", "position", "shading_normal", "uv", "albedo", "shape_id", "pr
 NARROW = 0.01  # pixels around the centre that a hit is looked for in
 
 
-def window(camera: Camera, film: Film, x: int, y: int) -> Camera | None:
-    """Return a camera whose film of one pixel is the pixel (x, y) of a film; None if none is."""
-    width, height = film.width, film.height
-    if isinstance(camera, Perspective):
-        along_x = {"smaller": width <= height, "larger": width >= height}.get(
-            camera.fov_axis, camera.fov_axis == "x"
-        )
-        pixel = np.tan(np.radians(camera.fov) / 2.0) / (width if along_x else height)
-        fov = float(np.degrees(2.0 * np.arctan(pixel)))
-        if fov < 1e-3:
-            return None
-        return dataclasses.replace(
-            camera,
-            fov=fov,
-            fov_axis="x",
-            offset_x=0.5 - width * (0.5 - camera.offset_x) + x,
-            offset_y=0.5 - height * (0.5 - camera.offset_y) + y,
-        )
-    if isinstance(camera, Orthographic):
-        centre = [1.0 - (2 * x + 1) / width, (height - (2 * y + 1)) / width, 0.0]
-        scale = np.diag([1.0 / width, 1.0 / width, 1.0, 1.0])
-        matrix = np.asarray(camera.to_world, float) @ transforms.translate(centre) @ scale
-        return dataclasses.replace(camera, to_world=matrix)
-    if isinstance(camera, Matrix):
-        zoom = np.eye(4)
-        zoom[0, 0], zoom[0, 3] = width, width - (2 * x + 1)
-        zoom[1, 1], zoom[1, 3] = height, (2 * y + 1) - height
-        return dataclasses.replace(camera, projection=zoom @ np.asarray(camera.projection, float))
-    return None
-
-
 def pixel_of(scene: Scene, x: int, y: int, bands: int, integrator: Integrator) -> Scene:
     """Return a scene that shows the pixel (x, y) of another one alone."""
-    camera = window(scene.camera, scene.film, x, y)
+    camera = scene.camera.pixel_camera(scene.film.width, scene.film.height, x, y)
     size: dict[str, Any] = {"width": 1, "height": 1, "crop": None}
     if camera is None:
         camera, size = scene.camera, {"crop": (x, y, 1, 1)}

@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 import http
 import logging
+import socket
 import struct
 import threading
 import time
@@ -31,7 +32,7 @@ from websockets.http11 import Request as HttpRequest
 from websockets.http11 import Response
 
 from clpt.errors import ClptError
-from clpt.view.access import LOOPBACK, Access, is_loopback
+from clpt.view.access import LOOPBACK, Access, is_wildcard, outward_address
 from clpt.view.commands import COMMANDS, LARGEST_MESSAGE, CommandError, parse
 from clpt.view.messages import PREPARING, answering, as_json
 from clpt.view.session import Session
@@ -232,14 +233,30 @@ class Server:
         self._thread.start()
         self.port = self._listening.result()
         self.access = Access(self.port)
-        names = (*LOOPBACK, host) if is_loopback(host) else (host, *LOOPBACK)
-        self._hosts = {f"{_bracketed(name)}:{self.port}" for name in names}
+        self._wildcard = is_wildcard(host)
+        self.announced = outward_address(host) if self._wildcard else host
+        machine = socket.gethostname().lower()
+        names = (machine, f"{machine}.local") if self._wildcard else ()
+        self._hosts = {self._with_port(name) for name in (self.announced, *names, *LOOPBACK)}
 
     @property
     def address(self) -> str:
         """An address that opens the page, once."""
-        place = f"{_bracketed(self.host)}:{self.port}{self.access.room}"
+        place = f"{self._with_port(self.announced)}{self.access.room}"
         return f"http://{place}?token={self.access.new_token()}"
+
+    def _with_port(self, host: str) -> str:
+        """Return a host as a request for this server names it."""
+        return f"[{host}]:{self.port}" if ":" in host else f"{host}:{self.port}"
+
+    def _is_named(self, connection: ServerConnection, name: str) -> bool:
+        """Return whether a request names this server, by a name of its own or by the address at
+        which it has come, where the server listens at all of them.
+        """
+        if name.lower() in self._hosts:
+            return True
+        came = connection.transport.get_extra_info("sockname") if self._wildcard else None
+        return came is not None and name == self._with_port(came[0].removeprefix("::ffff:"))
 
     def close(self) -> None:
         """Leave all viewers, and listen no more."""
@@ -316,15 +333,17 @@ class Server:
     def _answer(self, connection: ServerConnection, request: HttpRequest) -> Response | None:
         """Answer a request; None lets a socket be opened."""
         try:
-            return self._checked_answer(request)
+            return self._checked_answer(connection, request)
         except Exception:  # of headers that are given twice, of paths that are none
             return _response(http.HTTPStatus.BAD_REQUEST, "the request makes no sense")
 
-    def _checked_answer(self, request: HttpRequest) -> Response | None:
+    def _checked_answer(
+        self, connection: ServerConnection, request: HttpRequest
+    ) -> Response | None:
         headers, url = request.headers, urlsplit(request.path)
         if getattr(request, "method", "GET") != "GET":  # older releases read nothing else
             return _response(http.HTTPStatus.METHOD_NOT_ALLOWED, "only GET is answered")
-        if headers.get("Host", "") not in self._hosts:
+        if not self._is_named(connection, headers.get("Host", "")):
             return _response(http.HTTPStatus.FORBIDDEN, "this server has another name")
         tokens, room = parse_qs(url.query).get("token"), self.access.room
         if url.path == room and tokens:
@@ -432,8 +451,3 @@ def _response(status: http.HTTPStatus, body: str | bytes, kind: str = "") -> Res
         }
     )
     return Response(status.value, status.phrase, headers, content)
-
-
-def _bracketed(host: str) -> str:
-    """Return a host as it stands in an address."""
-    return f"[{host}]" if ":" in host else host

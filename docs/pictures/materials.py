@@ -11,6 +11,7 @@ import numpy as np
 from clpt import measured, spectra
 from clpt.scene import Scene, integrators, lights, shapes, textures
 from clpt.scene.materials import (
+    AshikhminShirley,
     Blend,
     BumpMap,
     CoatedConductor,
@@ -28,6 +29,7 @@ from clpt.scene.materials import (
     Merl,
     NormalMap,
     Null,
+    OrenNayar,
     Phong,
     Plastic,
     Principled,
@@ -37,6 +39,7 @@ from clpt.scene.materials import (
     RoughPlastic,
     ThinDielectric,
     TwoSided,
+    Ward,
     pigment,
 )
 from clpt.transforms import look_at, rotate, scale, translate
@@ -243,9 +246,21 @@ TWO = partial(TwoSided, front=Diffuse(reflectance=ORANGE))
 
 MATERIALS = {
     "diffuse": three("Three colours.", *each(Diffuse, "reflectance", (RED, CREAM, BLUE))),
+    "oren_nayar": three(
+        "`sigma` 0, 20 and 60 degrees.",
+        *each(OrenNayar, "sigma", (0.0, 20.0, 60.0), reflectance=CREAM),
+    ),
     "phong": three(
         "`exponent` 10, 60 and 600.",
         *each(Phong, "exponent", (10.0, 60.0, 600.0), diffuse=GREEN, specular=0.3),
+    ),
+    "ward": three(
+        "`alpha_u` 0.05, 0.15 and 0.4.",
+        *each(Ward, "alpha_u", (0.05, 0.15, 0.4), diffuse=GREEN, specular=0.3),
+    ),
+    "ashikhmin_shirley": three(
+        "`specular` 0.05, 0.2 and 0.6.",
+        *each(AshikhminShirley, "specular", (0.05, 0.2, 0.6), diffuse=RED),
     ),
     "dielectric": three(
         "`int_ior` 1.33 (water), 1.5 (glass) and 2.42 (diamond).",

@@ -1,8 +1,8 @@
-/* Traversal of the binary tree that bvh/build.cl makes, one ray a work-item: the readable reference. `leaves` holds
- * the triangle records of bvh/leaves.cl. */
+/* Traversal of the binary tree of bvh/build.cl, a ray a work-item: the readable reference. `leaves` holds the triangle
+ * records of bvh/leaves.cl. */
 #include "bvh/triangle.cl"
 
-/* The corners of the box around everything. */
+/* The corners of the root's box. */
 inline void binary_bounds(global const float *nodes, float3 *low, float3 *high)
 {
     float8 root = *(global const float8 *)nodes;
@@ -10,7 +10,7 @@ inline void binary_bounds(global const float *nodes, float3 *low, float3 *high)
     *high = root.s456;
 }
 
-/* Where a ray is in a tree: at a node, which it enters at `entry` (INFINITY: it does not); farther nodes wait. */
+/* A ray's position in a tree: a node, its entry distance `entry` (INFINITY: no entry), and a stack of farther nodes. */
 typedef struct {
     float8 node;
     float entry;
@@ -25,7 +25,7 @@ inline void binary_start(global const float8 *tree, const Ray *ray, float t, Bin
     s->entry = ray_enter(ray, s->node, t);
 }
 
-/* From a node down to the nearest leaf; 0 if the ray enters no child on the way. */
+/* Descends from a node to the nearest leaf; returns 0 if the ray enters no child. */
 inline int binary_descend(global const float8 *tree, const Ray *ray, float t, BinaryState *s)
 {
     while (s->entry < INFINITY && !node_is_leaf(s->node)) {
@@ -34,7 +34,7 @@ inline int binary_descend(global const float8 *tree, const Ray *ray, float t, Bi
         s->node = tree[left];
         s->entry = ray_enter(ray, s->node, t);
         float other_entry = ray_enter(ray, other, t);
-        if (fmax(s->entry, other_entry) < INFINITY) { /* both: the farther one waits */
+        if (fmax(s->entry, other_entry) < INFINITY) { /* both: the farther child waits */
             s->waiting[s->waits] = left + (other_entry >= s->entry);
             s->entries[s->waits++] = fmax(s->entry, other_entry);
         }
@@ -46,7 +46,7 @@ inline int binary_descend(global const float8 *tree, const Ray *ray, float t, Bi
     return s->entry < INFINITY;
 }
 
-/* To the last node that waits and is nearer than t; 0 if none is. */
+/* Pops the last node that is nearer than t; returns 0 without such a node. */
 inline int binary_next(global const float8 *tree, float t, BinaryState *s)
 {
     do {
@@ -57,7 +57,7 @@ inline int binary_next(global const float8 *tree, float t, BinaryState *s)
     return 1;
 }
 
-/* The nearest hit, or with `first_only` any. */
+/* The nearest hit, or any hit with `first_only`. */
 inline TriHit binary_trace(global const float *nodes, global const float *leaves, Ray ray, float tmax,
                            int first_only)
 {

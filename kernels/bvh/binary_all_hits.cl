@@ -1,5 +1,5 @@
-/* All hits of a ray by the binary tree; their number is returned. A triangle is in one leaf only, so that
- * none is met twice. */
+/* All hits of a ray by the binary tree; returns their number. Each triangle is in a single leaf, so no hit comes
+ * twice. */
 #include "bvh/binary.cl"
 #include "bvh/hit_list.cl"
 

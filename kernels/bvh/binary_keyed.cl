@@ -1,4 +1,4 @@
-/* Traversal of the binary tree of what deforms, see bvh/keyed.cl and bvh/binary.cl. */
+/* Traversal of a binary tree over moving vertices, see bvh/keyed.cl and bvh/binary.cl. */
 #include "bvh/binary.cl"
 #include "bvh/keyed.cl"
 
@@ -14,7 +14,7 @@ inline float8 binary_keyed_node(global const float8 *tree, uint at, uint count, 
     return found;
 }
 
-/* The nearest hit, or with `first_only` any. */
+/* The nearest hit, or any hit with `first_only`. */
 inline TriHit binary_keyed_trace(global const float *nodes, global const float *leaves, uint count, float share,
                                  vec3 o, vec3 d, float tmin, float tmax, int first_only)
 {
@@ -29,7 +29,7 @@ inline TriHit binary_keyed_trace(global const float *nodes, global const float *
         float8 node = binary_keyed_node(tree, waiting[--waits], count, share);
         if (!(ray_enter(&ray, node, hit.t) < INFINITY)) continue;
         uint link = node_link(node);
-        if (!node_is_leaf(node)) { /* the nearer one first */
+        if (!node_is_leaf(node)) { /* the nearer child first */
             float8 left = binary_keyed_node(tree, link, count, share);
             float8 right = binary_keyed_node(tree, link + 1, count, share);
             uint last = ray_enter(&ray, right, hit.t) >= ray_enter(&ray, left, hit.t);

@@ -1,11 +1,11 @@
 /* A binary tree over boxes, top down, by the surface area heuristic with binned centroids (Wald 2007).
  *
- * The first levels run one kernel a level, one work-item a range; what is left are subtrees, one
- * work-item each. Ranges stand in a binary heap: those under range k are 2k + 1 and 2k + 2.
+ * Each of the first levels has a kernel launch, with a work-item a range. Then each subtree has a work-item.
+ * Ranges form a binary heap: the children of range k are 2k + 1 and 2k + 2.
  *
- * The children of a range that is cut before item m stand at nodes 2m and 2m + 1, those of a subtree's
- * ranges one after the other where its first cut may be: neighbours share cache lines and pages. So no
- * counter is shared, and two builds make the same tree.
+ * The children of a range that is split before item m are nodes 2m and 2m + 1. A subtree's nodes follow each
+ * other from its first split on, so that neighbours share cache lines and pages. No counter is shared, so two
+ * builds give the same tree.
  */
 #include "bvh/no_vectorize.cl"
 #include "bvh/items.cl"
@@ -13,14 +13,14 @@
 
 #define BUILD_BINS 8
 
-/* What the whole tree shares. */
+/* Parameters of the whole tree. */
 typedef struct {
     global float8 *items, *nodes;
     float reach;    /* the largest coordinate of the scene */
-    uint leaf_size; /* items of a leaf, at most */
-    uint at_once;   /* items that are tested in the time of one, as a power of two */
-    uint runs;      /* are the items runs of bvh/curve.cl? Each is a leaf then */
-    uint depth;     /* most levels of a leaf below the root */
+    uint leaf_size; /* the most items of a leaf */
+    uint at_once;   /* log2 of the items that a traversal tests at once */
+    uint runs;      /* whether items are runs of bvh/curve.cl, and become leaves */
+    uint depth;     /* the most levels below the root */
 } Build;
 
 inline float build_reach(float8 scene)
@@ -34,7 +34,7 @@ inline float8 build_node(float8 bounds, float reach, uint link, uint count)
     return node_make(node_pad(bounds, reach), link, count);
 }
 
-/* Small ranges are cut with fewer bins: there they cost more than they find. */
+/* Small ranges have fewer bins: more bins cost more than they gain. */
 inline uint build_bins(uint count) { return count > 12 ? BUILD_BINS : 4; }
 
 inline int4 build_bin(float8 item, float4 low, float4 scale)
@@ -43,13 +43,13 @@ inline int4 build_bin(float8 item, float4 low, float4 scale)
     return clamp(bin, (int4)(0), (int4)(BUILD_BINS - 1));
 }
 
-/* What it costs to test `count` items in a box. A side that nothing is in has no number for an area. */
+/* The cost of `count` items in a box. The area of an empty side is no number. */
 inline float build_cost(const Build *b, float8 bounds, uint count)
 {
     return item_half_area(bounds) * (int)((count + (1u << b->at_once) - 1) >> b->at_once);
 }
 
-/* Adds an item to its bins of the three axes, and to their numbers of items, 8 bits a bin. */
+/* Adds an item to its bin of each axis, and to the bins' counts, 8 bits a bin. */
 inline void build_put(float8 bounds[BUILD_BINS][3], ulong4 *numbers, float8 item, float4 low, float4 scale)
 {
     int4 bin = build_bin(item, low, scale);
@@ -61,8 +61,8 @@ inline void build_put(float8 bounds[BUILD_BINS][3], ulong4 *numbers, float8 item
 
 /* The cheapest plane: axis in x, last bin of the left side in y; x < 0 if no plane divides.
  *
- * Every second item goes to bins of its own: neighbours tend to fall into the same bin, and what was
- * stored a moment ago is slow to load. */
+ * Odd items have a second set of bins: neighbours tend to fall into the same bin, and a load after a recent
+ * store is slow. */
 inline int2 build_plane(const Build *b, uint first, uint count, float4 low, float4 scale)
 {
     uint bins = build_bins(count), end = first + count;
@@ -114,8 +114,8 @@ inline int2 build_plane(const Build *b, uint first, uint count, float4 low, floa
     return plane;
 }
 
-/* Moves the items of a range whose bin is `last` or before to its front; returns where the others begin.
- * An item that is not of a side is made NaN for it, which a union leaves out. */
+/* Moves the items of a range with a bin up to `last` to its front; returns the start of the others. For the other
+ * side an item becomes NaN, which a union ignores. */
 inline uint build_divide(global float8 *items, Range r, int axis, int last, float8 span, float4 scale,
                          Extent *left, Extent *right)
 {
@@ -140,9 +140,8 @@ inline uint build_divide(global float8 *items, Range r, int axis, int last, floa
     return mid;
 }
 
-/* Moves the items of a range so that its two extents follow each other; returns where the second
- * begins. Where no plane divides, or the depth runs out, it is the middle: then the depth that is
- * left always suffices. */
+/* Splits the items of a range; returns the start of the second part. Where no plane divides, or the depth runs out,
+ * it is the middle: the remaining depth then suffices. */
 inline uint build_cut(const Build *b, Range r, float8 span, Extent *left, Extent *right)
 {
     uint mid = r.first;
@@ -162,8 +161,8 @@ inline uint build_cut(const Build *b, Range r, float8 span, Extent *left, Extent
     return mid;
 }
 
-/* Writes the node of a range; if it is to be divided, does so and returns 1. next: where its children
- * go, or 0: by the position of the cut. */
+/* Writes the node of a range; splits the range if necessary and returns 1 then. next: the children's node, or 0: by
+ * the position of the split. */
 inline int build_range(const Build *b, Range r, Extent h, uint next, Range children[2], Extent extents[2])
 {
     if (r.count <= b->leaf_size) {
@@ -196,7 +195,7 @@ kernel NO_VECTORIZE void build_root(global const Extent *restrict parts, uint n_
     extents[0] = h;
 }
 
-/* Ranges from `begin` on in the heap, a level of it. Those with no items are no ranges. */
+/* A level of the heap, from range `begin` on. Empty ranges do nothing. */
 kernel NO_VECTORIZE void build_level(global float8 *restrict items, global float8 *restrict nodes,
                                      global Range *restrict ranges, global Extent *restrict extents,
                                      uint begin, uint leaf_size, uint at_once, uint runs, uint depth)

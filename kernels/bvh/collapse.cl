@@ -1,13 +1,13 @@
 /* A binary tree made 8 wide with the least SAH cost, by dynamic programming (Ylitie 2017, sec. 3).
  *
  * costs[node]: lanes 0 to 6 are C(node, i), the least cost of at most i = 1 .. 7 wide trees that
- * together hold what is below the node; lane 7 keeps the choices, as bits: for i = 2 .. 8 how many
- * of the i trees the left child gets (0: as for i - 1). A leaf of the binary tree, which has 8
- * triangles at most, is a block; testing one costs the same however few they are.
+ * together hold the node's subtree; lane 7 keeps the choices as bits: for i = 2 .. 8 the number of trees
+ * for the left child (0: as for i - 1). A leaf of the binary tree, with at most 8 triangles, is a block;
+ * the cost of a block does not depend on their number.
  *
  * Wide nodes are 8 rows of float8: low x, high x, low y, high y, low z, high z of the children,
- * their words, and the binary nodes that they were, plus 1, or 0 where there is no child; a child's word is its
- * wide node, or its block with BVH_LEAF set.
+ * their words, and their binary nodes plus 1, or 0 without a child; a child's word is its wide node, or its
+ * block with BVH_LEAF set.
  */
 #include "bvh/collapsed.cl"
 #include "bvh/fetch.cl"
@@ -21,8 +21,8 @@
 #define COLLAPSE_BLOCK_COST 1.0f
 #define COLLAPSE_EVENLY (4 << 18 | 3 << 15 | 3 << 12 | 2 << 9 | 2 << 6 | 1 << 3 | 1) /* choices: half to each child */
 
-/* The chance that a random line through the node's box meets a triangle in it: area of one side over
- * a quarter of the box's surface times one half (Cauchy); dependence among them is neglected. */
+/* The probability that a random line through the node's box hits a triangle in it: half of a triangle's area over a
+ * quarter of the box's surface (Cauchy), as if triangles were independent. */
 inline float collapse_leaf_occlusion(global const float8 *items, float8 node)
 {
     float through = 1.0f, half_area = node_half_area(node);
@@ -31,8 +31,7 @@ inline float collapse_leaf_occlusion(global const float8 *items, float8 node)
     return half_area > 0.0f ? 1.0f - through : 0.0f;
 }
 
-/* Costs of a node whose children's are there. Its count becomes theirs together: a tree over runs of items
- * has counted runs. */
+/* Costs of a node after its children. Its count becomes the children's sum: a tree over runs has counted runs. */
 inline void collapse_node(global float8 *nodes, global const float8 *items, global float8 *costs,
                           global float *occlusion, uint at)
 {
@@ -73,14 +72,14 @@ inline void collapse_node(global float8 *nodes, global const float8 *items, glob
     occlusion[at] = area > 0.0f ? 1.0f - (1.0f - pl / area) * (1.0f - pr / area) : 0.0f;
 }
 
-/* Costs below the ranges that build_subtree was given, children before parents. */
+/* Costs of the subtrees of build_subtree, children before parents. */
 kernel NO_VECTORIZE void collapse_subtree(global float8 *restrict nodes,
                                           global const float8 *restrict items,
                                           global const Range *restrict ranges, uint begin,
                                           global float8 *restrict costs, global float *restrict occlusion)
 {
     Range r = ranges[begin + get_global_id(0)];
-    uint waiting[2 * BVH_DEPTH + 2]; /* node; with BVH_LEAF set once its children wait above it */
+    uint waiting[2 * BVH_DEPTH + 2]; /* node; BVH_LEAF is set after its children were pushed */
     int n = 0;
     if (r.count) waiting[n++] = r.node;
     while (n) {
@@ -97,7 +96,7 @@ kernel NO_VECTORIZE void collapse_subtree(global float8 *restrict nodes,
     }
 }
 
-/* Costs of one level of the heap of ranges; those below it are there. */
+/* Costs of a level of the heap of ranges, after the levels below. */
 kernel NO_VECTORIZE void collapse_level(global float8 *restrict nodes,
                                         global const float8 *restrict items,
                                         global const Range *restrict ranges, uint begin,
@@ -108,7 +107,7 @@ kernel NO_VECTORIZE void collapse_level(global float8 *restrict nodes,
 }
 
 /* Numbers the wide nodes and blocks, level by level: a node's child nodes, and its blocks, have
- * neighbouring numbers. For the rest see collapse_number. */
+ * neighbouring numbers. See collapse_number. */
 inline void collapse_levels(global const float8 *nodes, global const float8 *costs, global uint *roots,
                             global uint2 *firsts, global uint *leaf_roots, global uint *totals)
 {
@@ -136,7 +135,7 @@ inline void collapse_levels(global const float8 *nodes, global const float8 *cos
 /* roots, leaf_roots: the binary node of each wide node and block; firsts: a node's first child node and first
  * block. totals: nodes, blocks, levels, as a float the tree's cost for a line that meets its box, and the first
  * node of each level. If the tree of least cost has more levels than the stacks of traversals, every node takes
- * what is three levels below it instead. count: of `costs`. */
+ * its descendants three levels below as children instead. count: of `costs`. */
 kernel NO_VECTORIZE void collapse_number(global const float8 *restrict nodes, global float8 *restrict costs,
                                          uint count, global uint *restrict roots,
                                          global uint2 *restrict firsts, global uint *restrict leaf_roots,
@@ -151,7 +150,7 @@ kernel NO_VECTORIZE void collapse_number(global const float8 *restrict nodes, gl
     totals[3] = as_uint(area > 0.0f ? ((global const float *)costs)[0] / area : 0.0f);
 }
 
-/* How much sooner than others a shadow ray ought to look into a child: chance to end over cost. */
+/* A shadow ray's priority of a child: the probability of a hit over the cost. */
 inline float collapse_promise(global const float8 *nodes, global const float8 *costs,
                               global const float *occlusion, uint node)
 {
@@ -159,9 +158,8 @@ inline float collapse_promise(global const float8 *nodes, global const float8 *c
     return cost > 0.0f ? occlusion[node] * node_half_area(nodes[node]) / cost : 0.0f;
 }
 
-/* Writes one wide node, of `totals` that there are, if there is room for `count`. Children stand in ascending
- * promise, for traversals visit the last slot first. Empty slots hold what no ray meets, and lead to block 0 if one
- * does nevertheless. */
+/* Writes a wide node if `count` has room for all nodes in `totals`. Children have ascending priority, for traversals
+ * visit the last slot first. Empty slots hold a box that no ray hits, and link to block 0. */
 kernel NO_VECTORIZE void collapse_nodes(global const float8 *restrict nodes,
                                         global const float8 *restrict costs,
                                         global const float *restrict occlusion,
@@ -205,7 +203,7 @@ kernel NO_VECTORIZE void collapse_nodes(global const float8 *restrict nodes,
     }
 }
 
-/* Asks for the faces of a leaf's triangles, which lie anywhere. */
+/* Prefetches the faces of a leaf's triangles, which lie anywhere. */
 inline void collapse_fetch(global const float8 *nodes, global const float8 *items, global const uint *faces,
                            uint leaf)
 {
@@ -213,7 +211,7 @@ inline void collapse_fetch(global const float8 *nodes, global const float8 *item
     for (uint k = 0; k < n; k++) FETCH(faces + 3 * (ulong)item_index(items[first + k]));
 }
 
-/* Writes one block. */
+/* Writes a block. */
 kernel NO_VECTORIZE void collapse_blocks(global const float8 *restrict nodes,
                                          global const float8 *restrict items,
                                          global const uint *restrict leaf_roots, uint count,
@@ -236,8 +234,8 @@ kernel NO_VECTORIZE void collapse_blocks(global const float8 *restrict nodes,
     leaf_store_block(block, vertices, faces);
 }
 
-/* The items of leaves that hold one each, by their indices, in the order of the wide tree: the binary leaves come to
- * name them so, too. */
+/* Writes the items' indices in the order of the wide tree's leaves, for leaves with a single item. Binary leaves get
+ * the same numbers. */
 kernel NO_VECTORIZE void collapse_indices(global float8 *restrict nodes,
                                           global const float8 *restrict items,
                                           global const uint *restrict leaf_roots, uint count,

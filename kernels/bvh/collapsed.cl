@@ -1,15 +1,15 @@
-/* What becomes of a binary tree made 8 wide, by the choices that bvh/collapse.cl left in `costs`. */
+/* The wide nodes of a binary tree, by the choices of bvh/collapse.cl in `costs`. */
 #include "bvh/node.cl"
 
-/* Of so many trees below a node, how many the left child gets. */
+/* The number of trees for the left child, of the trees below a node. */
 inline uint collapse_share(global const float8 *costs, uint node, uint trees)
 {
     return as_uint(((global const float *)(costs + node))[7]) >> 3 * (trees - 2) & 7u;
 }
 
-/* The binary nodes that become the children of the wide node at `root`; returns their number. What waits stands at the
- * other end of `children`, and how many trees it becomes in four bits each: NVIDIA's compiler of driver 580 gave two
- * arrays that are indexed at run time one place. */
+/* The binary nodes that become the children of the wide node at `root`; returns their number. The stack is at the
+ * other end of `children`, with four bits for each entry's number of trees: NVIDIA's compiler of driver 580 gave two
+ * dynamically indexed arrays the same memory. */
 inline uint collapse_children(global const float8 *nodes, global const float8 *costs, uint root,
                               uint children[8])
 {

@@ -1,22 +1,21 @@
-/* Traversal of the compressed 8-wide tree (Ylitie, Karras and Laine 2017), one ray a work-item: the layout for
- * GPUs, which wait for memory more than they compute.
+/* Traversal of the compressed 8-wide tree (Ylitie, Karras and Laine 2017), a ray a work-item: the layout for
+ * GPUs, which are bound by memory.
  *
  * A node is 20 words: a corner p (3 floats); the exponents of three steps, a byte each, and in the highest
- * byte which slots hold nodes; the first child node; the first item; 8 bytes that tell of the slots; then 8
- * bytes each for low x, low y, low z, high x, high y, high z of the slots' boxes, in steps from p. What a
- * node has below it are neighbours, in the order of its slots: nodes among nodes, items among items.
+ * byte a mask of slots with nodes; the first child node; the first item; a byte for each of 8 slots; then 8
+ * bytes each for low x, low y, low z, high x, high y, high z of the slots' boxes, in steps from p. Child
+ * nodes are neighbours in the order of slots, and so are items.
  *
- * A slot's byte is 0 where there is nothing. Bits 0 to 4 say which bit of a word stands for it: of a node
- * 24 + slot, of items, 3 at most, the first of theirs among the node's 24. Bits 5 to 7 are as many ones.
- * Slot i stands where its box has more of x, y, z by bits 0, 1, 2 of i, so that a ray finds the nearer ones
- * first when it goes through the slots in the order of i xor its octant.
+ * An empty slot's byte is 0. Bits 0 to 4 number the slot's bit in a word: 24 + slot for a node, the first of
+ * at most 3 among 24 for items. Bits 5 to 7 are a mask of that many set bits. Slot i lies toward larger x, y,
+ * z by bits 0, 1, 2 of i, so that a ray visits nearer slots first in the order of i xor its octant.
  *
- * `leaves` holds 12 words an item: three corners, prim, tag, one unused. */
+ * `leaves` holds 12 words an item: three corners, prim, tag, an unused word. */
 #include "bvh/hit.cl"
 #include "bvh/ray.cl"
 #include "bvh/shear.cl"
 
-#define COMPACT_STACK (BVH_LEVELS - 1) /* below the root a level has one group at most */
+#define COMPACT_STACK (BVH_LEVELS - 1) /* below the root a level has at most a group */
 #define COMPACT_NODES 0xff000000u /* of a group: the slots with nodes that wait */
 
 typedef struct {
@@ -26,9 +25,9 @@ typedef struct {
     uint octants;    /* the same in every byte */
 } CompactRay;
 
-/* Where a ray is in a tree: groups of nodes that wait, each of one parent. A group's x is the first child node of the
- * parent; of y the highest byte says which of them wait, in the ray's order, and the lowest which there are, by
- * slot. */
+/* A ray's position in a tree: groups of waiting nodes, each with a common parent. A group's x is the parent's first
+ * child node; the highest byte of y is a mask of waiting nodes in the ray's order, the lowest a mask of slots with
+ * nodes. */
 typedef struct {
     uint2 group, *waiting; /* COMPACT_STACK of them */
     uint waits;
@@ -54,7 +53,7 @@ inline float4 compact_max(float4 a, float4 b) { return a > b ? a : b; }
 
 inline float4 compact_bytes(uint word) { return convert_float4(as_uchar4(word)); }
 
-/* The corners of the box around everything. */
+/* The corners of the root's box. */
 inline void compact_bounds(global const float *nodes, float3 *low, float3 *high)
 {
     global const uint *node = (global const uint *)nodes;
@@ -77,7 +76,7 @@ inline void compact_bounds(global const float *nodes, float3 *low, float3 *high)
     *high = (float3)(highs[0], highs[1], highs[2]);
 }
 
-/* The bits of those of four slots whose box is met; meta: the slots' bytes. */
+/* The bits of four slots whose boxes are hit; meta: the slots' bytes. */
 inline uint compact_slots(const CompactRay *r, uint meta, int4 met)
 {
     uint inner = (meta & meta << 1 & 0x10101010u) >> 4; /* 1 in the bytes of nodes */
@@ -88,8 +87,8 @@ inline uint compact_slots(const CompactRay *r, uint meta, int4 met)
     return bits.x | bits.y | bits.z | bits.w;
 }
 
-/* Of four slots the bits of those whose box the ray meets between tmin and t. `near` and `far`: the bytes of
- * their planes; planes are at step * byte + begin along the ray. */
+/* The bits of four slots whose boxes the ray hits between tmin and t. `near` and `far`: the bytes of their planes;
+ * planes are at step * byte + begin along the ray. */
 inline uint compact_boxes(const CompactRay *r, float t, float3 step, float3 begin, uint3 near, uint3 far,
                           uint meta)
 {
@@ -102,7 +101,7 @@ inline uint compact_boxes(const CompactRay *r, float t, float3 step, float3 begi
     return compact_slots(r, meta, entry <= exit);
 }
 
-/* Takes the next node from those that wait. Returns 0 if there was none left. */
+/* Pops the next waiting node. Returns 0 if none is left. */
 inline int compact_take(const CompactRay *r, CompactState *state, uint *at)
 {
     uint2 group = state->group;
@@ -118,8 +117,8 @@ inline int compact_take(const CompactRay *r, CompactState *state, uint *at)
     return 1;
 }
 
-/* Looks into the next node: the items that the ray may meet there are bits 0 to 23 of items->y,
- * counted from items->x. Returns 0 if there was no node left. */
+/* Visits the next node: bits 0 to 23 of items->y are items that the ray may hit, counted from items->x. Returns 0 if
+ * no node is left. */
 inline int compact_next(global const float *nodes, const CompactRay *r, float t, CompactState *state, uint2 *items)
 {
     uint at;
@@ -143,7 +142,7 @@ inline int compact_next(global const float *nodes, const CompactRay *r, float t,
     return 1;
 }
 
-/* The first of the items that are left, which is then no longer among them. */
+/* Removes and returns the first of the items. */
 inline uint compact_item(uint2 *items)
 {
     uint bit = 31 - clz(items->y);
@@ -151,12 +150,9 @@ inline uint compact_item(uint2 *items)
     return items->x + bit;
 }
 
-/* Leaves nothing to visit, so that the loops end by their conditions: a return from within them parts the rays of a
- * GPU's group, and those that go on would wait for one another no more. */
-inline void compact_end(CompactState *state, uint2 *items)
-{
-    state->group.y = state->waits = items->y = 0;
-}
+/* Empties the stack, so that the loops end by their conditions: after a return from inside, the threads of a GPU's
+ * group would not reconverge. */
+inline void compact_end(CompactState *state, uint2 *items) { state->group.y = state->waits = items->y = 0; }
 
 inline TriHit compact_hit(global const float *leaves, uint item, float t, float u, float v)
 {
@@ -192,7 +188,7 @@ inline TriHit compact_closest(global const float *nodes, global const float *lea
     return best == BVH_MISS ? tri_miss(tmax) : compact_hit(leaves, best, t, u, v);
 }
 
-/* Whether anything is between tmin and tmax. */
+/* Whether the ray hits anything between tmin and tmax. */
 inline int compact_occluded(global const float *nodes, global const float *leaves, float ox, float oy,
                             float oz, float dx, float dy, float dz, float tmin, float tmax)
 {

@@ -1,5 +1,5 @@
-/* All hits of a ray by the compressed tree; their number is returned. A triangle is one item only, so that
- * none is met twice. */
+/* All hits of a ray by the compressed tree; returns their number. Each triangle is a single item, so no hit comes
+ * twice. */
 #include "bvh/compact.cl"
 #include "bvh/hit_list.cl"
 

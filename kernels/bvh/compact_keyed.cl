@@ -1,13 +1,13 @@
-/* Traversal of the compressed 8-wide tree of what deforms, see bvh/keyed.cl and bvh/compact.cl. */
+/* Traversal of a compressed 8-wide tree over moving vertices, see bvh/keyed.cl and bvh/compact.cl. */
 #include "bvh/compact.cl"
 #include "bvh/keyed.cl"
 
 #define KEYED(verb) compact_keyed_##verb
 #define KEYED_NODE COMPACT_WORDS /* words of a node, and of an item */
 #define KEYED_LEAF 12
-#define COMPACT_KEYED_WIDER 0x1p-21f /* of both distances between which one is, for their roundings */
+#define COMPACT_KEYED_WIDER 0x1p-21f /* relative margin for the rounding of both keys' distances */
 
-/* What a ray knows of a node at one key: planes are at step * byte + begin along it. */
+/* A node's planes at a key: at step * byte + begin along the ray. */
 typedef struct { uint4 a, b, c, d, e; float3 begin, step; } CompactKey;
 
 inline CompactKey compact_key(global const uint4 *node, const CompactRay *r)
@@ -18,7 +18,7 @@ inline CompactKey compact_key(global const uint4 *node, const CompactRay *r)
     return k;
 }
 
-/* Distances to four planes: their bytes, the step and the beginning at both keys; put off by their roundings times
+/* Distances to four planes, from bytes, steps and beginnings at both keys; moved by their rounding error times
  * `side`. */
 inline float4 compact_keyed_planes(uint first, uint last, float step0, float begin0, float step1, float begin1,
                                    float share, float side)
@@ -27,7 +27,7 @@ inline float4 compact_keyed_planes(uint first, uint last, float step0, float beg
     return t0 * (1.0f - share) + t1 * share + side * COMPACT_KEYED_WIDER * (fabs(t0) + fabs(t1));
 }
 
-/* Of four slots the bits of those whose box the ray meets between tmin and t; `half_` chooses the four. */
+/* The bits of four slots whose boxes the ray hits between tmin and t; `half_` chooses the four. */
 inline uint compact_keyed_boxes(const CompactRay *r, float t, const CompactKey *p, const CompactKey *q, float share,
                                 uint half_)
 {
@@ -48,7 +48,7 @@ inline uint compact_keyed_boxes(const CompactRay *r, float t, const CompactKey *
     return compact_slots(r, half_ ? p->b.w : p->b.z, entry <= exit);
 }
 
-/* As compact_next. */
+/* See compact_next. */
 inline int compact_keyed_next(global const float *nodes, uint count, float share, const CompactRay *r, float t,
                               CompactState *state, uint2 *items)
 {
@@ -63,7 +63,7 @@ inline int compact_keyed_next(global const float *nodes, uint count, float share
     return 1;
 }
 
-/* The nearest hit, or with `first_only` any. */
+/* The nearest hit, or any hit with `first_only`. */
 inline TriHit compact_keyed_trace(global const float *nodes, global const float *leaves, uint count, float share,
                                   vec3 o, vec3 d, float tmin, float tmax, int first_only)
 {

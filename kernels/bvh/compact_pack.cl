@@ -1,15 +1,14 @@
-/* From the collapse of a binary tree to the compressed nodes of bvh/compact.cl, but for their boxes and the corners
- * of triangles: those bvh/refit.cl finds, which goes on from here.
+/* Compressed nodes (bvh/compact.cl) from the collapse of a binary tree, without boxes and corners of triangles, which
+ * bvh/refit.cl computes next.
  *
- * Siblings are reordered, for they stand in the order of their slots. So `places` keeps of every node its
- * number in the collapse, and the first item of those below it: a node has its own items first, then come
- * those of its children, one after the other. */
+ * Siblings are reordered by their slots. So `places` keeps every node's number in the collapse, and the first item
+ * of its subtree: a node's items come first, then each child's in turn. */
 #include "bvh/no_vectorize.cl"
 #include "bvh/collapsed.cl"
 #include "bvh/items.cl"
 
-/* Slots for the children, four bits each, 8 beyond `found`: the pair with the largest offset along a slot's diagonal
- * first, and so on. */
+/* Slots for the children, four bits each, 8 beyond `found`. The pair of child and slot with the largest offset along
+ * the slot's diagonal is assigned first. */
 inline uint compact_child_slots(global const float8 *nodes, float8 parent, const uint *children, uint found)
 {
     float4 middle = parent.lo + parent.hi;
@@ -37,8 +36,8 @@ inline uint compact_child_slots(global const float8 *nodes, float8 parent, const
     return slots;
 }
 
-/* Nodes from `begin` on, a level; those above it are there. leaves: records of triangles, which get their
- * tags and the caller's numbers; or where `tags` is null the numbers alone. */
+/* A level of nodes, from `begin` on, after the levels above. leaves: records of triangles, which get tags and the
+ * caller's numbers, or only numbers if `tags` is null. */
 kernel NO_VECTORIZE void compact_nodes(global const float8 *restrict nodes, global const float8 *restrict items,
                                        global const float8 *restrict costs, global const uint *restrict roots,
                                        global const uint2 *restrict firsts, uint begin, uint count,

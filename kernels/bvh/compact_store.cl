@@ -1,8 +1,8 @@
 /* Boxes into a node of bvh/compact.cl, in steps of a byte: never smaller than they were.
  *
  * Traversals have the planes as p + byte * step, with errors of 2^-23 of the node's extent, which is 256 steps at
- * most; so boxes are larger by COMPACT_MARGIN of a step. Errors that are relative to the distance from
- * the ray's origin are looked after where far planes are put farther. */
+ * most; so boxes are larger by COMPACT_MARGIN of a step. Moving far planes farther covers errors relative to the
+ * distance from the ray's origin. */
 #include "bvh/leaves.cl"
 #include "bvh/node.cl"
 
@@ -10,13 +10,13 @@
 #define COMPACT_STEPS 250.0f /* over the node's extent, at most; some are left for margins */
 #define COMPACT_LEAST 27u    /* 2^-100: the shortest step's exponent, so that no plane is denormal */
 
-/* As the exponent of a float has it: the least power of two of which COMPACT_STEPS reach over `extent`. */
+/* The biased exponent of the least power of two that covers `extent` in COMPACT_STEPS steps. */
 inline uint compact_exponent(float extent)
 {
     return max((as_uint(extent / COMPACT_STEPS) + 0x7fffffu) >> 23, COMPACT_LEAST);
 }
 
-/* Planes of one axis; returns the step's exponent. Slots that are not `there` get what no ray meets. */
+/* Planes of an axis; returns the step's exponent. Slots that are not `there` get planes that no ray hits. */
 inline uint compact_axis(global uint *node, uint axis, float8 low, float8 high, int8 there)
 {
     float least = leaf_least(low), most = -leaf_least(-high);
@@ -36,7 +36,7 @@ inline uint compact_axis(global uint *node, uint axis, float8 low, float8 high, 
 #define COMPACT_ROW(b, lane) \
     (float8)(b[0].lane, b[1].lane, b[2].lane, b[3].lane, b[4].lane, b[5].lane, b[6].lane, b[7].lane)
 
-/* boxes: low corner and negated high corner of what is in the slots, FLT_MAX where there is nothing. */
+/* boxes: low corner and negated high corner of the slots' contents, FLT_MAX for empty slots. */
 inline void compact_store(global uint *node, const float8 boxes[8])
 {
     int8 there = COMPACT_ROW(boxes, s0) < FLT_MAX;

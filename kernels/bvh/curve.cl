@@ -1,13 +1,11 @@
-/* Leaves without a search for planes: items in the order of a curve through space, and the curve cut into
- * runs, each of which is a leaf.
+/* Leaves without a search for planes: items in the order of a space-filling curve, cut into runs as leaves.
  *
- * The curve is Morton's through cells that are as good as cubes, 33 times the scene's longest side halved;
- * keys are sorted by their digits, 11 bits at a time, stably, so that two builds make the same tree. Of all
- * ways to cut a stretch of the curve into runs of at most `leaf_size` items, that with the least sum of the
- * boxes' areas is found by dynamic programming over its items.
+ * It is Morton's curve through nearly cubic cells, from 33 halvings of the longest side. Keys are sorted stably
+ * by digits of 11 bits, so that two builds give the same tree. Dynamic programming finds the cut of a stretch
+ * into runs of at most `leaf_size` items with the least sum of the boxes' areas.
  *
- * A key is Morton's code above the item's index. What stands for a run, to build a tree over, is an item
- * named after its first, with the number of items instead of the area.
+ * A key is Morton's code above the item's index. An item represents a run for the build of a tree: its name is
+ * the run's first item, and its area is replaced by the number of items.
  */
 #include "bvh/fetch.cl"
 #include "bvh/no_vectorize.cl"
@@ -15,14 +13,11 @@
 
 #include "generated/curve_keys.cl"
 #define CURVE_AHEAD 16 /* items */
-#define CURVE_SHARE 0.2f /* of the area of the last eight items: what one leaf more costs above it */
+#define CURVE_SHARE 0.2f /* share of the last eight items' area: the cost of another leaf */
 #define CURVE_FAR 1e37f /* more than any sum of areas */
 
 /* The bits of a cell's coordinate at their positions in the code, byte by byte. */
-inline ulong curve_spread(global const ulong *table, int cell)
-{
-    return table[cell & 255] | table[256 + (cell >> 8)];
-}
+inline ulong curve_spread(global const ulong *table, int cell) { return table[cell & 255] | table[256 + (cell >> 8)]; }
 
 /* low, scale: from a doubled centroid to its cell; tables: of two bytes of each axis. */
 kernel NO_VECTORIZE void curve_keys(global const float8 *restrict items, uint count, float4 low, float4 scale,
@@ -40,7 +35,7 @@ kernel NO_VECTORIZE void curve_keys(global const float8 *restrict items, uint co
 inline uint curve_item(ulong key) { return key & (1ul << CURVE_INDEX) - 1; }
 inline uint curve_digit(ulong key, uint shift) { return key >> shift & ((1 << CURVE_BITS) - 1); }
 
-/* How often each digit stands among `run` neighbours; one work-item has so many. */
+/* Counts each digit among the `run` neighbours of a work-item. */
 kernel NO_VECTORIZE void curve_count(global const ulong *restrict keys, uint count, uint run, uint shift,
                                      global uint *restrict numbers)
 {
@@ -50,8 +45,7 @@ kernel NO_VECTORIZE void curve_count(global const ulong *restrict keys, uint cou
     for (uint i = begin; i < end; i++) numbers[curve_digit(keys[i], shift)]++;
 }
 
-/* Numbers made positions: of `columns` digits, each of which has its positions side by side, row after row; after
- * the last, the sum of all. */
+/* Turns counts of `columns` digits into positions, digit by digit and row by row; the sum of all follows the last. */
 kernel NO_VECTORIZE void curve_scan(global uint *restrict numbers, uint rows, uint columns)
 {
     uint sum = 0;
@@ -73,7 +67,7 @@ kernel NO_VECTORIZE void curve_move(global const ulong *restrict keys, uint coun
     for (uint i = begin; i < end; i++) sorted[numbers[curve_digit(keys[i], shift)]++] = keys[i];
 }
 
-/* Lanes one further, and what comes to the first. */
+/* Lanes moved up by a lane, with another value in the first. */
 inline float8 curve_shift(float8 v, float first)
 {
     v = v.s70123456;
@@ -81,23 +75,20 @@ inline float8 curve_shift(float8 v, float first)
     return v;
 }
 
-/* A bound of the last 1 .. 8 items, with one more. */
-inline float8 curve_widen(float8 last, float next)
-{
-    return item_union(curve_shift(last, INFINITY), (float8)(next));
-}
+/* The bounds of the last 1 .. 8 items, with another item. */
+inline float8 curve_widen(float8 last, float next) { return item_union(curve_shift(last, INFINITY), (float8)(next)); }
 
-/* Puts `run` items in order and finds for each how long the run is that ends with it, if one does; numbers
- * the runs that are made of them. */
+/* Puts `run` items in order, and finds for each the length of the run that ends with it, 0 without; counts the
+ * runs. */
 kernel NO_VECTORIZE void curve_cut(global const float8 *restrict items, global const ulong *restrict keys,
                                    uint count, uint run, uint leaf_size, global float8 *restrict sorted,
                                    global uchar *restrict lengths, global uint *restrict numbers)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
-    const int8 lanes = (int8)(0, 1, 2, 3, 4, 5, 6, 7); /* lane k: what ends with a run of k + 1 items */
+    const int8 lanes = (int8)(0, 1, 2, 3, 4, 5, 6, 7); /* lane k: the cost with a last run of k + 1 items */
     const float8 limit = lanes < (int8)(leaf_size) ? (float8)(0.0f) : (float8)(CURVE_FAR);
     float8 x = (float8)(INFINITY), y = x, z = x, to_x = x, to_y = x, to_z = x;
-    float8 before = (float8)(CURVE_FAR); /* the least cost of all before the run, less that of one item less */
+    float8 before = (float8)(CURVE_FAR); /* the least cost before the run, less the cost with an item less */
     before.s0 = 0.0f;
     for (uint i = begin; i < end; i++) {
         FETCH(items + curve_item(keys[min(i + CURVE_AHEAD, count - 1)]));
@@ -112,7 +103,7 @@ kernel NO_VECTORIZE void curve_cut(global const float8 *restrict items, global c
         float8 dx = -to_x - x, dy = -to_y - y, dz = -to_z - z;
         float8 area = dx * dy + dy * dz + dz * dx;
         float8 cost = before + area + CURVE_SHARE * area.s7 + limit;
-        cost = as_float8((as_int8(cost) & ~7) | 7 - lanes); /* so that the least one tells its lane */
+        cost = as_float8((as_int8(cost) & ~7) | 7 - lanes); /* so that the least value tells its lane */
         float4 four = cost.lo < cost.hi ? cost.lo : cost.hi;
         float2 two = four.lo < four.hi ? four.lo : four.hi;
         float least = two.x < two.y ? two.x : two.y;
@@ -124,7 +115,7 @@ kernel NO_VECTORIZE void curve_cut(global const float8 *restrict items, global c
     numbers[get_global_id(0)] = number;
 }
 
-/* Writes what stands for the runs; numbers: where those of each stretch begin. */
+/* Writes the items of runs; numbers: the first run of each stretch. */
 kernel NO_VECTORIZE void curve_runs(global const float8 *restrict sorted, uint count, uint run,
                                     global const uchar *restrict lengths, global const uint *restrict numbers,
                                     global float8 *restrict runs, global Extent *restrict extents)

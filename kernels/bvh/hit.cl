@@ -1,9 +1,9 @@
-/* What a ray meets among triangles; filled by every layout, so that shading needs no look-up.
+/* A ray's hit of a triangle; every layout fills all members, so that shading needs no look-up.
  *
  * t in units of the ray's direction; u, v are the barycentrics of vertices 1 and 2; prim is the
- * index of the triangle in the caller's faces, BVH_MISS if there is none; tag is the caller's word
- * for it; n = cross(v1 - v0, v2 - v0), not normalised: its length is twice the triangle's area;
- * plane = n . v0; side is the greatest coordinate of v1 - v0 and v2 - v0, by which the roundings of t count.
+ * index of the triangle in the caller's faces, BVH_MISS without a hit; tag is the caller's word for the
+ * triangle; n = cross(v1 - v0, v2 - v0), not normalised: its length is twice the triangle's area;
+ * plane = n . v0; side is the greatest coordinate of v1 - v0 and v2 - v0, the scale of t's rounding errors.
  * A hit has tmin < t < tmax.
  */
 #include "bvh/no_vectorize.cl"
@@ -12,11 +12,7 @@
 
 typedef struct { float t, u, v; uint prim, tag; float nx, ny, nz, plane, side; } TriHit;
 
-inline float tri_side(float3 e1, float3 e2)
-{
-    float3 e = fmax(fabs(e1), fabs(e2));
-    return fmax(e.x, fmax(e.y, e.z));
-}
+inline float tri_side(float3 e1, float3 e2) { float3 e = fmax(fabs(e1), fabs(e2)); return fmax(e.x, fmax(e.y, e.z)); }
 
 /* The hit of a triangle by its corner v0 and its sides from there. */
 inline TriHit tri_hit(float t, float u, float v, uint prim, uint tag, float3 v0, float3 e1, float3 e2)

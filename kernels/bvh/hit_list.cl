@@ -1,5 +1,5 @@
-/* Where a traversal puts all hits of a ray, in the order in which it finds them. Where the pointers are null it only
- * counts. `begin` is the index of the ray's first hit. */
+/* The arrays for all hits of a ray, in the traversal's order. With null pointers a traversal only counts. `begin` is
+ * the index of the ray's first hit. */
 #include "bvh/hit.cl"
 
 typedef struct { ulong begin; global float *t, *barycentrics; global int *primitive; } HitList;

@@ -1,31 +1,23 @@
-/* What a tree is built over: boxes with a name.
+/* Items of a build: boxes with a name.
  *
- * Items are float8: low corner, name, negated high corner, surface area of what is inside; so the
- * union of two boxes is one minimum. An item's name is its index with BVH_ITEM set, which keeps the
+ * Items are float8: low corner, name, negated high corner, surface area of the content; so the union of two
+ * boxes is a minimum. An item's name is its index with BVH_ITEM set, which keeps the
  * bits away from denormals and NaN.
  */
 #define BVH_ITEM 0x40000000u
 
-/* Items that follow each other, and the node that stands for them. */
+/* Consecutive items, and their node. */
 typedef struct { uint node, first, count, depth; } Range;
 
-/* What is known of a range: its bounds, and its span: the minimum of (centroid, -centroid). */
+/* A range's bounds, and its span: the minimum of (centroid, -centroid). */
 typedef struct { float8 bounds, span; } Extent;
 
 inline float8 item_union(float8 a, float8 b) { return a < b ? a : b; }
 
-/* Twice the centroid, and its negation; the fourth lanes mean nothing. */
-inline float8 item_centroid(float8 item)
-{
-    float4 c = item.lo - item.hi;
-    return (float8)(c, -c);
-}
+/* Twice the centroid, and its negation; the fourth lanes are unused. */
+inline float8 item_centroid(float8 item) { float4 c = item.lo - item.hi; return (float8)(c, -c); }
 
-inline Extent extent_empty(void)
-{
-    Extent h = {(float8)(INFINITY), (float8)(INFINITY)};
-    return h;
-}
+inline Extent extent_empty(void) { Extent h = {(float8)(INFINITY), (float8)(INFINITY)}; return h; }
 
 inline Extent extent_add(Extent h, float8 item)
 {

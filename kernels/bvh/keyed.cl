@@ -1,6 +1,6 @@
-/* Trees over triangles that change with time. Nodes and leaves stand there once for each key, side by side; a
- * traversal gets `nodes` and `leaves` at the key before the time, and the share of the way to the next one.
- * Products are rounded by themselves, and rounding keeps order: what is inside of a box at both keys is in between. */
+/* Trees over triangles with moving vertices. Copies of a node or leaf for consecutive keys are neighbours; a traversal
+ * gets `nodes` and `leaves` at the key before the time, and the fraction of the step to the next key. Products are
+ * rounded separately, and rounding keeps order: points inside a box at both keys are inside between them. */
 #ifdef FP_FAST_FMAF
 #define KEYED_BETWEEN(a, b, share) fma(b, share, a * (1.0f - share))
 #else
@@ -19,7 +19,7 @@ inline float8 keyed_row(float8 a, float8 b, float share)
     return KEYED_BETWEEN(a, b, (float8)(share));
 }
 
-/* The nine coordinates of a triangle that stand `step` floats apart, those of the next key `next` floats farther. */
+/* A triangle's nine coordinates, `step` floats apart, interpolated with the next key `next` floats farther. */
 inline void keyed_corners(global const float *v, uint step, uint next, float share, float corners[9])
 {
     for (uint i = 0; i < 9; i++) corners[i] = keyed_one(v[i * step], v[i * step + next], share);
@@ -32,14 +32,14 @@ inline TriHit keyed_hit(const float c[9], float t, float u, float v, uint prim, 
     return tri_hit(t, u, v, prim, tag, v0, (float3)(c[3], c[4], c[5]) - v0, (float3)(c[6], c[7], c[8]) - v0);
 }
 
-/* As shear_intersect, of corners that stand here. */
+/* Like shear_intersect, for corners in registers. */
 inline int keyed_intersect(const Shear *s, const float v[9], uint step, float *t, float *b1, float *b2)
 {
     SHEAR_INTERSECT
 }
 
-/* Takes the triangle of a record, whose corners stand in a row, as the hit if it is met before that. names: where in
- * the record its number and tag are; size: of a record [floats]. */
+/* Replaces the hit if the triangle of a record is nearer; its corners are consecutive. names: the position of number
+ * and tag in the record; size: of a record [floats]. */
 inline int keyed_nearer(const Shear *shear, global const float *record, uint names, uint size, float share, float tmin,
                         TriHit *hit)
 {

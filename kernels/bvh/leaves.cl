@@ -1,4 +1,4 @@
-/* The triangles of leaves as traversals read them, from vertices and faces.
+/* Triangle records of leaves for traversals, from vertices and faces.
  *
  * A triangle with a corner that is not finite, or beyond what trees hold, is stored as a point, which
  * nothing hits.
@@ -7,7 +7,7 @@
 
 #include "generated/tree_reaches.cl"
 
-/* The corners of a triangle; 0 is returned if they had to be made a point. */
+/* The corners of a triangle; returns 0 if they became a point. */
 inline int leaf_corners(global const float *vertices, global const uint *faces, uint prim,
                         float4 corners[3])
 {
@@ -21,7 +21,7 @@ inline int leaf_corners(global const float *vertices, global const uint *faces, 
     return 0;
 }
 
-/* Of bvh/binary.cl, 16 floats: v0, v1, v2, n = cross(v1 - v0, v2 - v0); then prim, tag, plane, side. */
+/* For bvh/binary.cl, 16 floats: v0, v1, v2, n = cross(v1 - v0, v2 - v0); then prim, tag, plane, side. */
 inline void leaf_store_record(global float *record, const float4 v[3])
 {
     float4 e1 = v[1] - v[0], e2 = v[2] - v[0], n = cross(e1, e2);
@@ -31,7 +31,7 @@ inline void leaf_store_record(global float *record, const float4 v[3])
     vstore2((float2)(dot(n, v[0]), tri_side(e1.xyz, e2.xyz)), 7, record);
 }
 
-/* Of bvh/brute.cl, 16 floats: v0, e1, e2, n = cross(e1, e2); then prim, tag, plane, side. */
+/* For bvh/brute.cl, 16 floats: v0, e1, e2, n = cross(e1, e2); then prim, tag, plane, side. */
 inline void leaf_store_brute(global float *record, const float4 v[3])
 {
     float4 e1 = v[1] - v[0], e2 = v[2] - v[0], n = cross(e1, e2);
@@ -48,18 +48,14 @@ inline float leaf_least(float8 row)
     return m.x < m.y ? m.x : m.y;
 }
 
-inline float8 leaf_min(float8 a, float8 b, float8 c)
-{
-    float8 m = a < b ? a : b;
-    return m < c ? m : c;
-}
+inline float8 leaf_min(float8 a, float8 b, float8 c) { float8 m = a < b ? a : b; return m < c ? m : c; }
 
 #define LEAF_ROW(p, axis) \
     (float8)(p[0].axis, p[1].axis, p[2].axis, p[3].axis, p[4].axis, p[5].axis, p[6].axis, p[7].axis)
 
-/* A block of bvh/wide8.cl, 11 rows of float8: v0, v1, v2 (x, y, z each), prim, tag; the last two stand there.
- * Slots beyond its triangles have prim = BVH_MISS and hold a point. Returns low corner and negated high
- * corner, FLT_MAX where there is nothing. */
+/* A block of bvh/wide8.cl, 11 rows of float8: v0, v1, v2 (x, y, z each), prim, tag; the last two are filled already.
+ * Slots beyond its triangles have prim = BVH_MISS and hold a point. Returns low corner and negated high corner,
+ * FLT_MAX for an empty block. */
 inline float8 leaf_store_block(global float *block, global const float *vertices,
                                global const uint *faces)
 {
@@ -77,7 +73,7 @@ inline float8 leaf_store_block(global float *block, global const float *vertices
                    LEAF_ROW(b, z), LEAF_ROW(c, x), LEAF_ROW(c, y), LEAF_ROW(c, z)};
     int8 sound = (int8)(-1);
     for (uint i = 0; i < 9; i++) sound &= fabs(v[i]) < BVH_REACH; /* NaN fails the comparison */
-    if (!all(sound)) { /* those that are not become a point of one that is */
+    if (!all(sound)) { /* invalid triangles become a point of a valid triangle */
         union { float8 row[3]; float at[24]; } corner = {{v[0], v[1], v[2]}};
         union { int8 row; int at[8]; } usable = {sound};
         uint k = 0;

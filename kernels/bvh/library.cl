@@ -1,11 +1,11 @@
-/* What a program of an application's own sends its rays through, whatever the layout: one ray a
- * work-item. BVH_ARGS are a kernel's arguments, by the names in `Accel.buffers`; BVH hands them on. */
+/* Traversal for an application's kernels, in any layout, with a ray a work-item. BVH_ARGS are a kernel's arguments, by
+ * the names in `Accel.buffers`; BVH passes them on. */
 #include "generated/layout.cl"
 
 #define BVH_ARGS global const float *nodes, global const float *leaves
 #define BVH nodes, leaves
 
-/* The nearest triangle between tmin and tmax, in units of d; its `prim` is BVH_MISS if there is none. */
+/* The nearest triangle between tmin and tmax, in units of d; `prim` is BVH_MISS without a hit. */
 inline TriHit bvh_closest(BVH_ARGS, float3 o, float3 d, float tmin, float tmax)
 {
     return LAYOUT(closest)(BVH, o.x, o.y, o.z, d.x, d.y, d.z, tmin, tmax);

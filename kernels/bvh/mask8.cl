@@ -1,6 +1,6 @@
-/* Eight truth values as bits, the first and the last of them.
+/* Eight truth values as bits, and the first and last true value.
  *
- * On x86 the sign bits of a vector are one instruction away; elsewhere eight bytes of a ulong serve.
+ * On x86 an instruction returns the sign bits of a vector; elsewhere eight bytes of a ulong hold them.
  */
 #if defined(__AVX__) && defined(__has_builtin)
 #if __has_builtin(__builtin_ia32_movmskps256) && __has_builtin(__builtin_ctz)

@@ -1,7 +1,7 @@
-/* For kernels whose code is vectors already: `kernel NO_VECTORIZE void name(...)`.
+/* For kernels with explicit vectors: `kernel NO_VECTORIZE void name(...)`.
  *
- * Intel's CPU runtime puts several work-items into one vector unless it is told not to, which makes
- * a traversal in float8 five times slower.
+ * By default Intel's CPU runtime puts several work-items into a vector, which makes a traversal in float8 five
+ * times slower.
  */
 #define NO_VECTORIZE
 #ifdef __has_attribute

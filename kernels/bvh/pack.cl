@@ -1,9 +1,9 @@
-/* From triangles and boxes to items, and from items to what traversals read; bvh/leaves.cl has the forms. */
+/* Items from triangles and boxes, and traversals' records from items; bvh/leaves.cl has the records. */
 #include "bvh/no_vectorize.cl"
 #include "bvh/items.cl"
 #include "bvh/leaves.cl"
 
-/* One work-item takes `run` neighbours and leaves the bounds of all of them in `extents`. */
+/* A work-item handles `run` neighbours and writes their bounds to `extents`. */
 kernel NO_VECTORIZE void items_of_triangles(global const float *restrict vertices,
                                   global const uint *restrict faces, uint count, uint run,
                                   global float8 *restrict items, global Extent *restrict extents)
@@ -22,7 +22,7 @@ kernel NO_VECTORIZE void items_of_triangles(global const float *restrict vertice
     extents[get_global_id(0)] = h;
 }
 
-/* The same for boxes given as low and high corner; what is inside is taken for an ellipsoid. */
+/* The same for boxes with a low and a high corner; their content counts as an ellipsoid. */
 kernel NO_VECTORIZE void items_of_boxes(global const float *restrict boxes, uint count, uint run,
                               global float8 *restrict items, global Extent *restrict extents)
 {
@@ -52,7 +52,7 @@ kernel NO_VECTORIZE void pack_triangles(global const float8 *restrict items, uin
     vstore2((float2)(as_float(prim), as_float(tags[prim])), 6, record);
 }
 
-/* The items' indices alone, for trees over shapes that the caller keeps. */
+/* The items' indices, for trees over shapes that the caller keeps. */
 kernel NO_VECTORIZE void pack_indices(global const float8 *restrict items, uint count,
                                       global uint *restrict indices)
 {

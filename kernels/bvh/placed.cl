@@ -1,15 +1,15 @@
-/* One instance by its transform: what its row of the table begins with, and its box in the world.
+/* An instance's row and its box in the world, from its transform.
  *
- * A ray is transformed into the group by the inverse in float, off by some roundings times the
- * matrix's condition; the box is larger by as much. A transform that is singular gives a box that is
- * not finite: trees leave it out.
+ * A ray is transformed into the group by the inverse in float. The error is some roundings times the matrix's
+ * condition, and the box is enlarged by it. A singular transform gives a box that is not finite, which trees
+ * leave out.
  */
 #define PLACED_ROUNDING 1e-6f
 
 inline float3 placed_dot(const float3 *m, float3 v) { return (float3)(dot(m[0], v), dot(m[1], v), dot(m[2], v)); }
 
-/* matrix: 16 floats, row after row, to the world; middle: where the origin of the group's triangles is in
- * the space that it takes from; low, high: their box about that; row: as clpt/records.py has it. */
+/* matrix: 16 floats, row by row, to the world; middle: the origin of the group's triangles in the matrix's source
+ * space; low, high: their box around it; row: see clpt/records.py. */
 inline void placed_write(global const float *matrix, float3 middle, float3 low, float3 high, global uint *row,
                          global float *box)
 {

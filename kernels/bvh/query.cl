@@ -1,5 +1,4 @@
-/* The nearest hit of each of an application's rays, and whether there is any, one ray a work-item: see
- * bvh/query_rays.cl. */
+/* Nearest hits and any-hit answers for an application's rays, a ray a work-item: see bvh/query_rays.cl. */
 #include "bvh/query_rays.cl"
 #include "generated/layout.cl"
 #include "generated/instance_traversal.cl"
@@ -11,7 +10,7 @@
 #define QUERY_INSTANCES(hit, first_only) \
     query_instances(nodes, leaves, instance_nodes, instances, QUERY_ONE, hit, first_only)
 
-/* The row of the instance that is met first, with `first_only` of any; BVH_MISS if there is none. */
+/* The row of the first hit instance, or of any with `first_only`; BVH_MISS without a hit. */
 inline uint query_instances(global const float *nodes, global const float *leaves,
                             global const float *instance_nodes, global const uint *instances, float ox,
                             float oy, float oz, float dx, float dy, float dz, float from, float to,

@@ -1,6 +1,6 @@
-/* bvh/query.cl for a tree that is larger than a processor's caches: QUERY_RAYS rays a work-item, INTERLEAVED of them in
- * flight. Where most have about the direction of the one before, they are traced one after another, which is quicker:
- * they need the same memory, and the processor predicts their branches. */
+/* bvh/query.cl for a tree larger than a processor's caches: QUERY_RAYS rays a work-item, INTERLEAVED of them in
+ * flight. Coherent rays are traced sequentially, which is faster: they read the same memory, and the processor
+ * predicts their branches. */
 #include "bvh/query_rays.cl"
 #include "bvh/wide8_interleaved.cl"
 
@@ -8,7 +8,7 @@
 #define INTERLEAVED 8
 #define TREE_ARGS global const float *nodes, global const float *leaves
 
-/* Whether three quarters of the rays from `first` on have about the direction of the one before. */
+/* Whether three quarters of the rays from `first` on have about their predecessor's direction. */
 inline int query_alike(global const float *directions, uint first, uint end)
 {
     uint alike = 0;
@@ -29,8 +29,8 @@ inline void query_put(TriHit hit, uint8 begins, uint i, global float *t, global 
     vstore2((float2)(hit.u, hit.v), i, barycentrics + begins.s6);
 }
 
-/* The rays of a batch: `alone` traces ray i by itself; `step` takes state s a step further and is 0 at the end of
- * ray i, where `finish` stores its hit. */
+/* The rays of a batch: `alone` traces ray i; `step` advances state s and returns 0 at the end of ray i, where `finish`
+ * stores its hit. */
 #define QUERY_BATCH(alone, step, finish)                                                        \
     uint next = get_global_id(0) * QUERY_RAYS, end = min(next + QUERY_RAYS, count);             \
     uint active = INTERLEAVED;                                                                  \

@@ -1,8 +1,8 @@
-/* An application's rays as arguments of a kernel, one a work-item.
+/* An application's rays as arguments of a kernel, a ray a work-item.
  *
- * Origins and directions stand as x y z behind each other; t is in units of the direction. `t_mins` and
- * `t_maxs` are null where one number holds for all. `begins` tells where arrays begin in their buffers, in
- * elements: origins, directions, t_mins, t_maxs, then what the kernel writes.
+ * Origins and directions are x y z, packed; t is in units of the direction. `t_mins` and `t_maxs` are null if a
+ * number holds for all rays. `begins` are offsets of arrays in their buffers, in elements: origins, directions,
+ * t_mins, t_maxs, then outputs.
  */
 #define RAY_ARGS uint count, uint8 begins, global const float *origins, global const float *directions, \
                  global const float *t_mins, global const float *t_maxs, float t_min, float t_max

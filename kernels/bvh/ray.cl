@@ -1,7 +1,7 @@
-/* A ray as the one-ray traversals keep it, and its test against one box.
+/* A ray for single-ray traversals, and its test with a box.
  *
- * Differences of coordinates come first, so that errors are relative to the distance from the ray's
- * origin; far planes are put a few of them farther, so that no ray slips between two boxes that touch.
+ * Differences of coordinates come first, so that errors are relative to the distance from the ray's origin; far
+ * planes move by a few such errors, so that no ray slips between two touching boxes.
  */
 #include "bvh/node.cl"
 
@@ -12,21 +12,18 @@ typedef struct {
     float tmin;
 } Ray;
 
-/* As hardware does it; the library's fmin and fmax look after NaN, at many times the price. */
+/* Like hardware; the library's fmin and fmax handle NaN at many times the cost. */
 inline float ray_min(float a, float b) { return a < b ? a : b; }
 inline float ray_max(float a, float b) { return a > b ? a : b; }
 
-/* False if a component is NaN or infinite: such a ray meets nothing. */
+/* False if a component is NaN or infinite: such a ray hits nothing. */
 inline int ray_finite(float ox, float oy, float oz, float dx, float dy, float dz)
 {
     return isfinite(ox) && isfinite(oy) && isfinite(oz) && isfinite(dx) && isfinite(dy) && isfinite(dz);
 }
 
 /* 1 / d, finite for d = 0, so that a slab's planes never make NaN. */
-inline float ray_reciprocal(float d)
-{
-    return 1.0f / (fabs(d) > 1e-20f ? d : copysign(1e-20f, d));
-}
+inline float ray_reciprocal(float d) { return 1.0f / (fabs(d) > 1e-20f ? d : copysign(1e-20f, d)); }
 
 inline Ray ray_make(float ox, float oy, float oz, float dx, float dy, float dz, float tmin)
 {
@@ -35,7 +32,7 @@ inline Ray ray_make(float ox, float oy, float oz, float dx, float dy, float dz, 
     return ray;
 }
 
-/* Where the ray enters a node's box between tmin and t; INFINITY if it does not. */
+/* The ray's entry distance into a node's box between tmin and t; INFINITY without entry. */
 inline float ray_enter(const Ray *ray, float8 node, float t)
 {
     float x0 = (node.s0 - ray->o.x) * ray->r.x, x1 = (node.s4 - ray->o.x) * ray->r.x;
@@ -44,6 +41,6 @@ inline float ray_enter(const Ray *ray, float8 node, float t)
     float near = ray_max(ray_max(ray_min(x0, x1), ray_min(y0, y1)), ray_min(z0, z1));
     float far = ray_min(ray_min(ray_max(x0, x1), ray_max(y0, y1)), ray_max(z0, z1));
     near = ray_max(near, ray->tmin);
-    far = ray_max(far, far * RAY_WIDER); /* a negative one is as it was */
+    far = ray_max(far, far * RAY_WIDER); /* negative values stay */
     return near <= ray_min(far, t) ? near : INFINITY;
 }

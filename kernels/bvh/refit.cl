@@ -1,10 +1,8 @@
-/* Trees fitted to triangles or boxes that have moved: nodes and leaves stay what they are, their boxes are
- * found again from the leaves up.
+/* Refits of trees to moved triangles or boxes: nodes and leaves stay, boxes are computed from the leaves up.
  *
- * Boxes come out as the builder makes them, so that a tree whose triangles did not move is the same to
- * the bit. What is not finite, or beyond what trees hold, is left out: nothing hits it. A box with
- * nothing in it is inside out, but in a binary node a point beyond everything, for traversals of those
- * sort the planes of a box.
+ * Boxes equal the builder's, so that a tree with unmoved triangles stays the same to the bit. Triangles that
+ * are not finite, or beyond a tree's reach, are left out: nothing hits them. An empty box is inverted, but in
+ * a binary node it is a point beyond everything, for its traversals sort the planes of a box.
  */
 #include "bvh/compact_store.cl"
 #include "bvh/hit.cl"
@@ -14,12 +12,12 @@
 
 #define REFIT_NOTHING ((float8)(FLT_MAX))
 
-/* What the leaves hold: triangles, or where `boxes` is not null, boxes by their `indices`. */
+/* The content of leaves: triangles or, if `boxes` is not null, boxes by their `indices`. */
 typedef struct {
     global float *leaves;
     global const float *vertices, *boxes;
     global const uint *faces, *indices;
-    float reach; /* the largest coordinate when the tree was built */
+    float reach; /* the largest coordinate at the build */
 } Refit;
 
 inline float8 refit_pad(float8 bounds, float reach)
@@ -42,7 +40,7 @@ inline float8 refit_box(Refit tree, uint item)
     return all(sound) ? (float8)(lo, -hi) : REFIT_NOTHING;
 }
 
-/* The bounds of items first .. first + count - 1 of a binary tree, whose records are written. */
+/* Writes the records of items first .. first + count - 1 of a binary tree, and returns their bounds. */
 inline float8 refit_records(Refit tree, uint first, uint count)
 {
     float8 bounds = REFIT_NOTHING;
@@ -60,18 +58,15 @@ inline float8 refit_records(Refit tree, uint first, uint count)
     return bounds;
 }
 
-/* The bounds of a block, which is written. */
+/* Writes a block and returns its bounds. */
 inline float8 refit_block(Refit tree, uint block)
 {
     if (tree.boxes) return refit_box(tree, block);
     return leaf_store_block(tree.leaves + (ulong)block * 88, tree.vertices, tree.faces);
 }
 
-/* A binary node's bounds, which are padded. */
-inline float8 refit_bounds(float8 node)
-{
-    return node.s0 < FLT_MAX ? (float8)(node.lo, -node.hi) : REFIT_NOTHING;
-}
+/* A binary node's padded bounds. */
+inline float8 refit_bounds(float8 node) { return node.s0 < FLT_MAX ? (float8)(node.lo, -node.hi) : REFIT_NOTHING; }
 
 inline void refit_node(global float8 *nodes, Refit tree, uint at)
 {
@@ -87,8 +82,7 @@ inline void refit_node(global float8 *nodes, Refit tree, uint at)
     nodes[at] = node_make(bounds, as_uint(node.s3), as_uint(node.s7));
 }
 
-/* Where a tree's nodes and leaves begin in their buffers is told in steps of 32 bytes, where its faces do
- * in triangles. */
+/* Offsets of a tree's nodes and leaves are in units of 32 bytes, of its faces in triangles. */
 inline Refit refit_tree(global float *leaves, uint leaves_begin, global const float *vertices,
                         global const uint *faces, uint faces_begin, global const uint *indices,
                         global const float *boxes, float reach)
@@ -104,13 +98,13 @@ inline Refit refit_tree(global float *leaves, uint leaves_begin, global const fl
         global const float *restrict boxes, float reach
 #define REFIT refit_tree(leaves, leaves_begin, vertices, faces, faces_begin, indices, boxes, reach)
 
-/* Below the ranges that build_subtree was given, children before parents. */
+/* The subtrees of build_subtree, children before parents. */
 kernel NO_VECTORIZE void refit_subtree(global float8 *nodes, uint nodes_begin, global const Range *restrict ranges,
                                        uint begin, REFIT_ARGS)
 {
     Refit tree = REFIT;
     Range r = ranges[begin + get_global_id(0)];
-    uint waiting[2 * BVH_DEPTH + 2]; /* node; with BVH_LEAF set once its children wait above it */
+    uint waiting[2 * BVH_DEPTH + 2]; /* node; BVH_LEAF is set after its children were pushed */
     int n = 0;
     nodes += nodes_begin;
     if (r.count) waiting[n++] = r.node;
@@ -128,7 +122,7 @@ kernel NO_VECTORIZE void refit_subtree(global float8 *nodes, uint nodes_begin, g
     }
 }
 
-/* One level of the heap of ranges; those below it are done. */
+/* A level of the heap of ranges, after the levels below. */
 kernel NO_VECTORIZE void refit_level(global float8 *nodes, uint nodes_begin, global const Range *restrict ranges,
                                      uint begin, REFIT_ARGS)
 {
@@ -136,7 +130,7 @@ kernel NO_VECTORIZE void refit_level(global float8 *nodes, uint nodes_begin, glo
     if (r.count) refit_node(nodes + nodes_begin, REFIT, r.node);
 }
 
-/* Wide nodes from `begin` on, a level; those below it are done. */
+/* A level of wide nodes, from `begin` on, after the levels below. */
 kernel NO_VECTORIZE void refit_wide8(global float8 *nodes, uint nodes_begin, uint begin, uint count, REFIT_ARGS)
 {
     if (get_global_id(0) >= count) return;
@@ -164,7 +158,7 @@ kernel NO_VECTORIZE void refit_wide8(global float8 *nodes, uint nodes_begin, uin
     }
 }
 
-/* Wide nodes that follow a binary tree: the box of each child is that of the binary node which it was. */
+/* Wide nodes that follow a binary tree: each child has the box of its binary node. */
 kernel NO_VECTORIZE void refit_followers(global const float8 *restrict binary, global const uint *restrict totals,
                                          uint count, global float *restrict nodes)
 {
@@ -183,8 +177,8 @@ kernel NO_VECTORIZE void refit_followers(global const float8 *restrict binary, g
     }
 }
 
-/* A buffer of a tree that was built anew takes the place of one, unless the tree has more wide nodes than there is
- * room for. A work-item has 16 words. */
+/* Copies a buffer of a new tree over an old tree's, unless the new tree exceeds the room for wide nodes. A work-item
+ * has 16 words. */
 kernel NO_VECTORIZE void refit_adopt(global const uint *restrict totals, uint room, uint count, uint words,
                                      global const uint *restrict made, global uint *restrict adopts)
 {
@@ -193,7 +187,7 @@ kernel NO_VECTORIZE void refit_adopt(global const uint *restrict totals, uint ro
     for (uint i = begin; i < end; i++) adopts[i] = made[i];
 }
 
-/* The bounds of item `at` of a compressed tree, whose record is written. */
+/* Writes the record of item `at` of a compressed tree, and returns its bounds. */
 inline float8 refit_item(Refit tree, uint at)
 {
     if (tree.boxes) return refit_box(tree, at);
@@ -204,8 +198,8 @@ inline float8 refit_item(Refit tree, uint at)
     return sound ? refit_triangle(v) : REFIT_NOTHING;
 }
 
-/* Compressed nodes from `begin` on, a level; those below it are done. bounds: of every node, as they were
- * before they became steps, so that nothing grows from level to level. */
+/* A level of compressed nodes, from `begin` on, after the levels below. bounds: of every node, before rounding to
+ * steps, so that boxes do not grow from level to level. */
 kernel NO_VECTORIZE void refit_compact(global float8 *nodes, uint nodes_begin, global float8 *restrict bounds,
                                        uint begin, uint count, REFIT_ARGS)
 {

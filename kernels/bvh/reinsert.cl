@@ -1,14 +1,13 @@
-/* A binary tree made better: nodes are taken out and put in again where the sum of all areas becomes the least
- * (Bittner, Hapala and Havran 2013; the search is that of Meister and Bittner 2018).
+/* Reinsertion: nodes are removed from a binary tree and inserted where the sum of all areas becomes least (Bittner,
+ * Hapala and Havran 2013; search by Meister and Bittner 2018).
  *
- * In each pass the best place of every large node is looked for, many nodes at once, in the tree as it is. Then the
- * nodes are moved, one after another: what was moved before may have made a place worse, so what is gained is
- * computed again, and nothing is moved that does not gain. So the tree is the same however many nodes are looked at
- * at once.
+ * Each pass searches the best position of every large node in parallel, in the unchanged tree. Then nodes move in
+ * sequence: a former move may have made a position worse, so each gain is computed again, and only gainful moves are
+ * done. So the tree does not depend on the number of parallel searches.
  *
- * Siblings stand side by side; `parents` has a word for each pair of them. A node that is moved stays where it
- * stands, with its pair, and the other place of the pair changes hands: no place becomes free. The count of an inner
- * node is how many levels there are below it, until bvh/collapse.cl writes what it counts.
+ * Siblings are neighbours; `parents` has a word for each pair. A moved node keeps its memory with its pair, and the
+ * pair's other half changes its node: no memory becomes free. The count of an inner node is the number of levels
+ * below it, until bvh/collapse.cl replaces it.
  */
 #include "bvh/items.cl"
 #include "bvh/no_vectorize.cl"
@@ -32,14 +31,13 @@ inline float8 reinsert_node(global const float8 *nodes, uint link)
     return node;
 }
 
-/* The nodes that stand below range k of the heap, whose last level begins with `begin`: from `x` up to `y`. */
+/* The nodes below range k of the heap, from `x` up to `y`; the heap's last level begins with `begin`. */
 inline uint2 reinsert_own(global const Range *ranges, global const uint *ends, uint begin, uint k)
 {
     return k < begin ? (uint2)(0) : (uint2)(2 * (ranges[k].first + 1), ends[k - begin]);
 }
 
-/* Below the ranges that build_subtree was given: parents, levels, where the nodes end, and of their areas the sum
- * and the number. */
+/* The subtrees of build_subtree: parents, levels, the end of the nodes, and the sum and number of their areas. */
 kernel NO_VECTORIZE void reinsert_subtree(global float8 *restrict nodes, global const Range *restrict ranges,
                                           uint begin, global uint *restrict parents, global uint *restrict ends,
                                           global float2 *restrict areas)
@@ -55,11 +53,11 @@ kernel NO_VECTORIZE void reinsert_subtree(global float8 *restrict nodes, global 
             sum += (float2)(node_half_area(node), 1.0f);
             if (!node_is_leaf(node)) {
                 parents[node_link(node) / 2] = at;
-                end += 2; /* children stand behind their parents */
+                end += 2; /* children follow their parents */
             }
             at = next++;
         } while (at < end);
-        for (at = end; at >= first; at--) { /* the range's own node last */
+        for (at = end; at >= first; at--) { /* the range's node last */
             uint below = at > first ? at - 1 : r.node;
             if (!node_is_leaf(nodes[below])) nodes[below] = reinsert_node(nodes, node_link(nodes[below]));
         }
@@ -68,7 +66,7 @@ kernel NO_VECTORIZE void reinsert_subtree(global float8 *restrict nodes, global 
     areas[k] = sum;
 }
 
-/* The ranges above those, and in areas[0] the mean of all areas. */
+/* The ranges above, and in areas[0] the mean of all areas. */
 kernel NO_VECTORIZE void reinsert_top(global float8 *restrict nodes, global const Range *restrict ranges, uint begin,
                                       global uint *restrict parents, global float2 *restrict areas)
 {
@@ -83,7 +81,7 @@ kernel NO_VECTORIZE void reinsert_top(global float8 *restrict nodes, global cons
     }
 }
 
-/* The best place of a node, the sibling that it is to have; 0 if it stands well. */
+/* The best new sibling of a node; 0 to leave it. */
 inline uint reinsert_search(global const float8 *nodes, global const uint *parents, uint x)
 {
     uint waiting[REINSERT_STACK], parent = parents[x / 2], target = 0;
@@ -119,7 +117,7 @@ inline uint reinsert_search(global const float8 *nodes, global const uint *paren
     return target;
 }
 
-/* The places of the nodes of each range of the heap that are larger than the mean. */
+/* The best new siblings of nodes larger than the mean, for each range of the heap. */
 kernel NO_VECTORIZE void reinsert_find(global const float8 *restrict nodes, global const Range *restrict ranges,
                                        uint begin, global const uint *restrict parents,
                                        global const uint *restrict ends, global const float2 *restrict areas,
@@ -133,7 +131,7 @@ kernel NO_VECTORIZE void reinsert_find(global const float8 *restrict nodes, glob
         targets[at] = node_half_area(nodes[at]) > least ? reinsert_search(nodes, parents, at) : 0;
 }
 
-/* The boxes and levels of a node and all above it, till one stays as it is; what the areas lose is returned. */
+/* Updates boxes and levels from a node up to the first unchanged node; returns the decrease of areas. */
 inline float reinsert_refit(global float8 *nodes, global const uint *parents, uint at)
 {
     float lost = 0.0f;
@@ -153,7 +151,7 @@ inline void reinsert_put(global float8 *nodes, global uint *parents, uint at, fl
     if (!node_is_leaf(node)) parents[node_link(node) / 2] = at;
 }
 
-/* What areas would gain if a node became the sibling of that at `at`; INFINITY if it cannot. */
+/* The change of areas if a node became the sibling of node `at`; INFINITY if it cannot. */
 inline float reinsert_growth(global const float8 *nodes, global const uint *parents, uint x, uint at)
 {
     float8 node = nodes[x];
@@ -167,7 +165,7 @@ inline float reinsert_growth(global const float8 *nodes, global const uint *pare
     return depth > BVH_DEPTH ? INFINITY : growth;
 }
 
-/* Makes a node the sibling of `target`, if that gains. */
+/* Makes a node the sibling of `target`, if areas decrease. */
 inline void reinsert_move(global float8 *nodes, global uint *parents, uint x, uint target)
 {
     uint pair = x & ~1u, parent = parents[pair / 2];
@@ -181,7 +179,7 @@ inline void reinsert_move(global float8 *nodes, global uint *parents, uint x, ui
     reinsert_refit(nodes, parents, parents[target / 2]);
 }
 
-/* Moves the nodes to the places that were found. */
+/* Moves the nodes to their new siblings. */
 kernel NO_VECTORIZE void reinsert_all(global float8 *restrict nodes, global const Range *restrict ranges,
                                       uint begin, global uint *restrict parents, global const uint *restrict ends,
                                       global const uint *restrict targets)
@@ -196,7 +194,7 @@ kernel NO_VECTORIZE void reinsert_all(global float8 *restrict nodes, global cons
     }
 }
 
-/* The heap of ranges, as far as bvh/collapse.cl reads it, over the tree as it has become. */
+/* The members of the heap of ranges that bvh/collapse.cl reads, for the changed tree. */
 kernel NO_VECTORIZE void reinsert_ranges(global const float8 *restrict nodes, global Range *restrict ranges,
                                          uint begin)
 {

@@ -4,7 +4,7 @@
  *     int shape_intersect(ShapeTable table, uint prim, float3 o, float3 d, float tmin, float *t)
  * which returns 1 and lowers *t if the ray meets shape `prim` between tmin and *t, and includes
  * bvh/shapes_binary.cl or bvh/shapes_wide8.cl, which have `shapes_trace`: the nearest shape, or with `first_only`
- * any; BVH_MISS if none. *t begins as the farthest allowed. `indices`: the shape of each leaf's item.
+ * any; BVH_MISS without a hit. *t starts as the farthest distance. `indices`: the shape of each leaf's item.
  */
 inline uint shapes_closest(global const float *nodes, global const uint *indices, ShapeTable table,
                            float ox, float oy, float oz, float dx, float dy, float dz, float tmin,

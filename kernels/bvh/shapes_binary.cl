@@ -1,5 +1,5 @@
-/* Traversal of a binary tree over shapes: see bvh/shapes.cl. A box is tested again when what waits
- * has its turn, for which its memory is read anyway: so a level takes 4 bytes of the stack. */
+/* Traversal of a binary tree over shapes: see bvh/shapes.cl. A popped node's box is tested again, since its memory is
+ * read anyway: so a level takes 4 bytes of the stack. */
 #include "bvh/hit.cl"
 #include "bvh/ray.cl"
 

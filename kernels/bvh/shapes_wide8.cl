@@ -1,5 +1,5 @@
-/* Traversal of an 8-wide tree over shapes: see bvh/shapes.cl. A leaf is one shape, whose box was tested with those of
- * its seven neighbours. */
+/* Traversal of an 8-wide tree over shapes: see bvh/shapes.cl. A leaf is a shape, whose box was tested together with
+ * seven neighbours. */
 #include "bvh/wide8.cl"
 
 inline uint shapes_trace(global const float *nodes, global const uint *indices, ShapeTable table, float3 o,

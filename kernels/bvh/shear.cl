@@ -1,7 +1,7 @@
 /* The watertight test of a ray and a triangle (Woop, Benthin and Wald 2013).
  *
- * Space is moved and sheared so that the ray runs along +z from the origin; then a triangle is hit if
- * the origin of the xy plane is on one side of all its edges. Two triangles see the same two points
+ * Space is moved and sheared so that the ray runs along +z from the origin; then a triangle is hit if the origin
+ * of the xy plane is on the same side of all its edges. Two triangles see the same two points
  * of a shared edge. Each product of the edge function is rounded by itself, and rounding keeps order:
  * a sign is never wrong, at worst the function is zero, which both sides take for inside.
  */
@@ -34,7 +34,7 @@ inline float shear_edge(float px, float py, float qx, float qy)
     return px * qy - py * qx;
 }
 
-/* The body of a function that tests one triangle, see `shear_intersect`. */
+/* The body of a function that tests a triangle, see `shear_intersect`. */
 #define SHEAR_INTERSECT                                                                               \
     float az = v[s->kz * step] - s->oz, bz = v[(3 + s->kz) * step] - s->oz;                           \
     float cz = v[(6 + s->kz) * step] - s->oz;                                                         \
@@ -50,10 +50,7 @@ inline float shear_edge(float px, float py, float qx, float qy)
     *b2 = e2 * inverse;                                                                               \
     return (e0 >= 0.0f && e1 >= 0.0f && e2 >= 0.0f) || (e0 <= 0.0f && e1 <= 0.0f && e2 <= 0.0f);
 
-/* Whether the ray's line meets a triangle, whose nine coordinates stand `step` floats apart; where, and
- * the barycentrics of vertices 1 and 2. */
+/* Whether the ray's line hits a triangle with nine coordinates `step` floats apart; its distance, and the barycentrics
+ * of vertices 1 and 2. */
 inline int shear_intersect(const Shear *s, global const float *v, uint step, float *t, float *b1,
-                           float *b2)
-{
-    SHEAR_INTERSECT
-}
+                           float *b2) { SHEAR_INTERSECT }

@@ -1,9 +1,9 @@
-/* One ray against one triangle record of bvh/leaves.cl: v0, v1, v2, n, prim, tag, plane, side. */
+/* A ray against a triangle record of bvh/leaves.cl: v0, v1, v2, n, prim, tag, plane, side. */
 #include "bvh/hit.cl"
 #include "bvh/ray.cl"
 #include "bvh/shear.cl"
 
-/* If the ray meets the triangle between tmin and hit->t, the hit becomes that one and 1 is returned. */
+/* If the ray hits the triangle between tmin and hit->t, replaces the hit and returns 1. */
 inline int triangle_intersect(global const float *record, const Shear *shear, float tmin, TriHit *hit)
 {
     float t, u, v;

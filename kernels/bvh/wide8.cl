@@ -1,22 +1,22 @@
-/* Traversal of the 8-wide tree that bvh/collapse.cl makes, one ray a work-item: the layout for CPUs.
+/* Traversal of the 8-wide tree of bvh/collapse.cl, a ray a work-item: the layout for CPUs.
  *
- * A node's eight boxes, and a block's eight triangles, are tested at once in float8. What waits is kept by
- * bvh/wide8_waiting.cl, or where vectors are taken apart, as on a GPU, by bvh/wide8_levels.cl in its place.
+ * A node's eight boxes, and a block's eight triangles, are tested at once in float8. The stack is in
+ * bvh/wide8_waiting.cl, or on devices without vectors, such as GPUs, in bvh/wide8_levels.cl.
  */
 #include "bvh/hit.cl"
 #include "bvh/mask8.cl"
 #include "bvh/ray.cl"
 #include "bvh/shear.cl"
 
-/* What is added to offsets for rounding. The products o * r and plane * r are wrong by 2^-24 of themselves at
- * most; they differ by the distance, errors of which RAY_WIDER looks after. */
+/* A margin of offsets for rounding. The products o * r and plane * r have relative errors up to 2^-24; their difference
+ * is the distance, whose errors RAY_WIDER covers. */
 #define WIDE8_PRODUCTS 0x1p-22f
 
 typedef struct {
     float tmin;
-    float rx, ry, rz, px, py, pz; /* where it enters a box: plane * r + p */
-    float fx, fy, fz, gx, gy, gz; /* where it leaves: plane * f + g */
-    uint nx, ny, nz; /* rows of a node with the near planes; the far ones are in row ^ 1 */
+    float rx, ry, rz, px, py, pz; /* entry distance of a box: plane * r + p */
+    float fx, fy, fz, gx, gy, gz; /* exit distance: plane * f + g */
+    uint nx, ny, nz; /* rows of a node with near planes; far planes are in row ^ 1 */
     Shear shear;
 } Wide8Ray;
 
@@ -35,7 +35,7 @@ inline Wide8Ray wide8_ray(float ox, float oy, float oz, float dx, float dy, floa
     return ray;
 }
 
-/* The corners of the box around everything; children that are not there are inside out. */
+/* The corners of the root's box; boxes of missing children are inverted. */
 inline void wide8_bounds(global const float *nodes, float3 *low, float3 *high)
 {
     *low = (float3)(INFINITY);
@@ -46,7 +46,7 @@ inline void wide8_bounds(global const float *nodes, float3 *low, float3 *high)
     }
 }
 
-/* The children whose box the ray meets between tmin and t, and where it enters each. */
+/* The children whose boxes the ray hits between tmin and t, and its entry distances. */
 inline Mask8 wide8_boxes(global const float *node, const Wide8Ray *r, float t, float8 *entry)
 {
     global const float8 *row = (global const float8 *)node;
@@ -82,16 +82,12 @@ inline float8 wide8_edge(float8 px, float8 py, float8 qx, float8 qy)
     *det = sum;                                                                                      \
     return mask8(inside & (q > r->tmin * sum) & (q < t * sum));
 
-/* The triangles of a block that the ray meets between tmin and t; at what distances, times `det`.
- * bvh/shear.cl tells why nothing slips between two of them. */
+/* The triangles of a block that the ray hits between tmin and t, and their distances times `det`. bvh/shear.cl tells
+ * why no ray slips between two triangles. */
 inline Mask8 wide8_triangles(global const float *block, const Wide8Ray *r, float t, float8 *distance,
-                             float8 *det)
-{
-    global const float8 *b = (global const float8 *)block;
-    WIDE8_TRIANGLES
-}
+                             float8 *det) { global const float8 *b = (global const float8 *)block; WIDE8_TRIANGLES }
 
-/* The hit record of one triangle of a block, computed again for that one alone. */
+/* The hit record of a triangle of a block, computed again in scalars. */
 inline TriHit wide8_hit(global const float *leaves, uint slot, float t, const Wide8Ray *r)
 {
     global const float *b = leaves + (ulong)(slot >> 3) * 88 + (slot & 7);
@@ -104,8 +100,7 @@ inline TriHit wide8_hit(global const float *leaves, uint slot, float t, const Wi
 
 #include "bvh/wide8_waiting.cl"
 
-/* From a node down to the nearest leaf, or to a node of which no child is met; what it comes to is
- * returned. */
+/* Descends from a node to the nearest leaf, or to a node without hit children; returns its word. */
 inline uint wide8_descend(global const float *nodes, const Wide8Ray *r, float t, uint at, ulong *waiting,
                           uint *waits)
 {
@@ -133,7 +128,7 @@ inline TriHit wide8_closest(global const float *nodes, global const float *leave
     return best == BVH_MISS ? tri_miss(tmax) : wide8_hit(leaves, best, t, &r);
 }
 
-/* Whether anything is between tmin and tmax. */
+/* Whether the ray hits anything between tmin and tmax. */
 inline int wide8_occluded(global const float *nodes, global const float *leaves, float ox, float oy,
                           float oz, float dx, float dy, float dz, float tmin, float tmax)
 {

@@ -1,5 +1,5 @@
-/* All hits of a ray by the 8-wide tree; their number is returned. A triangle is in one block only, so that
- * none is met twice. */
+/* All hits of a ray by the 8-wide tree; returns their number. Each triangle is in a single block, so no hit comes
+ * twice. */
 #include "bvh/wide8.cl"
 #include "bvh/hit_list.cl"
 

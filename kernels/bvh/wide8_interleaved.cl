@@ -1,12 +1,11 @@
-/* Rays through the 8-wide tree, several of them interleaved: each takes a step to its next node or block in turn, and
- * what it needs there is fetched while the others step. That pays where rays of all directions wait for memory, in a
- * tree larger than the caches. */
+/* Interleaved rays through the 8-wide tree: each steps to its next node or block in turn, whose memory is prefetched
+ * while the other rays step. This pays for incoherent rays in a tree larger than the caches. */
 #include "bvh/fetch.cl"
 #include "bvh/wide8.cl"
 
 typedef struct {
     Wide8Ray ray;
-    float t; /* tmax, or where the nearest so far is */
+    float t; /* tmax, or the nearest distance so far */
     uint at, waits, best;
     union {
         ulong nearest[WIDE8_STACK];
@@ -14,21 +13,21 @@ typedef struct {
     } waiting;
 } Wide8RayState;
 
-/* Whether two rays have about the same direction: the squared cosine is of 13 degrees. */
+/* Whether two rays' directions are within 13 degrees, by the squared cosine. */
 inline int wide8_alike(float3 a, float3 b)
 {
     float along = dot(a, b);
     return along > 0.0f && along * along > 0.95f * dot(a, a) * dot(b, b);
 }
 
-/* Asks for the lines of memory that a node or a block fills. */
+/* Prefetches the cache lines of a node or a block. */
 inline void wide8_fetch(global const float *nodes, global const float *leaves, uint at)
 {
     global const float *from = at & BVH_LEAF ? leaves + (ulong)(at & ~BVH_LEAF) * 88 : nodes + (ulong)at * 64;
     for (uint line = 0; line < 5; line++) FETCH(from + 16 * line);
 }
 
-/* Begins a ray; 0 if it is not finite and meets nothing. */
+/* Starts a ray; returns 0 if it is not finite and hits nothing. */
 inline int wide8_start(Wide8RayState *s, float ox, float oy, float oz, float dx, float dy, float dz, float tmin,
                        float tmax)
 {
@@ -40,7 +39,7 @@ inline int wide8_start(Wide8RayState *s, float ox, float oy, float oz, float dx,
     return 1;
 }
 
-/* The next node or block of a ray that looks for the nearest hit; 0 at the end, where wide8_finish returns it. */
+/* The next node or block of a ray for its nearest hit; returns 0 at the end, where wide8_finish returns the hit. */
 inline int wide8_step(global const float *nodes, global const float *leaves, Wide8RayState *s)
 {
     uint at = s->at;
@@ -63,8 +62,7 @@ inline TriHit wide8_finish(global const float *leaves, const Wide8RayState *s)
     return s->best == BVH_MISS ? tri_miss(s->t) : wide8_hit(leaves, s->best, s->t, &s->ray);
 }
 
-/* The next node or block of a ray that looks for any hit; 0 at the end, where `best` is not BVH_MISS if there is
- * one. */
+/* The next node or block of a ray for any hit; returns 0 at the end, where `best` is BVH_MISS without a hit. */
 inline int wide8_step_any(global const float *nodes, global const float *leaves, Wide8RayState *s)
 {
     uint at = s->at;

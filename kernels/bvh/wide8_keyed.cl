@@ -1,5 +1,5 @@
-/* Traversal of the 8-wide tree of what deforms, see bvh/keyed.cl and bvh/wide8.cl. The words of nodes count
- * nodes and blocks of all keys. */
+/* Traversal of an 8-wide tree over moving vertices, see bvh/keyed.cl and bvh/wide8.cl. The words of nodes count nodes
+ * and blocks of all keys. */
 #include "bvh/wide8.cl"
 #include "bvh/keyed.cl"
 
@@ -26,7 +26,7 @@ inline Mask8 wide8_keyed_boxes(global const float *node, float share, const Wide
     return mask8(*entry <= exit);
 }
 
-/* The triangles of a block that the ray meets between tmin and t; for the rest see wide8_triangles. */
+/* The triangles of a block that the ray hits between tmin and t; see wide8_triangles. */
 inline Mask8 wide8_keyed_block(global const float *block, float share, const Wide8Ray *r, float t, float8 *distance,
                                float8 *det)
 {
@@ -45,7 +45,7 @@ inline TriHit wide8_keyed_hit(global const float *leaves, float share, uint slot
     return keyed_hit(corners, t, u, v, as_uint(b[72]), as_uint(b[80]));
 }
 
-/* count: of keys, which the words of wide nodes know. */
+/* count: of keys, a factor in the words of wide nodes. */
 inline TriHit wide8_keyed_closest(global const float *nodes, global const float *leaves, uint count, float share,
                                   vec3 o, vec3 d, float tmin, float tmax)
 {

@@ -1,5 +1,5 @@
-/* What waits of an 8-wide tree, in 8 bytes a level: a node in the low word, and in the high one those of its children
- * that wait. A child's box is tested again when its turn comes. For rays that go alone on a device without vectors. */
+/* The stack of an 8-wide tree in 8 bytes a level: a node in the low word, its waiting children in the high word. A
+ * popped child's box is tested again. For devices without vectors. */
 
 #define WIDE8_STACK (BVH_LEVELS - 1) /* each level above the last leaves a node waiting */
 #define WIDE8_SETS ulong waiting[WIDE8_STACK]; uint n = 0;
@@ -11,8 +11,8 @@
         k.s##i = lesser;                     \
     }
 
-/* Of the children `m` that are met the slots, three bits each, the nearest lowest, under a bit that ends them. They
- * are sorted by a network (Knuth 1998, sec. 5.3.4), by where the ray enters but for 7 parts in 2^23. */
+/* The slots of the hit children `m`, three bits each, the nearest lowest, below a terminating bit. A network sorts them
+ * (Knuth 1998, sec. 5.3.4) by entry distance, up to 7 parts in 2^23. */
 inline uint wide8_order(uint8 entry, Mask8 m)
 {
     const uint8 slots = (uint8)(0, 1, 2, 3, 4, 5, 6, 7);
@@ -28,21 +28,20 @@ inline uint wide8_order(uint8 entry, Mask8 m)
     return ((two.x | two.y << 6 | two.z << 12 | two.w << 18) & (ends - 1)) | ends;
 }
 
-/* The word of the first child of a list, which has one; the others are left waiting with their node. */
+/* Returns the word of the first child of a non-empty list; pushes the others with their node. */
 inline uint wide8_first(global const float *nodes, uint node, uint list, ulong *waiting, uint *waits)
 {
     if (list >> 3 > 1) waiting[(*waits)++] = (ulong)(list >> 3) << 32 | node;
     return as_uint(nodes[(ulong)node * 64 + 48 + (list & 7)]);
 }
 
-/* The nearest of the children `m` of a node that are met, of which there is one at least; entry: their distances, as
- * bits. */
+/* The nearest of the hit children `m` of a node, at least a child; entry: their distances as bits. */
 inline uint wide8_nearest(global const float *nodes, uint at, const uint *entry, Mask8 m, ulong *waiting, uint *waits)
 {
     return wide8_first(nodes, at, wide8_order(vload8(0, entry), m), waiting, waits);
 }
 
-/* The last that waits, wherever it is, in `at`; 0 if there is none. */
+/* Pops the last child into `at`, at any distance; returns 0 without a child. */
 inline int wide8_later(global const float *nodes, ulong *waiting, uint *waits, float t, uint *at)
 {
     if (!*waits) return 0;
@@ -51,7 +50,7 @@ inline int wide8_later(global const float *nodes, ulong *waiting, uint *waits, f
     return 1;
 }
 
-/* Whether the ray meets one child's box between tmin and t; box: its place in the node. */
+/* Whether the ray hits a child's box between tmin and t; box: its slot in the node. */
 inline int wide8_enters(global const float *box, const Wide8Ray *r, float t)
 {
     float x = box[8 * r->nx] * r->rx + r->px, far_x = box[8 * (r->nx ^ 1)] * r->fx + r->gx;
@@ -60,7 +59,7 @@ inline int wide8_enters(global const float *box, const Wide8Ray *r, float t)
     return fmax(fmax(x, y), fmax(z, r->tmin)) <= fmin(fmin(far_x, far_y), fmin(far_z, t));
 }
 
-/* The last that waits and is nearer than t, in `at`; 0 if none is. */
+/* Pops the last child nearer than t into `at`; returns 0 without such a child. */
 inline int wide8_next(global const float *nodes, const Wide8Ray *r, ulong *waiting, uint *waits, float t, uint *at)
 {
     ulong top;
@@ -72,8 +71,8 @@ inline int wide8_next(global const float *nodes, const Wide8Ray *r, ulong *waiti
     return 1;
 }
 
-/* From a node of which the children `m` are met to the last of them, which promises most; to one that waits if there
- * is none. The others wait as a set. 0 if nothing waits. */
+/* Moves from a node to the last of its hit children `m`, with the highest priority, or to a waiting child if `m` is
+ * empty. The others are pushed as a set. Returns 0 if nothing waits. */
 inline int wide8_last(global const float *nodes, uint node, Mask8 m, ulong *waiting, uint *waits, uint *at)
 {
     ulong top = (ulong)m << 32 | node;
@@ -88,7 +87,7 @@ inline int wide8_last(global const float *nodes, uint node, Mask8 m, ulong *wait
     return 1;
 }
 
-/* Whether the ray meets triangle `b` of a block between tmin and t, as wide8_triangles has it; where, times `det`. */
+/* Whether the ray hits triangle `b` of a block between tmin and t, see wide8_triangles; its distance times `det`. */
 inline int wide8_triangle(global const float *b, const Wide8Ray *r, float t, float *distance, float *det)
 {
     const Shear *s = &r->shear;
@@ -104,8 +103,8 @@ inline int wide8_triangle(global const float *b, const Wide8Ray *r, float t, flo
     return inside & (*distance > r->tmin * *det) & (*distance < t * *det);
 }
 
-/* Tests a block; a hit that is nearer than t becomes t and, by its slot, best. Two triangles at a time need .6 of the
- * registers that eight do. */
+/* Tests a block; a hit nearer than t sets t and best, its slot. Two triangles at a time need .6 of the registers of
+ * eight. */
 inline void wide8_nearer(global const float *leaves, uint block, const Wide8Ray *r, float *t, uint *best)
 {
     float far = *t;
@@ -119,7 +118,7 @@ inline void wide8_nearer(global const float *leaves, uint block, const Wide8Ray 
     }
 }
 
-/* Whether the ray meets a triangle of a block. */
+/* Whether the ray hits a triangle of a block. */
 inline int wide8_meets(global const float *leaves, uint block, const Wide8Ray *r, float t)
 {
     int met = 0;

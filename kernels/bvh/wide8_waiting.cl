@@ -1,13 +1,12 @@
-/* What waits of an 8-wide tree, each child with the distance at which the ray enters it. */
+/* The stack of an 8-wide tree: each child with the ray's entry distance. */
 
 #define WIDE8_STACK (7 * BVH_DEPTH + 8) /* each node above leaves 7 children waiting */
 #define WIDE8_SETS uint waiting[BVH_DEPTH], n = 0; Mask8 sets[BVH_DEPTH];
 #define WIDE8_LAST(nodes, node, m, at) wide8_last(nodes, node, m, waiting, sets, &n, at)
 #define wide8_next(nodes, r, waiting, waits, t, at) wide8_later(nodes, waiting, waits, t, at)
 
-/* The nearest of the children `m` of a node that are met, of which there is one at least, by their words and
- * entry distances. The others are left waiting in descending order: entry distance, as bits, above the word,
- * so that both are compared at once. */
+/* Returns the nearest of the hit children `m` of a node, at least a child, by words and entry distances. Pushes the
+ * others in descending order: the entry distance as bits above the word, so that a comparison takes both. */
 inline uint wide8_nearest(global const float *nodes, uint at, const uint *entry, Mask8 m, ulong *waiting,
                           uint *waits)
 {
@@ -17,7 +16,7 @@ inline uint wide8_nearest(global const float *nodes, uint at, const uint *entry,
     if (!m) return words[i];
     ulong near = (ulong)entry[i] << 32 | words[i];
     uint base = *waits, n = base;
-    do { /* the nearest goes on */
+    do { /* the nearest is returned */
         i = mask8_first(m);
         m &= m - 1;
         ulong c = (ulong)entry[i] << 32 | words[i];
@@ -31,7 +30,7 @@ inline uint wide8_nearest(global const float *nodes, uint at, const uint *entry,
     return (uint)near;
 }
 
-/* The last that waits and is nearer than t, in `at`; 0 if none is. */
+/* Pops the last child nearer than t into `at`; returns 0 without such a child. */
 inline int wide8_later(global const float *nodes, const ulong *waiting, uint *waits, float t, uint *at)
 {
     uint n = *waits;
@@ -44,8 +43,8 @@ inline int wide8_later(global const float *nodes, const ulong *waiting, uint *wa
     return 1;
 }
 
-/* From a node of which the children `m` are met to the last of them, which promises most; to one that waits
- * if there is none. The others wait as a set, with their node. 0 if nothing waits. */
+/* Moves from a node to the last of its hit children `m`, with the highest priority, or to a waiting child if `m` is
+ * empty. The others are pushed as a set with their node. Returns 0 if nothing waits. */
 inline int wide8_last(global const float *nodes, uint node, Mask8 m, uint *waiting, Mask8 *sets, uint *waits,
                       uint *at)
 {
@@ -63,7 +62,7 @@ inline int wide8_last(global const float *nodes, uint node, Mask8 m, uint *waiti
     return 1;
 }
 
-/* Tests a block; a hit that is nearer than t becomes t and, by its slot, best. */
+/* Tests a block; a hit nearer than t sets t and best, its slot. */
 inline void wide8_nearer(global const float *leaves, uint block, const Wide8Ray *r, float *t, uint *best)
 {
     union { float8 v; float at[8]; } q;
@@ -79,7 +78,7 @@ inline void wide8_nearer(global const float *leaves, uint block, const Wide8Ray 
     }
 }
 
-/* Whether the ray meets a triangle of a block. */
+/* Whether the ray hits a triangle of a block. */
 inline int wide8_meets(global const float *leaves, uint block, const Wide8Ray *r, float t)
 {
     float8 unused[2];

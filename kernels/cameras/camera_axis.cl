@@ -9,4 +9,4 @@ inline void camera_axis_moved(Scene scene, vec3 *from, vec3 *axis)
 }
 
 /* Twin, where the camera stands still. */
-#define camera_axis_moved(scene, from, axis)
+inline void camera_axis_moved(Scene scene, vec3 *from, vec3 *axis) {}

@@ -1,5 +1,5 @@
 /* The front of a lens that moves. */
-#define front_moved(scene, ray) camera_moved(scene, ray)
+inline CameraRay front_moved(Scene scene, CameraRay ray) { return camera_moved(scene, ray); }
 
 /* A direction from the front, as the camera was lowered; *grows: a solid angle there, over that in the world. */
 inline vec3 front_lowered(Scene scene, vec3 to, real *grows)
@@ -15,5 +15,5 @@ inline vec3 front_lowered(Scene scene, vec3 to, real *grows)
 }
 
 /* Twin, where the camera stands still. */
-#define front_moved(scene, ray) (ray)
-#define front_lowered(scene, to, grows) (to)
+inline CameraRay front_moved(Scene scene, CameraRay ray) { return ray; }
+inline vec3 front_lowered(Scene scene, vec3 to, real *grows) { return to; }

@@ -11,5 +11,5 @@ inline integer ghost_bit(Scene scene, integer pixel_index, integer sample)
 inline mask left_to_flare(integer state, integer depth) { return (depth == 0) & ((state & PATH_GHOST) != 0); }
 
 /* Twin, where a lens has none, or light paths do not bring them. */
-#define ghost_bit(scene, pixel_index, sample) ((integer)(0))
-#define left_to_flare(state, depth) mask_of(0)
+inline integer ghost_bit(Scene scene, integer pixel_index, integer sample) { return (integer)(0); }
+inline mask left_to_flare(integer state, integer depth) { return mask_of(0); }

@@ -5,4 +5,7 @@ inline Spectrum path_start(Scene scene, Slab path, uint at, integer pixel_index,
 }
 
 /* Twin, where all rays count alike, or the film has no alpha. */
-#define path_start(scene, path, at, pixel_index, sample) camera_start()
+inline Spectrum path_start(Scene scene, Slab path, uint at, integer pixel_index, integer sample)
+{
+    return camera_start();
+}

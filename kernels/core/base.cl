@@ -1,4 +1,4 @@
-/* All that a stage and a kind may rely on, in order. generated/scene.cl is made from clpt/records.py. */
+/* The base of stages and kinds, in order. generated/scene.cl comes from clpt/records.py. */
 #include "core/lanes.cl"
 #include "core/rows.cl"
 #include "core/math.cl"

@@ -1,6 +1,6 @@
-/* OpenCL C's built-in functions, as far as clpt's texts call them, for a compiler that would otherwise read a header
- * of 18,000 lines before each text: see clpt/device/declarations.py. Source: The OpenCL C Specification 1.2, 6.12.
- * Types and constants are the compiler's own. */
+/* The built-in functions of OpenCL C that clpt's texts call, in place of a compiler's header of 18,000
+ * lines: see clpt/device/declarations.py. Source: The OpenCL C Specification 1.2, 6.12.
+ * Types and constants come from the compiler. */
 #define PURE __attribute__((overloadable, const))
 #define CALLED __attribute__((overloadable))
 #define FLOATS(F, name) F(name, float) F(name, float2) F(name, float3) F(name, float4) F(name, float8) F(name, float16)

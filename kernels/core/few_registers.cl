@@ -1,5 +1,5 @@
-/* In the place of bvh/no_vectorize.cl for programs of a GPU to which FEW_REGISTERS are enough: AMD's run as many groups
- * as these allow. Left alone their compiler takes up to 156 for 92, and 172 for 154. */
+/* In place of bvh/no_vectorize.cl for GPU programs that fit FEW_REGISTERS registers: on AMD the number limits the
+ * groups in flight. By default its compiler takes up to 156 for 92, and 172 for 154. */
 #ifdef __GFX11__
 #define NO_VECTORIZE __attribute__((amdgpu_waves_per_eu(1536 / FEW_REGISTERS)))
 #elif defined(__GFX10__)

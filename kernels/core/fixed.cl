@@ -1,17 +1,13 @@
-/* Sums of pixels are whole numbers of 96 bits, in units of 2^-48, two's complement: they do not depend on the order
- * of their terms, so that a film is the same however its samples are divided, and films add without a rounding. */
+/* Sums of pixels are whole numbers of 96 bits in two's complement, in units of 2^-48. They do not depend on the order
+ * of terms, so that a film does not depend on the division of its samples, and films add without rounding. */
 typedef struct { natural low, middle, high; } Fixed;
 typedef struct { natural x, y, z; } Natural3;
 
-#define FIXED_LARGEST 0x1p44f /* of one term */
+#define FIXED_LARGEST 0x1p44f /* of a term */
 
-inline Fixed fixed_zero(void)
-{
-    Fixed f = {(natural)(0u), (natural)(0u), (natural)(0u)};
-    return f;
-}
+inline Fixed fixed_zero(void) { Fixed f = {(natural)(0u), (natural)(0u), (natural)(0u)}; return f; }
 
-/* 1 where the sum of two words, one of which is `term`, left its 32 bits. */
+/* The carry of a sum of two words, with `term` as an addend: 1 if it exceeded 32 bits. */
 inline natural fixed_carry(natural sum, natural term) { return sel_n(sum < term, (natural)(1u), (natural)(0u)); }
 
 inline Fixed fixed_add(Fixed a, Fixed b)
@@ -24,7 +20,7 @@ inline Fixed fixed_add(Fixed a, Fixed b)
     return f;
 }
 
-/* v in units, what is below one cut off; |v| is FIXED_LARGEST at most. Every step but the last is exact. */
+/* v in units, truncated; |v| is at most FIXED_LARGEST. Every step but the last is exact. */
 inline Fixed fixed_of(real v)
 {
     real rest = fabs(v);
@@ -38,7 +34,7 @@ inline Fixed fixed_of(real v)
     return fixed_add(f, one);
 }
 
-/* The same of 0 <= v < 2^16, which has no highest word. */
+/* The same for 0 <= v < 2^16, without the highest word. */
 inline Fixed fixed_of_small(real v)
 {
     natural middle = to_natural(v * 0x1p16f), low = to_natural((v - to_real(middle) * 0x1p-16f) * 0x1p48f);
@@ -46,11 +42,11 @@ inline Fixed fixed_of_small(real v)
     return f;
 }
 
-/* Whether that function takes all three; false for what is not finite. */
+/* Whether this function accepts all three values; false for values that are not finite. */
 inline mask fixed_takes_small(vec3 v)
 {
     return (v.x >= 0.0f) & (v.y >= 0.0f) & (v.z >= 0.0f) & (v.x + v.y + v.z < 65536.0f);
 }
 
-/* Where a sum is so large, or so far below 0, that another term might leave the 96 bits. */
+/* Whether another term might exceed a sum's 96 bits. */
 inline mask fixed_is_full(natural high) { return high + 0x40000000u >= 0x80000000u; }

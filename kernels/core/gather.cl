@@ -1,5 +1,5 @@
 /* Memory lane by lane: `gather` reads table[at]; the index of an idle lane must be valid: give 0. `scatter_if`
- * writes only where m; where lanes write to one place the last one counts.
+ * writes only where m; if lanes write to the same address, the last lane counts.
  *
  * Processors with an instruction for it get it by a compiler's built-in function. Written out lane by lane, reads are
  * nine tenths of a compiled shading kernel, and of the time to compile it. LANE_BITS: a mask as a bit for each lane. */

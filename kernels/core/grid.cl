@@ -5,24 +5,24 @@
 #include "generated/grid_sizes.cl"
 
 typedef struct {
-    integer rows, columns; /* of cells */
-    integer faces;         /* the rows are those of so many grids, each with one more row of corners */
+    integer rows, columns; /* number of cells */
+    integer faces;         /* number of grids that share the rows, each with an additional row of corners */
     integer corners;       /* first word in `distributions` of the corners' weights */
-    integer marginal;      /* of sums over the rows of a block, for every strip; 1 at its end */
-    integer conditional;   /* of sums over the columns of a block, for every row; 1 at its end */
-    integer blocks;        /* of what `grid_receiver` goes to */
+    integer marginal;      /* first word of sums over a block's rows, for every strip; 1 at its end */
+    integer conditional;   /* first word of sums over a block's columns, for every row; 1 at its end */
+    integer blocks;        /* first word of the tables of `grid_receiver` */
     integer block_rows, block_columns; /* cells of a block */
     real norm;
 } Grid;
 
-/* How many blocks hold so many cells. */
+/* The number of blocks for a number of cells. */
 inline integer grid_blocks(integer cells, integer block)
 {
     return to_integer((to_real(cells + block) - 0.5f) / to_real(block));
 }
 
-/* The first word of what is told for a receiver: sums over bands, 1 at the end; for every band sums over its strips, 1
- * at the end; and for every block its chance over that by weight alone. n: unit normal in the grid's own axes. */
+/* The first word of a receiver's tables: sums over bands, 1 at the end; for every band sums over its strips, 1 at the
+ * end; and for every block its probability over the probability by weight only. n: unit normal in the grid's axes. */
 inline integer grid_receiver(Grid g, mask given, vec3 n)
 {
     integer down = grid_blocks(g.rows, g.block_rows), across = grid_blocks(g.columns, g.block_columns);
@@ -42,7 +42,7 @@ typedef struct {
     real pdf; /* per cell area */
 } GridPoint;
 
-/* The first of n sums that is above u. */
+/* The first of n sums above u. */
 inline integer grid_search(Scene scene, integer first, integer n, real u)
 {
     integer lo = 0, hi = n - 1;
@@ -55,7 +55,7 @@ inline integer grid_search(Scene scene, integer first, integer n, real u)
     return lo;
 }
 
-/* What is left of u in the entry that it chose, in [0, 1). */
+/* u rescaled within its chosen entry, in [0, 1). */
 inline real grid_rest(Scene scene, integer first, integer i, real u)
 {
     real below = gather(scene.distributions, first + max_i(i - 1, (integer)(0)));
@@ -122,7 +122,7 @@ inline real grid_pdf(Scene scene, Grid g, integer receiver, integer row, integer
     return cell_density(g, w, at) * gather(scene.distributions, receiver + down + (down + band) * across + strip);
 }
 
-/* Radiance of a texel of four floats, the first of which begins at `first`. */
+/* Radiance of a texel of four floats; texel 0 begins at `first`. */
 inline Spectrum texel_at(Scene scene, integer first, integer i, Wavelengths lambdas)
 {
     vec4 texel = gather4(scene.texels, first + 4 * i);

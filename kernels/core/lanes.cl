@@ -2,24 +2,24 @@
  *
  * A GPU builds the text with LANES = 1, so that a work-item shades one path; a CPU with LANES = 8 or
  * 16, so that a work-item shades that many paths in SIMD. `real`, `integer` and `mask` are then
- * vectors. A kind's functions are branch-free but for `if (any(mask))`, which at one lane is a plain
+ * vectors. A kind's functions are branch-free except for `if (any(mask))`, which in a single lane is a plain
  * branch. Masks come from comparisons, combine with & and |, and negate with !, never with ~ (a
- * true scalar comparison is 1, a true vector one is -1).
+ * true scalar comparison is 1, a true vector comparison is -1).
  */
-/* Left to themselves, compilers call small functions and return their structs through memory, lane by
- * lane: a third of the time of shading. (Oclgrind cannot run what comes of it.) */
+/* By default compilers call small functions and return their structs through memory, lane by lane: a third of the time
+ * of shading. (Oclgrind cannot run the inlined code.) */
 #ifndef NOT_INLINED
 #define inline __attribute__((always_inline)) inline
 #endif
-/* What is long and stands in several places of a text is `called`, so that a CPU's compiler has it once. */
+/* Long functions with several call sites are `called`, so that a CPU's compiler emits them once. */
 #if LANES > 1 && !defined(NOT_INLINED)
 #define called __attribute__((noinline))
 #else
 #define called inline
 #endif
 
-/* Before loops of a GPU. Its registers cannot be indexed, so what indexes a small array is UNROLLED: else the array
- * lies in memory. What is seldom run and long is ROLLED: instructions are fetched from memory too. */
+/* For loops on GPUs. Registers cannot be indexed, so loops over small arrays are UNROLLED, which keeps the arrays out
+ * of memory. Long loops that run seldom are ROLLED: instructions are fetched from memory too. */
 #if LANES == 1 && !defined(NOT_INLINED)
 #define UNROLLED _Pragma("unroll")
 #define ROLLED _Pragma("unroll 1")
@@ -67,7 +67,7 @@ typedef struct { real x, y; } vec2;
 typedef struct { real x, y, z; } vec3;
 typedef struct { real x, y, z, w; } vec4;
 
-/* A scalar condition as a mask: in a vector it would be 1, which selects nothing. */
+/* A scalar condition as a mask: 1 in a vector would select nothing. */
 #if LANES == 1
 #define mask_of(condition) (condition)
 #else
@@ -78,11 +78,7 @@ typedef struct { real x, y, z, w; } vec4;
 inline real sel(mask m, real a, real b) { return m ? a : b; }
 inline integer sel_i(mask m, integer a, integer b) { return m ? a : b; }
 inline natural sel_n(mask m, natural a, natural b) { return m ? a : b; }
-inline vec3 sel3(mask m, vec3 a, vec3 b)
-{
-    vec3 r = {sel(m, a.x, b.x), sel(m, a.y, b.y), sel(m, a.z, b.z)};
-    return r;
-}
+inline vec3 sel3(mask m, vec3 a, vec3 b) { vec3 r = {sel(m, a.x, b.x), sel(m, a.y, b.y), sel(m, a.z, b.z)}; return r; }
 
 inline real min_r(real a, real b) { return a < b ? a : b; }
 inline real max_r(real a, real b) { return a > b ? a : b; }
@@ -109,18 +105,14 @@ inline real sqrt_r(real x) { return sqrt(max_r(x, (real)(0.0f))); } /* of a roun
 #if LANES == 1
 inline int sum_lanes(integer v) { return v; }
 #else
-/* Compilers see through their own built-in functions where a mask is known, and leave a branch out; convert_char8 may
- * be a function of a library that is linked later. */
+/* Compilers fold their built-in functions for a constant mask, and drop the branch; convert_char8 may be a library
+ * function that is linked later. */
 #ifdef LANE_BITS
 inline int any_lane(mask m) { return LANE_BITS(m) != 0; }
 #elif LANES == 8
 inline int any_lane(mask m) { return as_ulong(__builtin_convertvector(m, char8)) != 0; }
 #else
-inline int any_lane(mask m)
-{
-    ulong2 q = as_ulong2(__builtin_convertvector(m, char16));
-    return (q.x | q.y) != 0;
-}
+inline int any_lane(mask m) { ulong2 q = as_ulong2(__builtin_convertvector(m, char16)); return (q.x | q.y) != 0; }
 #endif
 #undef any
 #define any(m) any_lane(m) /* OpenCL's own any() is slow on some runtimes */

@@ -1,6 +1,6 @@
-/* The luminance of a reflectance under D65, that of white being one, and the wavelengths [nm] at which the reflectance
- * has to be known for that: nodes of the four-point Gauss quadrature whose weight is the CIE 1931 luminosity times
- * D65. Of random colours it is off by 1% in the mean, of the most saturated ones by 17%. */
+/* The luminance of a reflectance under D65, 1 for white, and its wavelengths [nm]: nodes of the four-point Gauss
+ * quadrature with the CIE 1931 luminosity times D65 as weight. Its error is 1% in the mean of random colours,
+ * 17% for the most saturated colours. */
 #if SPECTRUM_SIZE == 3
 inline Spectrum luminance_lambdas(void) { return spectrum_of(0.0f); }
 inline real luminance_of(Spectrum s) { return 0.2126f * s.x + 0.7152f * s.y + 0.0722f * s.z; }

@@ -1,39 +1,28 @@
 /* Constants, vectors and elementary functions on lanes. The library's sin, cos, exp and log undo
- * vectorisation on some CPU runtimes, so polynomials stand here; each states its error. */
+ * vectorisation on some CPU runtimes, so polynomials replace them; each states its error. */
 #define PI 3.14159265358979f
 #define INV_PI 0.318309886183791f
 #define INV_2PI 0.159154943091895f
 #define INV_4PI 0.0795774715459477f
 #define FAR 1e30f
 
-inline vec3 v3(real x, real y, real z)
-{
-    vec3 r = {x, y, z};
-    return r;
-}
-inline vec4 v4(real x, real y, real z, real w)
-{
-    vec4 r = {x, y, z, w};
-    return r;
-}
+inline vec3 v3(real x, real y, real z) { vec3 r = {x, y, z}; return r; }
+inline vec4 v4(real x, real y, real z, real w) { vec4 r = {x, y, z, w}; return r; }
 inline vec3 add3(vec3 a, vec3 b) { return v3(a.x + b.x, a.y + b.y, a.z + b.z); }
 inline vec3 sub3(vec3 a, vec3 b) { return v3(a.x - b.x, a.y - b.y, a.z - b.z); }
 inline vec3 scale3(vec3 a, real s) { return v3(a.x * s, a.y * s, a.z * s); }
 inline vec3 neg3(vec3 a) { return v3(-a.x, -a.y, -a.z); }
 inline vec3 madd3(vec3 a, real s, vec3 b) { return v3(a.x * s + b.x, a.y * s + b.y, a.z * s + b.z); } /* a s + b */
 inline real dot3(vec3 a, vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline vec3 cross3(vec3 a, vec3 b)
-{
-    return v3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
-}
+inline vec3 cross3(vec3 a, vec3 b) { return v3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x); }
 inline vec3 normalize3(vec3 a) { return scale3(a, 1.0f / sqrt(max_r(dot3(a, a), (real)(1e-35f)))); }
 inline real sqr(real x) { return x * x; }
 
-/* The power of two by which |x| comes into [1, 2), for 2^-126 <= |x| < 2^127: products with it are exact. */
+/* The power of two that scales |x| into [1, 2), for 2^-126 <= |x| < 2^127; products with it are exact. */
 inline real scale_to_one(real x) { return as_real(0x7f000000u - (as_natural(x) & 0x7f800000u)); }
 
-/* The length of a vector whose square may leave float32, as that of an area does from sides of 4e9 m on; `sqrt(dot3(v,
- * v))` to the bit where it does not. At least 1e-37. */
+/* The length of a vector whose square may exceed float32, such as an area with sides above 4e9 m; otherwise equal to
+ * `sqrt(dot3(v, v))` to the bit. At least 1e-37. */
 inline real wide_length3(vec3 v)
 {
     real largest = max_r(max_r(max_r(fabs(v.x), fabs(v.y)), fabs(v.z)), (real)(1e-37f));
@@ -135,7 +124,7 @@ inline real erfinv_r(real x)
 }
 
 /* a / b for a from 0 to 2^28, b > 0 and a quotient up to 2^20; an integer division would run lane by lane. The quotient
- * of floats is off by some 2^-22 of itself, more where a device divides worse: by 1 at most, which is put right. */
+ * of floats has a relative error of about 2^-22, more on some devices: at most 1, which is corrected. */
 inline integer divide(integer a, int b)
 {
     integer q = to_integer(to_real(a) * (1.0f / (float)b)), left = a - q * b;

@@ -7,8 +7,8 @@ inline real mis_weight(real pdf_a, real pdf_b)
     return sel(pdf_a > 0.0f, 1.0f / (1.0f + r * r), (real)(0.0f));
 }
 
-/* The same against a third density as well, which is given over the first one. pdf_a below 0: delta, which the second
- * cannot find. */
+/* The weight against a third density too, which is relative to the first. pdf_a below 0: delta, which the second
+ * technique cannot sample. */
 inline real mis_weight_of_three(real pdf_a, real pdf_b, real third)
 {
     real r = sel(pdf_a < 0.0f, (real)(0.0f), pdf_b / max_r(pdf_a, (real)(1e-20f)));

@@ -1,4 +1,4 @@
-/* A unit vector in a word: its place on an octahedron that is unfolded to a square, 16 bits a side (Cigolle et al.
+/* A unit vector in a word: its point on an octahedron unfolded to a square, 16 bits a side (Cigolle et al.
  * 2014, "A Survey of Efficient Representations for Independent Unit Vectors"); off by 5e-5 at most. */
 inline natural octahedral_pack(vec3 v)
 {

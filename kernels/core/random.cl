@@ -20,5 +20,5 @@ inline natural reverse_bits(natural x)
     return ((x & 0x55555555u) << 1u) | ((x & 0xaaaaaaaau) >> 1u);
 }
 
-/* What the random numbers of one sample of a pixel follow from; each sampler uses both in its own way. */
+/* The state of a pixel's sample: random numbers follow from it; samplers use both members differently. */
 typedef struct { natural seed, index; } Sampler;

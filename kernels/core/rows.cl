@@ -1,34 +1,22 @@
-/* Words that follow one another in a table, lane by lane: table[at], table[at + 1] and so on; an idle lane's index must
- * be valid: give 0. `gather2` to `gather4` read the words of a lane at once and transpose them in registers, half of
+/* Consecutive words of a table, lane by lane: table[at], table[at + 1] and so on; an idle lane's index must be valid:
+ * give 0. `gather2` to `gather4` read the words of a lane at once and transpose them in registers, half of
  * the time of reading word by word. gather_w4 is gather4 of a table of words.
  *
- * `row4` is gather_w4 for tables of few rows, of which all lanes mostly read one: its words then come by broadcast.
- * Else processors that gather do so by pairs of words: slower than a transposition, but 10 instructions in the place
- * of 100, of which programs have many. */
+ * `row4` is gather_w4 for tables of few rows: lanes mostly read the same row, whose words are then broadcast.
+ * Otherwise processors with gathers read pairs of words: slower than a transposition, but 10 instructions instead of
+ * 100 at each of many uses. */
 #if LANES == 1
-inline vec2 gather2(global const float *p, integer at)
-{
-    vec2 r = {p[at], p[at + 1]};
-    return r;
-}
-inline vec3 gather3(global const float *p, integer at)
-{
-    vec3 r = {p[at], p[at + 1], p[at + 2]};
-    return r;
-}
-inline vec4 gather4(global const float *p, integer at)
-{
-    vec4 r = {p[at], p[at + 1], p[at + 2], p[at + 3]};
-    return r;
-}
+inline vec2 gather2(global const float *p, integer at) { vec2 r = {p[at], p[at + 1]}; return r; }
+inline vec3 gather3(global const float *p, integer at) { vec3 r = {p[at], p[at + 1], p[at + 2]}; return r; }
+inline vec4 gather4(global const float *p, integer at) { vec4 r = {p[at], p[at + 1], p[at + 2], p[at + 3]}; return r; }
 #else
 typedef float2 Row2 __attribute__((aligned(4)));
 typedef float4 Row4 __attribute__((aligned(4)));
 #define ROW_2(i) (*(global const Row2 *)(p + at.s##i))
 #define ROW_3(i) JOINED_4(*(global const Row2 *)(p + at.s##i), *(global const Row2 *)(p + at.s##i + 1))
 #define ROW_4(i) (*(global const Row4 *)(p + at.s##i))
-/* Of two vectors: one after the other, and every second word of both. By clang's function, of which all compilers for
- * CPUs are made, each is one instruction. `.even` and a vector of vectors are three, vload4 a call. */
+/* Two vectors joined, and every second word of both. With clang's function, which all CPU compilers have, each is a
+ * single instruction. `.even` and a vector of vectors are three, vload4 is a call. */
 #define JOINED_4(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3)
 #define JOINED_8(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7)
 #define JOINED_16(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)

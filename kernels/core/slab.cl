@@ -1,8 +1,8 @@
-/* Slabs: structure-of-arrays state, one stream per word. A work-item serves LANES neighbours, from the slot `at` on. */
+/* Slabs: structure-of-arrays state, a stream per word. A work-item serves LANES neighbours, from the slot `at` on. */
 typedef struct { global float *words; uint step; } Slab;
 #if SLAB_BLOCK
-/* A GPU has streams for each block of so many slots: all words of a slot then lie at fixed distances from the first,
- * and a work-item keeps one address in place of one a word. step: words of a slot. */
+/* On GPUs each block of slots has its streams: all words of a slot lie at fixed distances from the first, and a
+ * work-item keeps a single address. step: words of a slot. */
 #define SLAB_STEP(words_of_slot, stride) words_of_slot
 #define slab_at(s, c, at) \
     ((s).words + ((size_t)((at) / SLAB_BLOCK * SLAB_BLOCK) * (s).step + (at) % SLAB_BLOCK) + (c) * SLAB_BLOCK)
@@ -77,7 +77,7 @@ inline void slab_write_fixed(Slab s, uint c, uint at, mask m, Fixed v)
     slab_write_vec3(s, c, at, m, v3(as_real(v.low), as_real(v.middle), as_real(v.high)));
 }
 
-/* Where words of any slots are, from that of slot 0 on. */
+/* Offsets of any slots' words from slot 0's word. */
 inline integer slab_places(Slab s, integer slots)
 {
 #if SLAB_BLOCK
@@ -88,7 +88,7 @@ inline integer slab_places(Slab s, integer slots)
 #endif
 }
 
-/* Copies word c of any slots to neighbours from `at` on, and back where m. */
+/* Copy word c of any slots to neighbours from `at` on, and back where m. */
 inline void slab_gather(Slab s, uint c, integer slots, uint at)
 {
     block_store(slab_at(s, c, at), gather(slab_at(s, c, 0u), slab_places(s, slots)));

@@ -11,8 +11,8 @@ inline natural scramble_reversed(natural x, natural seed)
     return x ^ (x * 0x53a22864u);
 }
 
-/* Words of 16 digits of base 4, bit-reversed: of a digit the lower bit is the more significant one. As elements of
- * GF(4), `t` of these times w and its square, where w^2 = w + 1; and both bits of each digit swapped. */
+/* Words of 16 digits of base 4, bit-reversed: a digit's lower bit is more significant. With digits as elements of
+ * GF(4): `t` times w, times w^2 = w + 1; and both bits of each digit swapped. */
 #define DIGITS_TIMES_W(t) ((((t) ^ ((t) >> 1u)) & 0x55555555u) | (((t) & 0x55555555u) << 1u))
 #define DIGITS_TIMES_W2(t) ((((t) >> 1u) & 0x55555555u) | ((((t) ^ ((t) >> 1u)) & 0x55555555u) << 1u))
 #define DIGITS_SWAPPED(t) ((((t) >> 1u) & 0x55555555u) | (((t) & 0x55555555u) << 1u))

@@ -1,10 +1,6 @@
-/* Arithmetic of spectra, for either mode, component by component. FOURTH(value) is the last one of a list, in spectral
- * mode alone; SPECTRUM_EACH(F) expands F(x) F(y) F(z) and, in that mode, F(w). */
-inline Spectrum spectrum_of(real v)
-{
-    Spectrum r = {v, v, v FOURTH(v)};
-    return r;
-}
+/* Arithmetic of spectra in both modes, component by component. FOURTH(value) is the last element of a list, in spectral
+ * mode only; SPECTRUM_EACH(F) expands F(x) F(y) F(z) and, in that mode, F(w). */
+inline Spectrum spectrum_of(real v) { Spectrum r = {v, v, v FOURTH(v)}; return r; }
 inline Spectrum spectrum_add(Spectrum a, Spectrum b)
 {
     Spectrum r = {a.x + b.x, a.y + b.y, a.z + b.z FOURTH(a.w + b.w)};
@@ -55,8 +51,8 @@ inline Spectrum spectrum_clamped(Spectrum a) /* to [0, 1] */
 }
 inline real spectrum_max(Spectrum a) { return SPECTRUM_MAX(a); }
 inline real spectrum_mean(Spectrum a) { return SPECTRUM_MEAN(a); }
-/* Whether the components differ: a dispersive index. By their bits, which compilers know to be the same where all are
- * one number; of numbers they do not, as NaN is not itself. */
+/* Whether the components differ: a dispersive index. Compares bits, which compilers fold for equal
+ * components; numbers they do not fold, since NaN differs from itself. */
 inline mask spectrum_varies(Spectrum a)
 {
     integer x = as_integer(a.x);

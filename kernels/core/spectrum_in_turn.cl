@@ -1,4 +1,4 @@
-/* What core/spectrum_at_once.cl has, a component after the other: all at once need too many of a GPU's registers. */
+/* The macros of core/spectrum_at_once.cl, component by component: all at once need too many of a GPU's registers. */
 inline real spectrum_part(Spectrum s, int number)
 {
     int n = 0;

@@ -1,5 +1,4 @@
-/* What core/texels_between.cl has, a texel after the other: the spectra of four at once need too many of a GPU's
- * registers. */
+/* The function of core/texels_between.cl, texel by texel: four spectra at once need too many of a GPU's registers. */
 inline Spectrum texels_between(Scene scene, integer first, integer i00, integer i10, integer i01, integer i11, vec2 at,
                                Wavelengths lambdas)
 {

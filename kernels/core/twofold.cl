@@ -1,5 +1,5 @@
-/* Numbers as a float and what it lacks, 2^-45 of the number: for differences of large numbers, such as that from an eye
- * to a ball of a planet's size, which one float would lose. Sums: Knuth 1969 (4.2.2, theorem B); products by `fma`; dot
+/* Numbers as a float and its rounding error, exact to 2^-45: for differences of large numbers, such as from an eye to a
+ * ball of a planet's size, which a single float would lose. Sums: Knuth 1969 (4.2.2, theorem B); products by `fma`; dot
  * products: Ogita, Rump and Oishi 2005 (Accurate Sum and Dot Product, algorithm 5.3). */
 typedef struct { real high, low; } Twofold;
 typedef struct { vec3 high, low; } Twofold3;
@@ -25,11 +25,7 @@ inline Twofold twofold_add(Twofold a, Twofold b)
     return r;
 }
 
-inline Twofold twofold_neg(Twofold a)
-{
-    Twofold r = {-a.high, -a.low};
-    return r;
-}
+inline Twofold twofold_neg(Twofold a) { Twofold r = {-a.high, -a.low}; return r; }
 
 inline Twofold twofold_sqr(Twofold a)
 {

@@ -13,4 +13,7 @@ inline real path_covers(Scene scene, Slab path, uint at, PathEnd end, Wavelength
 }
 
 /* Twin, where the film has no alpha. */
-#define path_covers(scene, path, at, end, lambdas, start) ((real)(1.0f))
+inline real path_covers(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas, Spectrum start)
+{
+    return (real)(1.0f);
+}

@@ -1,5 +1,5 @@
 /* Pixel filters by importance sampling: a sample serves its own pixel, at an offset drawn from |f|.
- * Filters are separable and even, so one half of one dimension is tabulated (clpt/render/film/encode_filters.py)
+ * Filters are separable and even, so one half of one dimension is tabulated (clpt/render/film/filters.py)
  * at the beginning of `distributions`: the number of cells n, n + 1 distances that bound cells of
  * equal probability, and the weight of each cell, which is negative where f is. */
 inline void filter_sample_axis(Scene scene, real u, real *offset, real *weight)

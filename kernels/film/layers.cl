@@ -44,7 +44,7 @@ inline void layers_add(Scene scene, global uint *layers, mask m, integer pixel_i
 }
 
 /* Counts the `unseen` paths, which have met nothing; others are counted where they meet the first surface. */
-inline void layers_count(Scene scene, Slab path, uint at, global uint *layers, mask unseen)
+inline void layers_count(Scene scene, Slab path, uint at, mask unseen LAYER_ARGS)
 {
     const integer one = 1;
     mask m = layers_want(path, at, unseen);
@@ -114,4 +114,4 @@ inline void mattes_add(Scene scene, global uint *mattes, mask m, integer pixel_i
 }
 
 /* Twin, where there are none beside the picture. */
-#define layers_count(scene, path, at, layers, unseen)
+inline void layers_count(Scene scene, Slab path, uint at, mask unseen LAYER_ARGS) {}

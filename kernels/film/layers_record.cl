@@ -23,10 +23,7 @@ inline real layer_z(Scene scene, vec3 p)
 }
 
 /* The shading normal; points of media have none. */
-inline vec3 layer_normal(Scattering scatter)
-{
-    return BSDF_IS_PHASE ? v3(0.0f, 0.0f, 0.0f) : scatter.shading.frame.n;
-}
+inline vec3 layer_normal(Scattering scatter) { return BSDF_IS_PHASE ? v3(0.0f, 0.0f, 0.0f) : scatter.shading.frame.n; }
 
 /* Puts three numbers of any size. */
 inline void layer_put_long3(integer *words, mask m, vec3 v, real weight)
@@ -66,20 +63,20 @@ inline void layers_put_first(Scene scene, Slab path, uint at, integer *words, ma
 }
 
 /* Adds what the `first` paths see first. */
-inline void layers_see(Scene scene, Slab path, uint at, LAYER_ARGS, mask first, Vertex v, Scattering scatter)
+inline void layers_see(Scene scene, Slab path, uint at, mask first, Vertex v, Scattering scatter LAYER_ARGS)
 {
     first = layers_want(path, at, first);
     integer words[LAYER_MOST_WORDS], pixel_index = load_path_pixel_index(path, at);
     int before = scene.settings->layer_denoising; /* theirs come last */
     layers_put_first(scene, path, at, words, first, v, scatter, layer_weight(path, at));
     layers_add(scene, layers, first, pixel_index, words, before ? before : scene.settings->layer_words);
-    mattes_record(scene, mattes, first, pixel_index, v);
+    mattes_record(scene, first, pixel_index, v LAYER_PASSED);
 }
 
 /* Adds what the `met` paths see here, but what they see first where other paths scout for that. Returns the paths'
  * state, which says whether denoisers have got theirs. */
-inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask met, Vertex v, Scattering scatter,
-                             integer state)
+inline integer layers_record(Scene scene, Slab path, uint at, mask met, Vertex v, Scattering scatter,
+                             integer state LAYER_ARGS)
 {
     global const Settings *settings = scene.settings;
     mask wanted = layers_want(path, at, met), first = wanted & (v.depth == 0), adds = first;
@@ -88,7 +85,7 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
         state |= sel_i(met, (integer)(PATH_SEEN), (integer)(0));
     }
     if (!any(adds)) return state;
-    if (!LAYERS_SCOUT && any(first)) layers_see(scene, path, at, LAYER_PASSED, first, v, scatter);
+    if (!LAYERS_SCOUT && any(first)) layers_see(scene, path, at, first, v, scatter LAYER_PASSED);
     if (!DENOISERS_SEE) return state;
     integer words[LAYER_MOST_WORDS];
     int before = settings->layer_denoising, albedo = settings->layer_denoising_albedo - before;
@@ -101,4 +98,5 @@ inline integer layers_record(Scene scene, Slab path, uint at, LAYER_ARGS, mask m
 }
 
 /* Twin, where there are none beside the picture. */
-#define layers_record(scene, path, at, layers, met, v, scatter, state) (state)
+inline integer layers_record(Scene scene, Slab path, uint at, mask met, Vertex v, Scattering scatter,
+                             integer state LAYER_ARGS) { return state; }

@@ -2,14 +2,20 @@
  * as those of the film, LIGHT_LAYERS pictures of nine streams of words (core/fixed.cl). Each part of a path's light is
  * added when it is found. The sums of all groups, and direct with indirect light, are the picture. Where paths start at
  * lights too, as many pictures follow of what these bring, which are divided by the number of light paths. */
+#include "generated/light_layer_args.cl"
+
+/* Step. */
 #include "film/sums.cl"
 #include "generated/seen_wavelengths.cl"
 #define LIGHT_PICTURE_WORDS 9
-#if LIGHT_LAYER_GROUPS /* the light that next-event estimation has chosen */
-#define light_layers_chosen(path, at, m, row) store_path_light(path, at, m, row)
-#else
-#define light_layers_chosen(path, at, m, row)
+
+/* Keeps the light that next-event estimation has chosen. */
+inline void light_layers_chosen(Slab path, uint at, mask m, integer row)
+{
+#if LIGHT_LAYER_GROUPS
+    store_path_light(path, at, m, row);
 #endif
+}
 
 inline void light_layer_sum(Scene scene, mask m, integer pixel_index, integer picture, vec3 value,
                             global uint *light_layers)
@@ -49,8 +55,8 @@ inline void light_layers_sum(Scene scene, mask m, integer pixel_index, integer s
 }
 
 /* Adds light that arrives at the camera from the light in row `row` of `lights`, after as many surfaces. */
-inline void light_layers_add(Scene scene, Slab path, uint at, mask m, integer surfaces, integer row, Spectrum light,
-                             global uint *light_layers)
+inline void light_layers_add(Scene scene, Slab path, uint at, mask m, integer surfaces, integer row,
+                             Spectrum light LIGHT_LAYER_ARGS)
 {
     Wavelengths lambdas = seen_wavelengths(scene, path, at, load_path_lambdas(path, at));
     vec3 v = scale3(film_value(scene, light, lambdas), load_path_weight(path, at) * scene.settings->film_scale);
@@ -58,5 +64,6 @@ inline void light_layers_add(Scene scene, Slab path, uint at, mask m, integer su
 }
 
 /* Twin, where there are none. */
-#define light_layers_add(scene, path, at, m, surfaces, row, light, light_layers)
-#define light_layers_chosen(path, at, m, row)
+inline void light_layers_add(Scene scene, Slab path, uint at, mask m, integer surfaces, integer row,
+                             Spectrum light LIGHT_LAYER_ARGS) {}
+inline void light_layers_chosen(Slab path, uint at, mask m, integer row) {}

@@ -1,5 +1,5 @@
 /* Adds the names of the objects and materials that the camera sees to mattes; points of media have none. */
-inline void mattes_record(Scene scene, global uint *mattes, mask first, integer pixel_index, Vertex v)
+inline void mattes_record(Scene scene, mask first, integer pixel_index, Vertex v LAYER_ARGS)
 {
     if (BSDF_IS_PHASE) return;
     int object = scene.settings->matte_object, material = scene.settings->matte_material;
@@ -8,4 +8,4 @@ inline void mattes_record(Scene scene, global uint *mattes, mask first, integer 
 }
 
 /* Twin, where there are none. */
-#define mattes_record(scene, mattes, first, pixel_index, v)
+inline void mattes_record(Scene scene, mask first, integer pixel_index, Vertex v LAYER_ARGS) {}

@@ -2,7 +2,7 @@
 #include "generated/scouts.cl"
 
 /* Takes those of the `active` paths a surface further that scout; returns the others. */
-inline mask scout_vertex(Scene scene, Slab path, uint at, LAYER_ARGS, mask active, Vertex v)
+inline mask scout_vertex(Scene scene, Slab path, uint at, mask active, Vertex v LAYER_ARGS)
 {
     mask scouts = active & path_scouts(v.state);
     if (!any(scouts)) return active;
@@ -16,11 +16,11 @@ inline mask scout_vertex(Scene scene, Slab path, uint at, LAYER_ARGS, mask activ
         vertex_end(path, at, met, next, mask_of(1), v.state);
     } else if (any(met)) {
         Sampler sampler = pixel_sampler(scene.settings, load_path_pixel_key(path, at), load_path_sample(path, at));
-        layers_see(scene, path, at, LAYER_PASSED, met, v, vertex_scattering(scene, path, at, met, v, sampler));
+        layers_see(scene, path, at, met, v, vertex_scattering(scene, path, at, met, v, sampler) LAYER_PASSED);
         store_path_state(path, at, met, v.state + 1 - PATH_ALIVE);
     }
     return active & !scouts;
 }
 
 /* Twin, where no path scouts, or none meets the material. */
-#define scout_vertex(scene, path, at, layers, active, v) (active)
+inline mask scout_vertex(Scene scene, Slab path, uint at, mask active, Vertex v LAYER_ARGS) { return active; }

@@ -11,4 +11,4 @@ inline real scout_choice(Scene scene, natural key, integer state, natural dimens
 }
 
 /* Twin, where no path scouts. */
-#define scout_choice(scene, key, state, dimension, u) (u)
+inline real scout_choice(Scene scene, natural key, integer state, natural dimension, real u) { return u; }

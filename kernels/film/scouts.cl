@@ -2,8 +2,10 @@
  * samples, to the first surface, for layers alone (film/scout.cl). */
 #define LAYERS_SCOUT 1
 #define PATH_SCOUTS 0x40000000
-#define path_scouts(state) (((state) & PATH_SCOUTS) != 0)
+
+inline mask path_scouts(integer state) { return (state & PATH_SCOUTS) != 0; }
 
 /* Twin, where no path scouts. */
 #define LAYERS_SCOUT 0
-#define path_scouts(state) mask_of(0)
+
+inline mask path_scouts(integer state) { return mask_of(0); }

@@ -8,9 +8,11 @@ inline integer scouts_begin(mask ended, integer sample)
 {
     return sel_i(!ended & (sample < LAYER_SAMPLES), (integer)(PATH_SCOUTS), (integer)(0));
 }
-#define LAYERS_END(end, scouted) (scouted)
+
+/* Which paths have ended that add to layers. */
+inline mask layers_end(PathEnd end, mask scouted) { return scouted; }
 
 /* Twin, where no path scouts. */
-#define scouts_ended(end) mask_of(0)
-#define scouts_begin(ended, sample) 0
-#define LAYERS_END(end, scouted) ((end).ended & (end).begun)
+inline mask scouts_ended(PathEnd end) { return mask_of(0); }
+inline integer scouts_begin(mask ended, integer sample) { return (integer)(0); }
+inline mask layers_end(PathEnd end, mask scouted) { return end.ended & end.begun; }

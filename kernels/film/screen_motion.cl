@@ -61,7 +61,7 @@ inline void screen_motion_put(integer *words, mask m, ScreenMotion s, real weigh
 }
 
 /* Adds the motion of the sky, which the `unseen` paths have come to. */
-inline void layers_of_sky(Scene scene, Slab path, uint at, global uint *layers, mask unseen)
+inline void layers_of_sky(Scene scene, Slab path, uint at, mask unseen LAYER_ARGS)
 {
     mask m = layers_want(path, at, unseen);
     if (!any(m)) return;
@@ -74,4 +74,4 @@ inline void layers_of_sky(Scene scene, Slab path, uint at, global uint *layers, 
 }
 
 /* Twin, where no layer tells how what is seen moves. */
-#define layers_of_sky(scene, path, at, layers, unseen)
+inline void layers_of_sky(Scene scene, Slab path, uint at, mask unseen LAYER_ARGS) {}

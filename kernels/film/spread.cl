@@ -1,6 +1,6 @@
 /* Splatting: light at a point of the film serves every pixel whose filter holds the point, each by the filter's value f
  * there. Filters are separable and even: from FILTER_PROFILE on `distributions` has the radius, a number of steps n,
- * and n + 1 values of f from 0 to the radius (clpt/render/film/encode_filters.py). FILTER_TAPS: how many pixels of
+ * and n + 1 values of f from 0 to the radius (clpt/render/film/filters.py). FILTER_TAPS: how many pixels of
  * an axis hold a point at most; FILTER_REACH: how far they are from its own. */
 #include "film/light.cl"
 #define SPREAD_PIXELS (FILTER_TAPS * FILTER_TAPS)

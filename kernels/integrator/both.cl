@@ -5,5 +5,5 @@ inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uin
 {
     Vertex v = vertex_load(scene, path, hit, at, active);
     if (which == 0) light_path_vertex(scene, path, shadow, at, active, v);
-    else path_vertex(scene, path, shadow, at, scout_vertex(scene, path, at, LAYER_PASSED, active, v), v SHADE_PASSED);
+    else path_vertex(scene, path, shadow, at, scout_vertex(scene, path, at, active, v LAYER_PASSED), v SHADE_PASSED);
 }

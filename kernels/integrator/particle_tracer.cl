@@ -6,13 +6,13 @@
  * lacks, where light is refracted, eta^2, and where normals are smoothed, the quotient
  * |wo . ns| |wi . n| / (|wo . n| |wi . ns|), wo being the side where the light came from.
  *
- * As the light paths of `path` they are weighed against those from the camera (transport/rivals.cl). */
+ * As the light paths of `path` they are weighed against those from the camera (transport/mis_ratio.cl). */
 #include "cameras/camera.cl"
 #include "generated/camera.cl"
 #include "film/connect.cl"
 #include "generated/connect.cl"
 #include "transport/light_path.cl"
-#include "generated/rivals.cl"
+#include "generated/mis_ratio.cl"
 #include "generated/light_path_steps.cl"
 
 inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v)
@@ -22,12 +22,15 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     Sampler sampler = light_path_sampler(scene.settings, pixel_index, load_path_sample(path, at));
     Scattering scatter = vertex_scattering(scene, path, at, active, v, sampler);
     real arrives = 1.0f / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-6f));
-    Rival rival = rival_of_emission(scene, path, at, v, vertex_receiver(scene, v, scatter, neg3(v.d)));
-    if (BSDF_IS_PHASE) rival = rival_chosen(scene, path, at, v, rival, vertex_receiver(scene, v, scatter, neg3(v.d)));
+    MisRatio mis_ratio = mis_ratio_of_light_path(scene, path, at, v, vertex_receiver(scene, v, scatter, neg3(v.d)));
+    if (BSDF_IS_PHASE) {
+        Receiver receiver = vertex_receiver(scene, v, scatter, neg3(v.d));
+        mis_ratio = mis_ratio_chosen(scene, path, at, v, mis_ratio, receiver);
+    }
 
     CameraJoint joint = join_camera_seek(scene, v, scatter);
-    bsdf_ask(scene, scatter, join_camera_to(joint, scatter), 1);
-    v.state += join_camera(scene, shadow, at, active, v, scatter, rival, joint, arrives);
+    bsdf_ask(scene, scatter, joint.to, 1);
+    v.state += join_camera(scene, shadow, at, active, v, scatter, mis_ratio, joint, arrives);
 
     vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);
     BsdfSample bs = hero_sample(scatter.bsdf, scatter.wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
@@ -38,9 +41,12 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     beta = spectrum_scale(beta, shading_frame_share(scatter.shading, neg3(v.d)));
     next = light_path_roulette(scene, path, at, next, null, v, scatter, &beta);
 
-    if (!BSDF_IS_PHASE) rival = rival_chosen(scene, path, at, v, rival, vertex_receiver(scene, v, scatter, onward));
-    next = dull_goes_on(next, null, scatter, bs, &rival, &beta);
-    next = rival_goes_to_camera(scene, path, at, next, null, rival, &v, onward, bs);
+    if (!BSDF_IS_PHASE) {
+        Receiver receiver = vertex_receiver(scene, v, scatter, onward);
+        mis_ratio = mis_ratio_chosen(scene, path, at, v, mis_ratio, receiver);
+    }
+    next = dull_goes_on(next, null, scatter, bs, &mis_ratio, &beta);
+    next = keep_mis_ratio_to_camera(scene, path, at, next, null, mis_ratio, &v, onward, bs);
     if (BSDF_IS_PANE) path_scattered(path, at, next & !null);
     vertex_leave(path, at, next, null, v, onward, beta);
     store_path_ratio(path, at, next, ratio);

@@ -1,12 +1,12 @@
 /* One vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on.
  * Light is found both by meeting it and by choosing it; the two are weighted by the power heuristic (Veach 1997,
- * 9.2.4), and against paths from lights where there are some (transport/rivals.cl). Steps that a scene or a material
+ * 9.2.4), and against paths from lights where there are some (transport/mis_ratio.cl). Steps that a scene or a material
  * does not have do nothing. */
 #include "lights/met_light.cl"
 #include "generated/ghosts.cl"
 #include "generated/light_layers.cl"
 #include "generated/layers.cl"
-#include "generated/rivals.cl"
+#include "generated/mis_ratio.cl"
 #include "generated/guide.cl"
 #include "generated/path_steps.cl"
 #include "generated/scout.cl"
@@ -20,29 +20,29 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     Sampler sampler = pixel_sampler(scene.settings, load_path_pixel_key(path, at), load_path_sample(path, at));
     Scattering scatter = vertex_scattering(scene, path, at, met, v, sampler);
     if (VERTEX_COUNTS)
-        v.state = layers_record(scene, path, at, LAYER_PASSED, met, v, scatter, v.state);
+        v.state = layers_record(scene, path, at, met, v, scatter, v.state LAYER_PASSED);
 #if BSDF_ABSORBS /* as the surfaces of lights mostly do */
     next = next & (spectrum_max(bsdf_albedo(scatter.bsdf)) > 0.0f);
 #endif
-    Rival rival = rival_of_camera(scene, path, at, v, sampler);
-    merge_at_vertex(scene, path, at, met, v, scatter, rival, ratio SHADE_PASSED);
-    Guided guided = guide_at(scene, guide, v.s, v.d);
+    MisRatio mis_ratio = mis_ratio_of_camera_path(scene, path, at, v, sampler);
+    merge_at_vertex(scene, path, at, met, v, scatter, mis_ratio, ratio SHADE_PASSED);
+    Guided guided = guide_at(scene, v.s, v.d MERGE_PASSED);
 
     NextEvent event = next_event_seek(scene, next, v, scatter);
-    bsdf_ask(scene, scatter, next_event_wi(event, scatter), 0);
-    event = next_event_weigh(scene, event, v, scatter, rival, guided, ratio SHADE_PASSED);
+    bsdf_ask(scene, scatter, event.wi, 0);
+    event = next_event_weigh(scene, event, v, scatter, mis_ratio, guided, ratio SHADE_PASSED);
     if (LANES == 1) { /* for what is kept meanwhile a GPU has too few registers */
         v.state += next_event_keep(scene, path, shadow, at, active, v, event);
         scatter.wo = to_frame(scatter.shading.frame, neg3(load_path_d(path, at)));
     }
-    BsdfSample bs = onward_sample(scatter, guide, guided, &ratio);
+    BsdfSample bs = onward_sample(scatter, guided, &ratio MERGE_PASSED);
     if (LANES > 1) v.state += next_event_keep(scene, path, shadow, at, active, v, event);
 
     mask null = vertex_is_null(bs.lobe);
     next = next & (bs.pdf > 0.0f);
     if (BSDF_IS_PANE) { /* of which the lobe tells */
         next = next & vertex_continues(scene, v, null);
-        v.state = layers_record(scene, path, at, LAYER_PASSED, met & !null, v, scatter, v.state);
+        v.state = layers_record(scene, path, at, met & !null, v, scatter, v.state LAYER_PASSED);
     }
     vec3 onward = normalize3(to_world(scatter.shading.frame, bs.wi));
     beta = spectrum_scale(spectrum_mul(beta, bs.weight), shading_frame_share(scatter.shading, onward));
@@ -51,7 +51,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 
     vertex_leave(path, at, on, null, v, onward, beta);
     store_path_cone(path, at, on, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
-    path_scatters(scene, path, at, on, null, &v, scatter, rival, bs, onward);
+    path_scatters(scene, path, at, on, null, &v, scatter, mis_ratio, bs, onward);
     store_path_eta(path, at, on, eta);
     vertex_end(path, at, met, on, null, v.state + path_escapes(scene, path, shadow, at, next, v, scatter, bs, onward));
     store_path_ratio(path, at, on, ratio);
@@ -61,6 +61,6 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active SHADE_ARGS)
 {
     Vertex v = vertex_load(scene, path, hit, at, active);
-    path_vertex(scene, path, shadow, at, scout_vertex(scene, path, at, LAYER_PASSED, active, v), v SHADE_PASSED);
+    path_vertex(scene, path, shadow, at, scout_vertex(scene, path, at, active, v LAYER_PASSED), v SHADE_PASSED);
 }
 #endif

@@ -1,12 +1,19 @@
-/* Light from a shape: LightRow.emission_mode is 0 where it leaves the front, evenly in all directions, 1 where it
- * leaves along the normal only (particle_tracer's), 2 where it leaves both sides. */
+/* LightRow.emission_mode: 0 from the front evenly, 1 along the normal only (particle_tracer), 2 from both sides; plus 4
+ * where no ray sees it. */
 inline ShapeSample area_turned(ShapeSample q, mask both)
 {
     q.n = sel3(both & (dot3(q.n, q.wi) > 0.0f), neg3(q.n), q.n);
     return q;
 }
 
-/* The sample ends a rounding off the surface, so that the surface does not shade it. p: the point [m]. */
+/* A sample of a light that no ray sees counts in full, as of a delta light: its density is negated. */
+inline LightSample area_unseen(LightSample s, mask unseen)
+{
+    s.pdf = sel(unseen, -s.pdf, s.pdf);
+    return s;
+}
+
+/* The sample ends a rounding off the surface, else the surface would shade it. p: the point [m]. */
 inline LightSample area_sample(ShapeSample q, vec3 p, Spectrum radiance)
 {
     real cosine = -dot3(q.n, q.wi);

@@ -11,11 +11,12 @@ inline integer light_joined(Scene scene, Slab shadow, uint at, mask ended, mask 
     mask shine = seen & mask_of(settings->hide_lights == 0);
     integer lit = sel_i(go, r.row, (integer)(0)), medium = sel_i(go, light_medium(scene, lit), (integer)(0));
     /* A ray from infinity is traced from the camera. */
-    store_shadow_through(shadow, at, shine, sel_i(r.away, camera_through(settings), light_through(scene, lit)));
+    store_shadow_through(shadow, at, shine, sel_i(r.away, camera_through(scene), light_through(scene, lit)));
     r.seen = medium_dims(scene, medium, c.t, lambdas, r.seen);
     connect_camera(shadow, at, ended, shine, s, c, spectrum_scale(r.seen, cosine * c.importance));
     return sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 }
 
 /* Twin, where light paths do not show lights to the camera. */
-#define light_joined(scene, shadow, at, ended, go, sampler, s, r, lambdas) ((integer)(0))
+inline integer light_joined(Scene scene, Slab shadow, uint at, mask ended, mask go, Sampler sampler, Surface s,
+                            LightRay r, Wavelengths lambdas) { return (integer)(0); }

@@ -1,4 +1,4 @@
-/* Choosing one row of `lights`, by the alias method (Walker 1977). */
+/* Choice of a row of `lights` by the alias method (Walker 1977). */
 inline LightRow light_at(Scene scene, integer row)
 {
     return light_row_row(scene.lights, row * LIGHT_ROW_WORDS);
@@ -18,8 +18,7 @@ inline real light_bits(natural choice, real other, real grain)
     return unit_interval(hash_natural(choice ^ hash_natural(as_natural(other)))) * grain;
 }
 
-/* A row of `lights`: *u chooses a row, and by its fraction either that row or its alias; what is left of it is uniform
- * in [0, 1) again. other: see light_bits. */
+/* A row of `lights`; *u: chooses a row, or its alias by the fraction; then uniform again. other: see light_bits. */
 inline integer light_pick(Scene scene, real *u, real other)
 {
     int count = scene.settings->light_count;
@@ -38,7 +37,7 @@ inline integer light_pick(Scene scene, real *u, real other)
     return sel_i(stay, row, l.alias);
 }
 
-/* With the probability of the row in it, 0 for none; a delta light keeps its mark and carries it as a factor. */
+/* A sample with the chance of its row in the pdf; a delta light has it as a factor of its radiance. */
 inline LightSample light_chosen(LightSample s, real pmf)
 {
     mask delta = s.pdf < 0.0f;

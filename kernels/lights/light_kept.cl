@@ -1,4 +1,4 @@
-/* The light of a path that is weighed, for its first vertex, see transport/rivals.cl. */
+/* The light of a path that is weighed, for its first vertex, see transport/mis_ratio.cl. */
 inline void light_kept(Slab path, uint at, mask go, LightRay r)
 {
     store_path_light(path, at, go, r.row);
@@ -6,4 +6,4 @@ inline void light_kept(Slab path, uint at, mask go, LightRay r)
 }
 
 /* Twin, where light paths are not weighed. */
-#define light_kept(path, at, go, r)
+inline void light_kept(Slab path, uint at, mask go, LightRay r) {}

@@ -39,7 +39,7 @@ inline real light_tree_importance(LightNode n, vec3 p, Receiver receiver, real l
     mask faces = !flat | (along > LIGHT_TREE_DARK);
     mask narrow = n.cos_e > -1.0f;
     if (any(narrow)) faces = faces & (!narrow | light_tree_in_cone(n, from));
-    real straight = lift - dot3(receiver_hemisphere(receiver), w), highest = straight + sine;
+    real straight = lift - dot3(receiver.hemisphere, w), highest = straight + sine;
     real cosine = max_r(max_r(straight, LIGHT_TREE_RISING * highest), (real)(LIGHT_TREE_SLACK));
     real reflected = receiver_reflects(receiver, neg3(w), sine, min_r(cosine, (real)(1.0f)));
     real importance = n.power * shines * reflected * sqr(inverse);
@@ -54,7 +54,7 @@ inline real light_tree_group(Scene scene, integer group, vec3 p, Receiver receiv
     int words = scene.settings->light_count * (LIGHT_ROW_WORDS + 1);
     global const uint *nodes = scene.lights + (words + LIGHT_TREE_LINE - 1) / LIGHT_TREE_LINE * LIGHT_TREE_LINE;
     integer at = group * (LIGHT_TREE_WIDTH * LIGHT_NODE_WORDS);
-    real lift = sel(hemisphere_given(receiver_hemisphere(receiver)), (real)(0.0f), (real)(1.0f)), sum = 0.0f;
+    real lift = sel(hemisphere_given(receiver.hemisphere), (real)(0.0f), (real)(1.0f)), sum = 0.0f;
     mask placed = mask_of(0), everywhere = mask_of(0); /* of the root's group: the first node and the middle one */
     for (int i = 0; i < LIGHT_TREE_WIDTH; i++) {
         LightNode n = light_node_row(nodes + i * LIGHT_NODE_WORDS, at);

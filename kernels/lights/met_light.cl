@@ -1,7 +1,7 @@
-/* What a path from the camera tells of a light that it meets. */
+/* The mis_ratio of a camera's path that meets a light. */
 
 #include "generated/kept_hemisphere.cl"
 
-/* What light paths do, over the path's own density (transport/rivals.cl): nothing where the camera or its first surface
- * sees the light, which is left to paths from the camera. */
-#define path_rival(path, at, depth) sel((depth) > 1, load_path_rival(path, at), (real)(0.0f))
+/* 0 where the camera or its first surface sees the light: light paths are not connected there
+ * (transport/mis_ratio.cl). */
+#define path_mis_ratio(path, at, depth) sel((depth) > 1, load_path_mis_ratio(path, at), (real)(0.0f))

@@ -1,8 +1,5 @@
-/* Rays to lights. */
-
-/* Puts a shadow ray into its slab, for the lanes that `shine`; the other active ones have none. It goes from off the
- * surface to the point of the light sample: along ls.wi it would end beside it. On a GPU all active ones store: what
- * hangs on a condition is computed behind it, and registers keep what that needs. */
+/* Stores a shadow ray for the lanes that `shine`, and none for other active lanes. It runs from off the surface to the
+ * light's point: along ls.wi it would miss that. On a GPU all active lanes store: a condition would cost registers. */
 inline void shadow_toward(Slab shadow, uint at, mask active, mask shine, Surface s, LightSample ls, Spectrum value)
 {
     vec3 from = surface_offset(s, ls.wi), to = sub3(madd3(ls.wi, ls.t, s.p), from);

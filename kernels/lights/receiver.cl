@@ -1,7 +1,7 @@
 /* What a surface does with light that comes to it, as far as the tree over lights asks for that.
  *
  * Its gloss is that of GGX microfacets of one roughness and one share in what is reflected, a guess of the host:
- * clpt/render/materials/gloss.py. Lights below a node of the tree count by that lobe, wider by the size of the
+ * clpt/render/materials/encode.py. Lights below a node of the tree count by that lobe, wider by the size of the
  * node. Liu et al. 2019, "Adaptive BRDF-Oriented Multiple Importance Sampling of Many Lights", and Tokuyoshi et al.
  * 2024, "Hierarchical Light Sampling with Accurate Spherical Gaussian Lighting", do so with other lobes. By the half
  * vector it has its shape where light grazes, too, and costs one division. */
@@ -17,8 +17,6 @@ typedef struct {
     real width, share;     /* alpha^2; 0: no gloss */
     real height;           /* share G1(wo) / (4 |cos|) */
 } Receiver;
-
-#define receiver_hemisphere(r) ((r).hemisphere)
 
 inline Receiver receiver_of(vec3 hemisphere, natural toward, natural gloss)
 {
@@ -58,7 +56,11 @@ inline real receiver_reflects(Receiver r, vec3 wi, real sine, real cosine)
 }
 
 /* Twin, where only its `hemisphere` matters. */
-#define Receiver vec3
-#define receiver_hemisphere(r) (r)
-#define receiver_at(scene, row, hemisphere, away) (hemisphere)
-#define receiver_reflects(r, wi, sine, cosine) (cosine)
+typedef struct { vec3 hemisphere; } Receiver;
+
+inline Receiver receiver_at(Scene scene, integer row, vec3 hemisphere, vec3 away)
+{
+    Receiver r = {hemisphere};
+    return r;
+}
+inline real receiver_reflects(Receiver r, vec3 wi, real sine, real cosine) { return cosine; }

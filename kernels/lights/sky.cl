@@ -7,7 +7,7 @@ typedef struct {
     mask seen;
     vec3 from, d; /* where d was chosen */
     Receiver receiver; /* by what of it */
-    real pdf, rival;
+    real pdf, mis_ratio;
 } SkyView;
 
 inline SkyView sky_view(Scene scene, Slab path, uint at, PathEnd end)
@@ -19,7 +19,7 @@ inline SkyView sky_view(Scene scene, Slab path, uint at, PathEnd end)
     v.d = sel3(v.seen, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f)); /* a slot without a pixel has none */
     v.from = madd3(v.d, -load_path_null_distance(path, at), load_path_o(path, at));
     v.receiver = path_receiver(path, at);
-    v.rival = path_rival(path, at, end.depth);
+    v.mis_ratio = path_mis_ratio(path, at, end.depth);
     return v;
 }
 
@@ -28,7 +28,7 @@ inline Spectrum sky_gather(Scene scene, Slab path, uint at, PathEnd end, Wavelen
 {
     SkyView v = sky_view(scene, path, at, end);
     if (any(v.seen)) {
-        Spectrum arrives = infinite_gather(scene, v.from, v.receiver, v.d, v.pdf, v.rival, lambdas);
+        Spectrum arrives = infinite_gather(scene, v.from, v.receiver, v.d, v.pdf, v.mis_ratio, lambdas);
         arrives = sky_dimmed(scene, path, at, v.seen, lambdas, arrives);
         Spectrum sum = spectrum_add(radiance, spectrum_mul(load_path_beta(path, at), arrives));
         radiance = spectrum_sel(v.seen, sum, radiance);
@@ -37,8 +37,11 @@ inline Spectrum sky_gather(Scene scene, Slab path, uint at, PathEnd end, Wavelen
 }
 
 /* To begin paths takes longer, as light is gathered there: lanes wait for others. */
-#define sky_due(end) path_end_of_half(end)
+inline int sky_due(PathEnd end) { return path_end_of_half(end); }
 
 /* Twin, in a scene without light from all around. */
-#define sky_gather(scene, path, at, end, lambdas, radiance) (radiance)
-#define sky_due(end) any((end).ended)
+inline Spectrum sky_gather(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas, Spectrum radiance)
+{
+    return radiance;
+}
+inline int sky_due(PathEnd end) { return any(end.ended); }

@@ -4,7 +4,7 @@
 inline Spectrum sky_dimmed(Scene scene, Slab path, uint at, mask seen, Wavelengths lambdas, Spectrum light)
 {
 #if USES_ABSORPTION
-    integer medium = sel_i(seen, MEDIUM_LEFT(load_path_medium(path, at)), (integer)(0));
+    integer medium = sel_i(seen, medium_left(load_path_medium(path, at)), (integer)(0));
     light = spectrum_mul(light, medium_transmittance(scene, medium, (real)(FAR), lambdas));
 #endif
     return light;

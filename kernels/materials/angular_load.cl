@@ -1,5 +1,5 @@
 /* An AngularTable from its five words in `materials`: the first value in `distributions`, how many cosines and rows,
- * the wavelength of the first row [nm] and how many rows a nm has. In RGB mode there are three rows, or one. */
+ * the wavelength of the first row [nm] and how many rows a nm has. In RGB mode the rows are three, or a single row. */
 inline AngularTable angular_load(Scene scene, integer at, Wavelengths lambdas)
 {
     AngularTable t;

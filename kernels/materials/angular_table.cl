@@ -7,7 +7,7 @@ typedef struct {
     Spectrum row; /* which row each wavelength has, with a fraction */
 } AngularTable;
 
-/* The last of n - 1 numbers that ascend from `first` on which is not above x; 0 if all are. */
+/* The index of the last number up to x among the n - 1 ascending numbers from `first`; 0 if all are above x. */
 inline integer angular_cell(AngularTable t, integer first, real x)
 {
     integer low = 0, high = t.cosines - 2;
@@ -54,7 +54,7 @@ inline Spectrum angular_density(AngularTable t, real cosine)
 #undef C
     return r;
 }
-/* The cosine that u leads to in one of the two rows around `at`: it is chosen by how near it is. */
+/* The cosine for a random number u in either row around `at`; the probability of a row is its nearness. */
 inline real angular_sample(AngularTable t, real at, real u)
 {
     real along;

@@ -14,4 +14,4 @@ inline Bsdf anisotropy_turned(Scene scene, integer row, Bsdf m, Surface s, Frame
 }
 
 /* Twin, where a material is equally rough in all directions, or knows no turn. */
-#define anisotropy_turned(scene, row, m, s, shaded) (m)
+inline Bsdf anisotropy_turned(Scene scene, integer row, Bsdf m, Surface s, Frame shaded) { return m; }

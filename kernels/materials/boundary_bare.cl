@@ -5,11 +5,7 @@
 
 typedef struct { int none; } Layers;
 
-inline Layers layers_none(void)
-{
-    Layers l = {0};
-    return l;
-}
+inline Layers layers_none(void) { Layers l = {0}; return l; }
 
 /* Two dielectrics, at cosine cos_i, signed; eta: index of the inside over the outside. */
 inline Boundary dielectric_boundary(Layers layers, real cos_i, Spectrum eta, Spectrum outside)
@@ -20,7 +16,7 @@ inline Boundary dielectric_boundary(Layers layers, real cos_i, Spectrum eta, Spe
     b.p = spectrum_mean(b.r);
     return b;
 }
-/* The same with one index for all wavelengths: a facet that all of them meet at the same cosine. */
+/* The same with a common index for all wavelengths, which meet a facet at the same cosine. */
 inline Boundary facet_boundary(Layers layers, real cos_i, real eta, Spectrum outside)
 {
     Boundary b;

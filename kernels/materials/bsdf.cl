@@ -33,7 +33,7 @@ typedef struct {
 typedef struct {
     Spectrum f;      /* f |cos| */
     real pdf;        /* of wi, as hero_pdf has it */
-    real p, p_back;  /* of wi and of wo, as rival_pdf has them */
+    real p, p_back;  /* of wi and of wo, as mis_pdf has them */
 } BsdfPair;
 
 /* What a vertex asks of its material. */

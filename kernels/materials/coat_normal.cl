@@ -17,4 +17,4 @@ inline Bsdf coat_normal_turned(Scene scene, integer row, Bsdf m, Surface s, Fram
 }
 
 /* Twin, where a material has no coat with a normal of its own. */
-#define coat_normal_turned(scene, row, m, s, shaded) (m)
+inline Bsdf coat_normal_turned(Scene scene, integer row, Bsdf m, Surface s, Frame shaded) { return m; }

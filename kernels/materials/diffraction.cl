@@ -1,8 +1,8 @@
-/* What a grating does to light, by the scalar theory of a thin grating: the groove delays the wave by
- * `path` [nm], and an order's share is the squared Fourier coefficient of the phase that this makes
- * over one period (Goodman 2005, 4.4; Stam 1999 and Werner et al. 2017 in rendering). */
+/* Diffraction by the scalar theory of a thin grating: the groove delays the wave by `path` [nm], and an order's
+ * share is the squared Fourier coefficient of this phase over a period (Goodman 2005, 4.4; Stam 1999 and Werner et
+ * al. 2017 in rendering). */
 #include "generated/grating_sizes.cl"
-#define BESSEL_SMALL 6.0f    /* arguments for which the recurrence starts at 20, */
+#define BESSEL_SMALL 6.0f    /* up to these arguments the recurrence starts at 20, */
 #define BESSEL_LARGEST 24.0f /* and at 40 */
 #define GRATING_SINUSOIDAL 0
 #define GRATING_LAMELLAR 1
@@ -54,8 +54,8 @@ inline real lamellar_share(int n, real waves, real fill)
     return n == 0 ? 1.0f - fill * (1.0f - fill) * contrast : contrast * sqr(fill * sinc_r((float)n * fill));
 }
 
-/* At which wavelengths an event is worked out that sends each wavelength elsewhere. `share`: what the
- * components get where all keep the direction, `alone`: where it is the hero's. */
+/* The wavelengths at which a dispersive event is evaluated. `share`: the weights of the components where all keep the
+ * direction; `alone`: where the direction is the hero's. */
 typedef struct {
     Spectrum lambdas, share, alone;
     real pdf;
@@ -73,8 +73,8 @@ inline Parted part_wavelengths(Spectrum lambdas, real u)
     return p;
 }
 #else
-/* RGB mode: one wavelength from 420 to 660 nm at random. It counts for blue around 460, green around
- * 540 and red around 620 nm by hats that overlap, each of mean one, so that white stays white. */
+/* RGB mode: a random wavelength from 420 to 660 nm. It counts for blue around 460, green around
+ * 540 and red around 620 nm by overlapping hats of mean 1, so that white stays white. */
 inline Parted part_wavelengths(Spectrum lambdas, real u)
 {
     Parted p;

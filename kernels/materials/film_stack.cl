@@ -7,11 +7,7 @@
  * for s- and Y = q / n^2 for p-polarised light, a boundary's amplitude is (Y - Y') / (Y + Y'). */
 typedef struct { real re, im; } Complex;
 
-inline Complex complex_of(real re, real im)
-{
-    Complex r = {re, im};
-    return r;
-}
+inline Complex complex_of(real re, real im) { Complex r = {re, im}; return r; }
 inline Complex complex_add(Complex a, Complex b) { return complex_of(a.re + b.re, a.im + b.im); }
 inline Complex complex_sub(Complex a, Complex b) { return complex_of(a.re - b.re, a.im - b.im); }
 inline Complex complex_mul(Complex a, Complex b)
@@ -45,8 +41,8 @@ inline Admittance admittance_of(real eta, real k, real from, real c)
     return m;
 }
 
-/* One polarisation's wave at the top of what has been stacked: the amplitude that comes back, and
- * the share of power that goes down to a base that does not absorb. */
+/* The wave of a polarisation at the top of a stack: the reflected amplitude, and the share of power that
+ * reaches a base that does not absorb. */
 typedef struct { Complex r; real t; } Wave;
 
 /* Puts a medium on top. The powers' ratio Re Y' / Re Y is dealt out over all boundaries as |Y'| / |Y|,
@@ -70,7 +66,7 @@ inline Wave wave_through(Wave w, real turns, real left)
     return w;
 }
 
-/* All that is stacked so far, at one wavelength. */
+/* A stack of layers at a wavelength. */
 typedef struct { Admittance top; Wave s, p; } Stack;
 
 inline Stack stack_on(real eta, real k, real from, real c)

@@ -16,7 +16,7 @@ inline vec2 fresnel_polarised(real c, real t, real eta)
     return r;
 }
 
-/* Two dielectrics. An index of one is no boundary: f = 0 at any angle. */
+/* Two dielectrics. A relative index of 1 is no boundary: f = 0 at any angle. */
 inline Fresnel fresnel_dielectric(real cos_i, real eta)
 {
     Fresnel r;
@@ -63,7 +63,7 @@ inline real fresnel_metal(real cos_i, real eta, real k)
     real t = 2.0f * cos_i * a;
     real m = max_r(q + c2, (real)(1e-15f)), n = max_r(q * c2 + s2 * s2, (real)(1e-15f));
     /* s = (m - t) / (m + t) of light polarised across the plane of incidence, and s (n - t s2) / (n + t s2) along it;
-     * the mean of both with one division. */
+     * the mean of both with a single division. */
     return clamp_r((m - t) * n / ((m + t) * (n + t * s2)), (real)(0.0f), (real)(1.0f));
 }
 inline Spectrum fresnel_conductor(real cos_i, Spectrum eta, Spectrum k)

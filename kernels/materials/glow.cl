@@ -1,6 +1,6 @@
-/* Albedo of a surface that reflects and gives out light of other wavelengths: over all that comes, per
- * wavelength that leaves. It may exceed one, as the light was taken elsewhere. In RGB mode nothing is
- * taken elsewhere, so a colour brighter than white would be light out of nothing. */
+/* Albedo of a fluorescent surface: light over all incident wavelengths, per outgoing wavelength. It may exceed 1
+ * because the light comes from other wavelengths. RGB mode moves no light between wavelengths, so a colour brighter
+ * than white would create light. */
 inline Spectrum with_glow(Spectrum elastic, Spectrum glow, real amount)
 {
     Spectrum r = spectrum_madd(glow, amount, elastic);

@@ -49,7 +49,7 @@ inline real charlie_lambda(real c, real t)
     real l = charlie_l(sel(steep, c, 1.0f - c), t);
     return exp_r(sel(steep, l, 2.0f * charlie_l((real)(0.5f), t) - l));
 }
-/* D G / (4 |cos_o|) of upright fibres (Estevez and Kulla 2017): their f |cos_i| for white ones. */
+/* D G / (4 |cos_o|) of upright fibres (Estevez and Kulla 2017): f |cos_i| for white fibres. */
 inline real charlie(real cos_o, real cos_i, vec3 h, real roughness)
 {
     real r = max_r(roughness, (real)(SHEEN_ROUGHEST)), inv = 1.0f / (r * r), t = sqr(1.0f - r * r);

@@ -1,5 +1,5 @@
-/* The layers of a coated material in spectral mode: LAYER_WORDS words of `materials` each, read one by
- * one at the path's wavelengths. The generated `Layer` and `layer_load` stand before this. */
+/* The layers of a coated material in spectral mode: LAYER_WORDS words of `materials` each, read in
+ * turn at the path's wavelengths. The generated `Layer` and `layer_load` stand before this. */
 typedef struct {
     Scene scene;
     integer first, count; /* rows in `materials` */

@@ -3,7 +3,6 @@
  * share that each colour reflects, ndf, sigma, the slices of vndf and of luminance, and the spectra: of every
  * phi_i, pair of neighbouring colours, row and column those of every theta_i, two halves in a word
  * (clpt/render/spectra/measurements.py). */
-#include "materials/halfway_square.cl"
 #include "materials/warp_table.cl"
 #define MEASUREMENT_HEAD 17
 #ifndef MEASUREMENT_COUNT /* where all measurements of a scene have the same, these are constants */
@@ -29,7 +28,7 @@ typedef struct {
     WarpTable vndf, luminance;
     integer spectra, colours;
     mask isotropic, over_density; /* whether spectra are over ndf / (4 sigma) */
-    integer reduction;            /* of how many equal parts of the azimuths one is stored */
+    integer reduction;            /* equal parts of the azimuths; a single part is stored */
 } MeasurementParts;
 
 inline GridTable measurement_grid(Measurement t, integer first, int i)
@@ -77,8 +76,7 @@ inline real measurement_at(global const float *values, GridTable t, vec2 p)
     return c.x + x * (c.y - c.x);
 }
 
-/* Which part of the azimuths is meant: w is turned, or mirrored, as `wo` must be to come to what is stored. Twice the
- * same gives w again. */
+/* Turns or mirrors w as `wo` must be turned to reach the stored part of the azimuths. Applied twice it returns w. */
 inline vec3 measurement_folded(MeasurementParts p, vec3 wo, vec3 w)
 {
     mask turns = (p.reduction >= 2) & (wo.y >= 0.0f);

@@ -1,5 +1,5 @@
-/* A MerlTable from its four words in `materials`: the first of its numbers in `distributions`, and the rows in
- * `spectra` of what red, green and blue are. */
+/* A MerlTable from its four words in `materials`: the first of its numbers in `distributions`, and the rows of
+ * the red, green and blue curves in `spectra`. */
 inline MerlTable merl_load_table(Scene scene, integer at, Wavelengths lambdas)
 {
     MerlTable t;

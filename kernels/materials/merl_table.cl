@@ -2,7 +2,6 @@
  * has from `first` on the numbers of MERL_HEAD, the slices of a warp for viewers at even angles to the normal, and f
  * [1/sr]: of every halfway angle, difference angle and azimuth its red, green and blue as halves in two words; after
  * the last azimuth the first again (clpt/render/spectra/measurements.py). */
-#include "materials/halfway_square.cl"
 #include "materials/warp_table.cl"
 #define MERL_HEAD 12
 #ifndef MERL_COUNT /* where all tables of a scene have the same, these are constants */

@@ -12,7 +12,7 @@ inline Microfacets microfacets_of(integer distribution, real alpha_u, real alpha
     return d;
 }
 
-/* D(m), normalised so that the integral of D(m) m.z over the hemisphere is one. */
+/* D(m), normalised so that the integral of D(m) m.z over the hemisphere is 1. */
 inline real microfacet_d(Microfacets d, vec3 m)
 {
     real c2 = m.z * m.z, s = sqr(m.x / d.alpha_u) + sqr(m.y / d.alpha_v), area = PI * d.alpha_u * d.alpha_v;

@@ -1,6 +1,6 @@
-/* By which wavelengths light came that leaves a fluorescent surface (Mojzik et al. 2018, for paths from the camera). A
+/* Samples the incident wavelengths of light from a fluorescent surface (Mojzik et al. 2018, for camera paths). A
  * matrix lies in `distributions`, on a grid of RERADIATION_STEP nm from lambda_min
- * (clpt/render/spectra/reradiation.py): at each node how much light to expect, then the integral of each
+ * (clpt/render/spectra/encode.py): at each node the expected light, then the integral of each
  * row times that, then of each row its values [1/nm] and the normalised running integral of the product. */
 #include "core/grid.cl"
 #include "generated/reradiation_sizes.cl"
@@ -23,8 +23,8 @@ inline real shift_between(Scene scene, integer first, real along)
 }
 
 /* A wavelength in, with density proportional to the matrix at `out` times the light to expect, both
- * linear between nodes: one of the two rows around `out`, a cell of it, a point of the cell. *weight:
- * the matrix over that density. */
+ * linear between nodes: either row around `out`, a cell of it, a point of the cell. *weight: the matrix
+ * over that density. */
 inline real reradiation_sample(Scene scene, integer table, real out, real u, real *weight)
 {
     real t;
@@ -48,13 +48,13 @@ inline real reradiation_sample(Scene scene, integer table, real out, real u, rea
     return scene.settings->lambda_min + (to_real(cell) + along) * RERADIATION_STEP;
 }
 
-/* The wavelengths in, of a path's wavelengths out: each stays, for light that was reflected, or is drawn
- * from the matrix; *elastic becomes the weight of what happened, and *glow zero. All four use one number,
- * each a quarter further, so that they stay exchangeable: which is the hero makes no difference. A
- * wavelength stays in proportion to the light that is to be expected either way, but not too seldom: from
+/* The incident wavelengths for a path's outgoing wavelengths: each stays, for light that was reflected, or is drawn
+ * from the matrix; *elastic becomes the weight of the event, and *glow zero. All four use the same random number,
+ * each a quarter further, so that they stay exchangeable: any of them may be the hero. A
+ * wavelength stays in proportion to the light expected either way, but not too seldom: from
  * the third surface on with r^(3/2) at least (0.9 at most), so that the squares of weights shrink by
  * r^(1/2) a bounce, while they could grow for ever between walls that give out much. In a medium r is a share of
- * collisions, of which there are more than light is taken: there it is 3 r, as light may be scattered many times. */
+ * collisions, which outnumber absorptions: there it is 3 r, as light may be scattered many times. */
 #if BSDF_IS_PHASE
 #define SHIFT_LEAST(r) (3.0f * (r))
 #else

@@ -1,11 +1,11 @@
-/* A rough dielectric boundary over a diffuse base: how much light passes it, and how much of the base's
- * light it throws back. Isotropic microfacets of roughness alpha; eta: index of the coat over outside.
- * From 1 on the integrals stand in tables, linear in the roots of alpha and of 1 - 1 / eta: within 0.01 of
- * float64 sums for an index of 1.2 to 3, where grazing light meets one below within 0.05; what a smooth coat throws
- * back of a metal's light within 0.01 in the mean, near the critical angle of a smooth metal within 0.07. */
+/* A rough dielectric boundary over a diffuse base: how much light passes it, and how much of the base's light it
+ * throws back. Isotropic microfacets of roughness alpha; eta: index of the coat over outside. From 1 on the
+ * integrals stand in tables, linear in the roots of alpha and of 1 - 1 / eta: within 0.01 of float64 sums for an
+ * index of 1.2 to 3, where grazing light meets an index below 1 within 0.05; what a smooth coat throws back of a
+ * metal's light within 0.01 in the mean, near the critical angle of a smooth metal within 0.07. */
 #include "generated/rough_coat_table.cl"
 
-/* A node of the tables by roughness and index, and how far it is to the next ones. */
+/* A node of the tables by roughness and index, and the distances to the next nodes. */
 typedef struct {
     integer row, column;
     real by_alpha, by_index;
@@ -23,7 +23,7 @@ inline CoatCell coat_cell(Microfacets d, real eta)
     cell.row = sel_i(d.beckmann, cell.row + COAT_ALPHAS, cell.row);
     return cell;
 }
-/* The number of a word of a table, and the next one, by their distance. */
+/* A word's two numbers, interpolated by the distance from the first. */
 inline real coat_pair(constant uint *table, integer at, real next)
 {
     integer word = gather_constant(table, at);
@@ -65,7 +65,7 @@ constant float coat_radius_beckmann[3] = {0.489028f, 1.177410f, 2.089504f};
 constant float coat_weight[3] = {0.492944f, 0.444444f, 0.062612f};
 constant float coat_azimuth[4] = {0.923880f, 0.382683f, -0.382683f, -0.923880f};
 
-/* The transmittance of a coat of lower index than what is outside, summed over these; off by less than
+/* The transmittance of a coat of lower index than outside, summed over these nodes, with an error below
  * 0.015. Nothing is tabulated for it: light beyond the critical angle makes edges. */
 called real coat_transmittance_thinner(Microfacets d, real cos_i, real eta)
 {

@@ -1,5 +1,5 @@
-/* What materials/thin_film.cl has, a wavelength after the other: the stacks of four at once need too many of a GPU's
- * registers. A layer is read at one wavelength in each turn. */
+/* The functions of materials/thin_film.cl, a wavelength after the other: four stacks at once need too many registers of
+ * a GPU. Each turn reads a layer at a single wavelength. */
 #include "materials/film_stack.cl"
 
 inline Boundary thin_film(Layers layers, mask outward, real cos_i, Spectrum from, Spectrum eta, Spectrum k)

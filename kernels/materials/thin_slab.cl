@@ -23,7 +23,7 @@ inline Spectrum thin_slab_reflected(real c, Spectrum eta)
     return r;
 }
 
-/* What passes it, of what it does not reflect the share `transmittance`. */
+/* Its transmittance: the share `transmittance` of the light that it does not reflect. */
 inline Spectrum thin_slab_passed(real c, Spectrum inside, Spectrum outside, Spectrum transmittance)
 {
     Spectrum f = thin_slab_reflected(c, relative_index(inside, outside));

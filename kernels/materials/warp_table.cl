@@ -1,10 +1,10 @@
-/* The unit square to itself, so that even points follow a density that is a bilinear table (Dupuy and Jakob 2018,
- * section 4.2), of which there are slices in rows; densities and integrals are linear between slices. From `first` on
- * stand for every row of slices, those that are neighbours next to each other: of every two rows of the table and
- * every column the densities, two halves in a word; the integrals along both rows up to there, two words; of cells of
- * even shares of these integrals, at which part of the columns they begin and end, two 16383ths in a word; then of
- * every row the integral of all above, which ends at 1; and of cells of even shares of that where they begin and end
- * (clpt/render/spectra/warp_tables.py). What is read together stands together. */
+/* Warps of the unit square: uniform points take the density of a bilinear table (Dupuy and Jakob 2018, section 4.2).
+ * Tables are slices in rows; densities and integrals are linear between slices. From `first` on follow, for every
+ * row of slices, with neighbouring slices side by side: for every pair of rows of the table and every column, the
+ * densities as two halves in a word; the integrals along both rows up to the column, two words; for cells with equal
+ * shares of these integrals, the columns where they begin and end, as two 16383ths in a word; then for every row the
+ * integral of all rows above, which ends at 1; and for cells with equal shares of that, the rows where they begin
+ * and end (clpt/render/spectra/measurements.py). Words that are read together lie together. */
 #include "core/rows.cl"
 
 typedef struct {
@@ -27,9 +27,10 @@ inline integer warp_count(global const float *values, integer first, int i)
     return sel_i(first > 0, to_integer(gather(values, first + i)), (integer)(2));
 }
 
-/* The last of n - 1 numbers that ascend from `first` + `cells` on which is not above x, and how far x is to the next,
- * [0, 1]. Before them stands, for even cells between the first and the last, at which number a cell begins; there is no
- * more than one in a cell. No loop: so compilers see that functions of one pair of directions have it in common. */
+/* The index of the last number up to x among the n - 1 ascending numbers from `first` + `cells`, and the position of
+ * x before the next, [0, 1]. Before them lies, for equal cells between the first and the last, the number at which a
+ * cell begins; a cell holds a single number at most. Without a loop compilers see that functions of a pair of
+ * directions share this. */
 inline integer warp_node(global const float *values, integer first, integer cells, integer n, real x, real *along)
 {
     integer nodes = first + cells, most = max_i(n - 2, (integer)(0));
@@ -43,11 +44,11 @@ inline integer warp_node(global const float *values, integer first, integer cell
     return i;
 }
 
-/* Words of the pairs of rows, of one kind; of a row of slices. */
+/* Words of the pairs of rows for a single quantity; of a row of slices. */
 inline integer warp_nodes(WarpTable t) { return (t.rows - 1) * t.columns * t.slices; }
 inline integer warp_stride(WarpTable t) { return 4 * warp_nodes(t) + 2 * t.rows * t.slices; }
 
-/* The cell of a table of n nodes in which x lies, and how far along it. */
+/* The cell with x in a table of n nodes, and the position of x along it. */
 inline integer warp_cell(real x, integer n, real *along)
 {
     real at = clamp_r(x, (real)(0.0f), (real)(1.0f)) * to_real(n - 1);
@@ -92,11 +93,7 @@ inline vec2 warp_sum_pairs(vec2 share, vec4 v)
     return r;
 }
 inline real warp_sum(vec2 share, vec2 v) { return share.x * v.x + share.y * v.y; }
-inline vec2 warp_added(vec2 a, vec2 b)
-{
-    vec2 r = {a.x + b.x, a.y + b.y};
-    return r;
-}
+inline vec2 warp_added(vec2 a, vec2 b) { vec2 r = {a.x + b.x, a.y + b.y}; return r; }
 
 /* The same of all slices; at: where the numbers of the first slice of the first row stand, stride: from row to row. */
 inline real warp_read(global const float *values, WarpSlices s, integer at, integer stride)
@@ -145,14 +142,14 @@ inline integer warp_guess(global const float *values, WarpSlices s, integer at, 
     return clamp_i(to_integer(part * (1.0f / 16383.0f) * to_real(n - 1)), n - 2);
 }
 
-/* Which way to walk from a node whose integral is `below` and that of the next one `above`, to that which x is in. */
+/* The step toward the cell with x from a node with the integral `below`; `above`: the next node's integral. */
 inline integer warp_way(real x, real below, real above, integer node, integer most)
 {
     integer forth = sel_i((above <= x) & (node < most), (integer)(1), (integer)(0));
     return sel_i((below > x) & (node > 0), (integer)(-1), forth);
 }
 
-/* Densities of a row and the next one at a column, and at the column beside it; integrals of both rows up to there. */
+/* Densities of two neighbouring rows at two neighbouring columns; integrals of both rows up to the first column. */
 inline vec2 warp_densities(WarpTable t, WarpSlices s, integer node)
 {
     return warp_read_halves(t.values, s, t.first + node * t.slices, warp_stride(t));
@@ -234,4 +231,29 @@ inline vec2 warp_invert(WarpTable t, WarpSlices s, vec2 p, real *density)
     u.x = (warp_at(before, y) + x * (c0 + 0.5f * x * (c1 - c0))) / max_r(warp_at(whole, y), (real)(1e-30f));
     u.y = warp_down(t, s, row) + y * (whole.x + 0.5f * y * (whole.y - whole.x));
     return u;
+}
+
+/* Halfway directions as points of the unit square (Dupuy and Jakob 2018, section 4.1): x is the root of the angle to z,
+ * y the azimuth, each over its range. */
+inline vec2 halfway_square(vec3 w)
+{
+    real theta = atan2_r(sqrt_r(w.x * w.x + w.y * w.y), w.z);
+    vec2 r = {sqrt_r(theta * (2.0f * INV_PI)), (atan2_r(w.y, w.x) + PI) * INV_2PI};
+    return r;
+}
+
+/* A point's direction; its azimuth is turned by so many full turns. */
+inline vec3 halfway_direction(vec2 p, real turned)
+{
+    real turn = p.y + 0.5f + turned, sin_p, cos_p, sin_t, cos_t;
+    sincos_2pi(turn - floor(turn), &sin_p, &cos_p);
+    sincos_2pi(0.25f * p.x * p.x, &sin_t, &cos_t);
+    return v3(cos_p * sin_t, sin_p * sin_t, cos_t);
+}
+
+/* Solid angle of wi over area of the square, at x; h: the halfway direction there, cos_o: its cosine to wo. */
+inline real halfway_area(real x, vec3 h, real cos_o)
+{
+    real sin_m = sqrt_r(h.x * h.x + h.y * h.y);
+    return max_r(2.0f * PI * PI * x * sin_m, (real)(1e-6f)) * 4.0f * max_r(cos_o, (real)(1e-6f));
 }

@@ -1,9 +1,9 @@
-/* Aims of lamps that shine into a cone: flights end near such a lamp only where its light goes. Behind the aims in
- * `media` stand as many cones: x, y, z of the axis, and the cosine of the half angle, -1 for no cone. */
+/* Aims of lamps that shine into a cone: flights aim at such a lamp only where its light goes. Behind the aims in
+ * `media` follow as many cones: x, y, z of the axis, and the cosine of the half angle, -1 for no cone. */
 #define AIM_COUNT (MEDIUM_AIMS / 2)
 
-/* Where a ray is in the cone of the aim in `row`, from the place `to` as seen from its origin; delta: of `to` along d;
- * end: of the ray [m]. */
+/* The part of a ray in the cone of the aim in `row`. to: the aim as seen from the ray's origin; delta: its component
+ * along d; far2: its squared length; end: of the ray [m]. */
 inline AimSpan aim_span(Scene scene, integer row, vec3 d, vec3 to, real delta, real far2, real end)
 {
     vec4 cone = row4(scene.media, row + 4 * AIM_COUNT);

@@ -1,4 +1,4 @@
-/* The index outside of a dielectric among bodies that overlap: that of the body that fills the place there. */
+/* The exterior index of a dielectric among overlapping bodies: the index of the body of highest priority there. */
 inline void bsdf_between_bodies(Scene scene, mask active, Vertex v, Bsdf *m)
 {
     integer index = body_word(scene, v.media.bodies.next, 1);
@@ -9,5 +9,5 @@ inline void bsdf_between_bodies(Scene scene, mask active, Vertex v, Bsdf *m)
     }
 }
 
-/* Twin, where what is outside of a material does not change it. */
-#define bsdf_between_bodies(scene, active, v, m)
+/* Twin, where a material keeps its own exterior index. */
+inline void bsdf_between_bodies(Scene scene, mask active, Vertex v, Bsdf *m) {}

@@ -1,11 +1,13 @@
-/* Bodies that overlap: where several are, that of the highest priority fills the place (Schmidt and Budge 2002, "Simple
- * Nested Dielectrics in Ray Traced Images"). Bodies of the same matter have one number from 1 to 255, the higher the
- * higher their priority. Those around a point are the four bytes of a word, in any order, 0 for none; a fifth is not
- * kept. `media` holds two words for each shape, the number of its body first; behind them two for each number: the name
- * of its medium, and where its index stands in `materials`, 0 where it has none. Number 0 has the material word of a
- * null surface in their place. What stands before: media/medium.cl. */
-#define camera_through(settings) ((integer)((settings)->camera_bodies)) /* what a ray to a light begins in */
-#define light_through(scene, row) light_bodies(scene, row)
+/* Bodies that overlap: the body of highest priority fills a point (Schmidt and Budge 2002, "Simple Nested
+ * Dielectrics in Ray Traced Images"). Bodies of the same matter share a number from 1 to 255, which rises with the
+ * priority. The bodies around a point are the four bytes of a word, in any order, 0 for an empty byte; a fifth body
+ * is lost. `media` holds two words for each shape, the number of its body first. Behind them follow two words for
+ * each number: the name of the medium, and where the index stands in `materials`, 0 without an index. For number 0
+ * the first word is the material word of a null surface. media/light_media.cl says what stands before. */
+
+/* The bodies where a shadow ray begins, at the camera and at a light. */
+inline integer camera_through(Scene scene) { return (integer)(scene.settings->camera_bodies); }
+inline integer light_through(Scene scene, integer row) { return light_bodies(scene, row); }
 
 inline integer bodies_top(integer bodies)
 {
@@ -36,12 +38,12 @@ inline integer body_medium(Scene scene, integer body)
     return sel_i(body != 0, body_word(scene, body, 0), (integer)(0));
 }
 
-/* A surface that a ray meets among bodies. */
+/* A surface that a ray hits among bodies. */
 typedef struct {
     integer body;   /* behind its front; 0: none */
     integer others; /* bodies around its front */
-    integer next;   /* that which fills the place there */
-    mask hidden;    /* it fills the place behind too: nothing is to be seen of the surface */
+    integer next;   /* the body that fills the point before its front */
+    mask hidden;    /* that body fills the point behind too, and hides the surface */
 } BodyBoundary;
 
 inline BodyBoundary body_boundary(Scene scene, integer shape, integer bodies, mask front)
@@ -54,12 +56,12 @@ inline BodyBoundary body_boundary(Scene scene, integer shape, integer bodies, ma
     return b;
 }
 
-/* The bodies around a ray that goes on from there; inward: to the back of the surface. */
+/* The bodies around a ray beyond the surface; inward: the ray goes to the back. */
 inline integer bodies_beyond(BodyBoundary b, mask inward)
 {
     return sel_i(inward & (b.body != 0), bodies_with(b.others, b.body), b.others);
 }
 
-/* Twin, where bodies do not overlap: a ray to a light knows its medium by name. */
-#define camera_through(settings) ((integer)((settings)->camera_medium))
-#define light_through(scene, row) light_medium(scene, row)
+/* Twin, where bodies do not overlap: a shadow ray begins with the name of its medium. */
+inline integer camera_through(Scene scene) { return (integer)(scene.settings->camera_medium); }
+inline integer light_through(Scene scene, integer row) { return light_medium(scene, row); }

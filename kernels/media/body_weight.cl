@@ -1,5 +1,5 @@
-/* What light of a homogeneous medium counts that a ray gathers, against its choice by next-event estimation. */
-inline Spectrum body_weighed(Scene scene, Slab path, uint at, mask flies, Spectrum light)
+/* Emission gathered along a ray in a homogeneous medium, weighted (MIS) against next-event estimation. */
+inline Spectrum emission_mis_weighted(Scene scene, Slab path, uint at, mask flies, Spectrum light)
 {
     integer row = medium_light_row(scene, sel_i(flies, load_path_medium(path, at), (integer)(0)));
     real pdf = load_path_pdf(path, at);
@@ -13,4 +13,4 @@ inline Spectrum body_weighed(Scene scene, Slab path, uint at, mask flies, Spectr
 }
 
 /* Twin, where no homogeneous medium is a light. */
-#define body_weighed(scene, path, at, flies, light) (light)
+inline Spectrum emission_mis_weighted(Scene scene, Slab path, uint at, mask flies, Spectrum light) { return light; }

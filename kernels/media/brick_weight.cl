@@ -1,5 +1,5 @@
-/* What light of a brick counts that a flight gathers at t, against its choice by next-event estimation; row: 1 + that
- * of `lights`. */
+/* The MIS weight of emission that a flight gathers in a brick at distance t, against next-event estimation; row: 1 +
+ * the brick's row of `lights`. */
 inline real brick_weight(Scene scene, integer row, mask active, GridOrigin origin, real t)
 {
     mask sought = active & (row > 0) & (origin.pdf >= 0.0f);
@@ -13,4 +13,4 @@ inline real brick_weight(Scene scene, integer row, mask active, GridOrigin origi
 }
 
 /* Twin, where no brick is a light. */
-#define brick_weight(scene, row, active, origin, t) ((real)(1.0f))
+inline real brick_weight(Scene scene, integer row, mask active, GridOrigin origin, real t) { return (real)(1.0f); }

@@ -1,27 +1,28 @@
-/* Collisions near lamps: in thin media the light of a lamp is met where a ray passes it by, not where extinction alone
- * would let the ray collide. Some flights choose their distance so that all angles at an aim, a place that a lamp has,
- * are as likely (Kulla and Fajardo 2012, equiangular sampling). AIM_COUNT of them stand first in `media`, each as x,
- * y, z and the sum of the shares of those up to it.
+/* Equiangular sampling (Kulla and Fajardo 2012): in thin media the light of a lamp is strong where a ray passes the
+ * lamp, not where extinction alone makes the ray collide. Some flights choose their distance so that all angles at an
+ * aim, a point of a lamp, are equally likely. AIM_COUNT aims stand first in `media`, each as x, y, z and the cumulative
+ * share.
  *
- * Any point is a valid aim, so a large lamp has one in its middle. Of `share` flights: half of them where little
- * lies between the ray and the aim, none where extinction hides it. */
+ * Any point is a valid aim: a large lamp has its middle. `share` is half of the flights where little lies between
+ * the ray and the aim, and falls with the transmittance to the aim. Both densities are combined by MIS (balance
+ * heuristic). */
 #define MOST_AIMED 0.5f
 
 typedef struct {
     real from, to; /* [m] */
-    mask meets;    /* there is such a part */
+    mask meets;    /* the ray has such a part */
 } AimSpan; /* the part of a ray that a lamp may light */
 
 #include "generated/aim_cone.cl"
 
 typedef struct {
-    real share;         /* of the flights that are chosen by angle */
+    real share;         /* of flights with a distance by angle */
     real delta, height; /* along the ray, and from it, to the aim [m] */
     real from, angle;   /* the angle where the lit part begins, and to its end [rad] */
     AimSpan lit;
 } Equiangular;
 
-/* The aim of a ray of a given extinction [1/m]; u chooses among them. */
+/* The aim of a ray in a medium of extinction sigma [1/m]; u chooses among the aims. */
 inline Equiangular equiangular(Scene scene, vec3 o, vec3 d, real end, real sigma, real u)
 {
     integer row = (integer)(0);
@@ -55,3 +56,37 @@ inline real equiangular_pdf(Equiangular e, real t)
     mask lit = (t >= e.lit.from) & (t <= e.lit.to);
     return sel(lit, e.height / (e.angle * (e.height * e.height + x * x)), (real)(0.0f));
 }
+
+typedef struct {
+    Equiangular ends;
+    mask aims;           /* the distance comes from an angle */
+    real left, by_angle; /* share of other flights; the distance by angle [m] */
+} FlightNear;
+
+/* Chooses the flights by *u, which is rescaled to a new random number. */
+inline FlightNear flight_near(Scene scene, Sampler sampler, integer vertex, integer name, vec3 o, vec3 d, real end,
+                              Medium m, mask scatters, real *u)
+{
+    real choice = AIM_COUNT > 1 ? sampler_pair(sampler, as_natural(DIMENSION_AIM + vertex)).x : (real)(0.0f);
+    FlightNear n;
+    n.ends = equiangular(scene, o, d, end, spectrum_mean(m.sigma_t), choice);
+    n.ends.share = flight_near_share(name, n.ends.share);
+    n.aims = scatters & (*u < n.ends.share);
+    n.left = 1.0f - n.ends.share;
+    n.by_angle = equiangular_distance(n.ends, *u / max_r(n.ends.share, (real)(1e-9f)));
+    *u = max_r(*u - n.ends.share, (real)(0.0f)) / n.left;
+    return n;
+}
+inline real flight_near_end(FlightNear n, real t) { return sel(n.aims, n.by_angle, t); }
+inline Spectrum flight_near_pdf(FlightNear n, real t, mask collides, Spectrum pdf)
+{
+    real nearby = sel(collides, n.ends.share * equiangular_pdf(n.ends, t), (real)(0.0f));
+    return spectrum_add(spectrum_scale(pdf, n.left), spectrum_of(nearby));
+}
+
+/* Twin, where no homogeneous medium holds a lamp, and for light paths: distances are sampled by transmittance alone. */
+typedef struct { mask aims; } FlightNear;
+inline FlightNear flight_near(Scene scene, Sampler sampler, integer vertex, integer name, vec3 o, vec3 d, real end,
+                              Medium m, mask scatters, real *u) { FlightNear n = {mask_of(0)}; return n; }
+inline real flight_near_end(FlightNear n, real t) { return t; }
+inline Spectrum flight_near_pdf(FlightNear n, real t, mask collides, Spectrum pdf) { return pdf; }

@@ -1,30 +1,29 @@
-/* Escapes: ways out of a sealed medium toward lamps. No ray to a light leaves such a body, as its smooth boundary bends
- * light, so that a path meets a lamp by chance alone. So at a collision near the boundary a ray of its own is sent
- * where light of a lamp should come from: into a cone around where the boundary bends the light of the lamp's middle.
- * Lamp and cone are those of the point where the path has last met the boundary, mostly not far away. The ray is bent
- * where it meets the boundary, wherever that is (tracing/escape_light.cl), and counts if it comes to a lamp. This ray
- * and the path's own are two ways to choose a direction at the collision, each weighed by its density (balance
- * heuristic), so the guess needs not be right.
+/* Escape rays: they leave a sealed medium toward lamps. No shadow ray leaves such a body, because its smooth boundary
+ * refracts, so a path meets a lamp by chance alone. At a collision near the boundary an escape ray is sampled in a cone
+ * around the refracted direction of the lamp's middle. Lamp and cone are chosen where the path last crossed the
+ * boundary, mostly not far away. The ray is refracted where it meets the boundary (tracing/escape_light.cl), and counts
+ * if it hits a lamp. Escape ray and phase function both sample a direction at the collision; MIS (balance heuristic)
+ * combines them, so the cone may be a guess.
  *
- * Balls around lamps stand in `distributions`, see clpt/render/media/escapes.py. */
+ * Balls around lamps stand in `distributions`, see clpt/render/media/sealed.py. */
 #include "core/rows.cl"
 
-#define ESCAPE_WORDS 5           /* of a ball: centre, radius and one that is not used */
-#define ESCAPE_SPREAD 0.03f      /* sine by which cones are wider than lamps */
-#define ESCAPE_WIDEST 0.8f       /* sine of the widest one */
-#define ESCAPE_SHARE 0.5f        /* of the optical depth, by which the chance of a ray falls */
-#define ESCAPE_DEEPEST 6.0f      /* optical depth below which none is sent */
-#define ESCAPE_FAR (4.0f * FAR)  /* length of such a ray, by which it is known */
+#define ESCAPE_WORDS 5           /* of a ball: centre, radius and an unused word */
+#define ESCAPE_SPREAD 0.03f      /* added to the sine of a lamp's half angle */
+#define ESCAPE_WIDEST 0.8f       /* the largest sine of a cone's half angle */
+#define ESCAPE_SHARE 0.5f        /* factor of the optical depth in the probability of an escape ray */
+#define ESCAPE_DEEPEST 6.0f      /* optical depth beyond which no escape ray is sent */
+#define ESCAPE_FAR (4.0f * FAR)  /* length that marks an escape ray */
 
 /* The cone of a lamp, as seen from a boundary. */
 typedef struct {
-    vec3 axis;          /* into which light would come out: away from the lamp it comes in */
-    real one_minus_cos; /* of its half angle; 0: no lamp is there */
-    real up;            /* cosine of axis and normal */
+    vec3 axis;          /* refracted direction toward the lamp, inside the body */
+    real one_minus_cos; /* of the half angle; 0 without a lamp */
+    real up;            /* cosine between axis and normal */
 } EscapeCone;
 
-/* Chooses a lamp by u, by how large it seems, for the point p of a boundary whose outward normal is n; eta: index of
- * the outside over that of the inside. */
+/* Chooses a lamp by u and its apparent size from the point p of a boundary with the outward normal n. eta: exterior
+ * over interior index. */
 inline EscapeCone escape_cone(Scene scene, vec3 p, vec3 n, real eta, real u)
 {
     EscapeCone e;
@@ -55,7 +54,7 @@ inline EscapeCone escape_cone(Scene scene, vec3 p, vec3 n, real eta, real u)
     return e;
 }
 
-/* Density of a direction by the ray that may be sent [1/sr]; chance: that it is. */
+/* Density of a direction by escape rays [1/sr]; chance: the probability that an escape ray is sent. */
 inline real escape_density(EscapeCone e, real chance, vec3 d)
 {
     mask within = 1.0f - dot3(e.axis, d) < e.one_minus_cos;

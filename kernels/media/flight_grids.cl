@@ -1,5 +1,8 @@
-/* Flights through media on grids, which take the place of those through media that are the same everywhere. */
+/* Distance sampling in media on grids, which replaces that in homogeneous media. */
 #include "generated/grid_origin.cl"
+
+/* No flight in a grid aims at a lamp (media/equiangular.cl). */
+inline real flight_near_share(integer name, real share) { return sel((name & MEDIUM_GRID) != 0, (real)(0.0f), share); }
 
 inline void flight_grids(Scene scene, Slab path, uint at, mask flies, integer name, FlightRay r, Spectrum ratio,
                          Wavelengths lambdas, Spectrum *light, Spectrum *weight, mask *collides, real *t, Medium *m)
@@ -20,5 +23,7 @@ inline void flight_grids(Scene scene, Slab path, uint at, mask flies, integer na
     }
 }
 
-/* Twin, where there are no grids. */
-#define flight_grids(scene, path, at, flies, name, r, ratio, lambdas, light, weight, collides, t, m)
+/* Twin, where no medium is on a grid. */
+inline real flight_near_share(integer name, real share) { return share; }
+inline void flight_grids(Scene scene, Slab path, uint at, mask flies, integer name, FlightRay r, Spectrum ratio,
+                         Wavelengths lambdas, Spectrum *light, Spectrum *weight, mask *collides, real *t, Medium *m) {}

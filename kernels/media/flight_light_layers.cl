@@ -1,8 +1,12 @@
-/* Adds light of media to the layers of the group that is told behind those of all lights. */
+/* Adds emission of media to its light layers, whose group follows the groups of all lights. */
 #include "film/light_layers.cl"
-#define flight_light_layers(scene, path, at, flies, state, light)                                                   \
-    light_layers_add(scene, path, at, flies, (state) & PATH_DEPTH, (integer)((scene).settings->light_count), light, \
-                     light_layers)
 
-/* Twin, where no layers of light are wanted. */
-#define flight_light_layers(scene, path, at, flies, state, light)
+inline void flight_light_layers(Scene scene, Slab path, uint at, mask flies, integer state, Spectrum light FLIGHT_ARGS)
+{
+    integer row = scene.settings->light_count;
+    light_layers_add(scene, path, at, flies, state & PATH_DEPTH, row, light LIGHT_LAYER_PASSED);
+}
+
+/* Twin, where the film has no layers of lights. */
+inline void flight_light_layers(Scene scene, Slab path, uint at, mask flies, integer state,
+                                Spectrum light FLIGHT_ARGS) {}

@@ -1,4 +1,5 @@
-/* What a flight weighs over all wavelengths of its path; f: of light that comes so far, pdf: of the distance. */
+/* The weight of a flight over all wavelengths of its path; f: transmittance, times scattering at a collision; pdf:
+ * of the distance at each wavelength. */
 inline Spectrum flight_weight(Slab path, uint at, mask flies, Spectrum ratio, Spectrum f, Spectrum pdf)
 {
     Spectrum pdfs = spectrum_mul(ratio, pdf);
@@ -8,4 +9,7 @@ inline Spectrum flight_weight(Slab path, uint at, mask flies, Spectrum ratio, Sp
 }
 
 /* Twin, where extinction is the same at all wavelengths. */
-#define flight_weight(path, at, flies, ratio, f, pdf) spectrum_scale(f, 1.0f / max_r((pdf).x, (real)(1e-30f)))
+inline Spectrum flight_weight(Slab path, uint at, mask flies, Spectrum ratio, Spectrum f, Spectrum pdf)
+{
+    return spectrum_scale(f, 1.0f / max_r(pdf.x, (real)(1e-30f)));
+}

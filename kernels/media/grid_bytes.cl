@@ -1,7 +1,7 @@
-/* Numbers of grids, some of which have 8 bits for each and some 16. */
-#define grid_packed(name) sel_i(((name) & MEDIUM_BYTES) != 0, (integer)(2), (integer)(1))
+/* Numbers on grids, with 8 or 16 bits each. */
+inline integer grid_packed(integer name) { return sel_i((name & MEDIUM_BYTES) != 0, (integer)(2), (integer)(1)); }
 
-/* The number `at` of a brick, over the highest; word: where it is. */
+/* The number at index `at` of a brick over the brick's highest; word: the word that holds it. */
 inline real grid_number_at(integer packed, integer word, integer at)
 {
     mask small = packed == 2;
@@ -10,5 +10,8 @@ inline real grid_number_at(integer packed, integer word, integer at)
 }
 
 /* Twin, where all numbers have 16 bits. */
-#define grid_packed(name) ((integer)(1))
-#define grid_number_at(packed, word, at) (to_real(((word) >> (((at) & 1) << 4)) & 0xffff) * (1.0f / 65535.0f))
+inline integer grid_packed(integer name) { return (integer)(1); }
+inline real grid_number_at(integer packed, integer word, integer at)
+{
+    return to_real((word >> ((at & 1) << 4)) & 0xffff) * (1.0f / 65535.0f);
+}

@@ -1,4 +1,4 @@
-/* Colours of the extinction on a grid. */
+/* Extinction with colours on a grid. */
 inline void grid_coloured(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas,
                            Medium *m)
 {
@@ -8,4 +8,5 @@ inline void grid_coloured(Scene scene, integer name, GridWalk w, mask active, na
 }
 
 /* Twin, where extinction has no colours on a grid. */
-#define grid_coloured(scene, name, w, active, bits, lambdas, m)
+inline void grid_coloured(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas,
+                           Medium *m) {}

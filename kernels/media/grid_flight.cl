@@ -1,19 +1,19 @@
 /* Flights through a medium on a grid, by delta tracking (Woodcock 1965); null collisions are weighed over the path's
- * wavelengths as all else is (Miller, Georgiev and Jarosz 2019).
+ * wavelengths, as other events are (Miller, Georgiev and Jarosz 2019).
  *
- * Where some grids emit, a flight gathers light at one point of each way that it goes without a collision within a
- * brick: chosen evenly, and weighed as if the flight had come just there. Light is also sought by next-event estimation
- * (lights/kinds/emissive_brick.cl), and both are weighed. */
-/* Where a flight ends, and what its sample weighs; `ratio` as in spectra/hero.cl. */
+ * Where some grids emit, a flight gathers emission at a random point of each segment between collisions and brick
+ * boundaries: the point is uniform, and weighed by the transmittance to it. Next-event estimation samples the same
+ * light (lights/kinds/emissive_brick.cl); MIS combines both. */
+/* The end of a flight, and its weight; `ratio` as in spectra/hero.cl. */
 typedef struct {
-    mask collides, endless; /* endless: it has had MOST_NULL_COLLISIONS, and weighs nothing */
+    mask collides, endless; /* endless: after MOST_NULL_COLLISIONS its weight is 0 */
     real t;                 /* [m] */
     Spectrum weight, ratio;
-    Spectrum light; /* that it gathers, where some grids emit */
-    integer phase;  /* material word of the part that it collides with */
+    Spectrum light; /* gathered emission, where some grids emit */
+    integer phase;  /* material word of the colliding part's phase function */
 } GridFlight;
 
-/* How a flight's direction was chosen: see Path.pdf, and from where. It matters where some grids emit. */
+/* The density of a flight's direction (see Path.pdf) and where it was sampled, for grids that emit. */
 typedef struct {
     real pdf, before; /* [1/sr]; [m] from there to the flight's origin */
     vec3 from;
@@ -22,7 +22,7 @@ typedef struct {
 
 #include "generated/flight_steps_of_grids.cl"
 
-/* A flight from o along d through the medium `name`, at most t metres; u: of its first way. */
+/* A flight from o along d through the medium `name`, at most t metres; u: random numbers of its first segment. */
 inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 d, real t, Spectrum ratio, vec2 u,
                               natural key, mask active, Wavelengths lambdas, GridOrigin origin)
 {
@@ -31,7 +31,7 @@ inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 
     GridWalk w;
     mask all = active;
     active = grid_begin(scene, name, o, d, t, active, &w);
-    mask dims = spectrum_max(m.sigma_s) == 0.0f; /* and never scatters: then all wavelengths share the collisions */
+    mask dims = spectrum_max(m.sigma_s) == 0.0f; /* without scattering all wavelengths share the collisions */
     real most = max_r(spectrum_max(m.sigma_t), (real)(1e-30f)), passed = 0.0f;
     real sigma = sel(dims, most, max_r(spectrum_pick(m.sigma_t, ratio, u.y), (real)(1e-30f)));
     real left = -log_r(max_r(1.0f - u.x, (real)(1e-9f))) / sigma;
@@ -51,7 +51,8 @@ inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 
             natural bits = hash_natural(key + count * 0x9e3779b9u), more = hash_natural(bits ^ 0x68bc21ebu);
             real density = brick_density(scene, w, b, meets, more);
             Medium own = grid_medium(scene, name, m, w, meets, more, lambdas);
-            mask real_one = grid_meet(scene, name, m, own, w, density, passed, most, dims, meets, &more, lambdas, &f);
+            mask real_one = grid_collide(scene, name, m, own, w, density, passed, most, dims, meets, &more, lambdas,
+                                         &f);
             f.collides = f.collides | real_one;
             f.t = sel(real_one, w.t, f.t);
             passed = sel(meets, (real)(0.0f), passed);

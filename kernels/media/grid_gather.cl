@@ -1,7 +1,7 @@
-/* Light that flights gather in grids that emit. */
+/* Emission that flights gather in grids. */
 #include "generated/brick_weight.cl"
 
-/* Adds what a brick emits along the way from w.t to `to`, the flight having come through `passed` before. */
+/* Adds the emission of a brick from w.t to `to`; passed: see grid_flight. */
 inline void grid_gather(Scene scene, integer name, Medium m, GridWalk w, GridBrick b, real to, real passed, mask dims,
                         natural bits, mask active, GridFlight *f, Wavelengths lambdas, GridOrigin origin)
 {
@@ -19,4 +19,5 @@ inline void grid_gather(Scene scene, integer name, Medium m, GridWalk w, GridBri
 }
 
 /* Twin, where no grid emits. */
-#define grid_gather(scene, name, m, w, b, to, passed, dims, bits, active, f, lambdas, origin)
+inline void grid_gather(Scene scene, integer name, Medium m, GridWalk w, GridBrick b, real to, real passed, mask dims,
+                        natural bits, mask active, GridFlight *f, Wavelengths lambdas, GridOrigin origin) {}

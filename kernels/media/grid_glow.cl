@@ -1,4 +1,5 @@
-/* Light of grids that have a temperature: of black bodies, in the place of `light`. at: of the grid's words. */
+/* The light of a grid at a point with this temperature, that of a black body; `light` for grids without
+ * temperatures. at: the grid's words. */
 inline Spectrum grid_glow(Scene scene, integer at, real number, mask active, Wavelengths lambdas, Spectrum light)
 {
     integer kind = gather_i(scene.materials, at + 1);
@@ -10,4 +11,7 @@ inline Spectrum grid_glow(Scene scene, integer at, real number, mask active, Wav
 }
 
 /* Twin, where no grid has a temperature. */
-#define grid_glow(scene, at, number, active, lambdas, light) (light)
+inline Spectrum grid_glow(Scene scene, integer at, real number, mask active, Wavelengths lambdas, Spectrum light)
+{
+    return light;
+}

@@ -1,9 +1,10 @@
-/* Grids that are made of parts. */
+/* Mixtures: media on a grid that are made of parts. */
 
-/* Of a mixture word GRID_MIXED of its row is 1 + the first word of its shares in `images`, 0 of what is none. These are
- * for each brick where its points begin from there, and for each point the density of GRIDS_MIXED parts over that of
- * the bricks. Behind that word there stand for each part the word of its phase function and its coefficients. The
- * mixture's own coefficients, times the density of its bricks, are at all wavelengths at least those of all parts. */
+/* In a mixture's row, word GRID_MIXED is 1 + the first word of its shares in `images`; it is 0 for other media. The
+ * shares are a word for each brick, where its points begin from there, and for each point the density of GRIDS_MIXED
+ * parts over the density of the bricks. Behind word GRID_MIXED follow the phase function's word and the coefficients
+ * of each part. The mixture's own coefficients times the density of its bricks bound the sum of all parts: they are
+ * the majorant. */
 inline integer grid_shares(Scene scene, integer name, GridWalk w, mask active, natural bits)
 {
     integer first = gather_i(scene.materials, sel_i(active, MEDIUM_ROW(name) + GRID_MIXED, (integer)(0))) - 1;
@@ -13,8 +14,8 @@ inline integer grid_shares(Scene scene, integer name, GridWalk w, mask active, n
     return sel_i(active, points + GRIDS_MIXED * grid_corner(w, bits), (integer)(0));
 }
 
-/* A part of a mixture at the point whose shares stand at word `shares` of `images`, where the density of the bricks is
- * 1. Lanes without shares have any medium. */
+/* A part of a mixture at the point with its shares at word `shares` of `images`, for a density of the bricks of 1.
+ * Lanes without shares get any medium. */
 inline Medium grid_part(Scene scene, integer name, int part, integer shares, Wavelengths lambdas)
 {
     integer row = MEDIUM_ROW(name) + GRID_MIXED + 2 + part * (1 + 2 * MEDIUM_SCATTERING);
@@ -41,5 +42,7 @@ inline void grid_mixed(Scene scene, integer name, GridWalk w, mask active, natur
     }
 }
 
-/* Twin, where all grids are of one part. */
-#define grid_mixed(scene, name, w, active, bits, lambdas, m)
+/* Twin, where no medium is a mixture. */
+inline void grid_mixed(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas, Medium *m)
+{
+}

@@ -1,4 +1,4 @@
-/* Albedos on a grid. */
+/* Scattering with albedos on a grid. */
 inline void grid_tinted(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas,
                           Medium *m)
 {
@@ -6,4 +6,5 @@ inline void grid_tinted(Scene scene, integer name, GridWalk w, mask active, natu
 }
 
 /* Twin, where no albedo is on a grid. */
-#define grid_tinted(scene, name, w, active, bits, lambdas, m)
+inline void grid_tinted(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas,
+                          Medium *m) {}

@@ -1,6 +1,6 @@
 /* Weights of flights through grids over all wavelengths of a path. */
 
-/* What passes so much of the highest density, times metres, at each wavelength over the most of them. */
+/* Transmittance of a thickness [majorant density times m] at each wavelength, over the largest of them. */
 inline Spectrum grid_passes(Medium m, real thickness)
 {
     real least = m.sigma_t.x;
@@ -10,8 +10,8 @@ inline Spectrum grid_passes(Medium m, real thickness)
     return spectrum_exp(spectrum_scale(spectrum_sub(m.sigma_t, spectrum_of(least)), -thickness));
 }
 
-/* After that since the last collision the path is as likely as `pdf` at each wavelength, and `value` of light is left;
- * both lack what passes at the least extinction. */
+/* Updates weight and ratio after a thickness since the last collision. value: the factor of the throughput; pdf: of the
+ * event; both at each wavelength, without the transmittance, whose common factor cancels. */
 inline void grid_weigh(Medium m, real thickness, Spectrum value, Spectrum pdf, mask active, GridFlight *f)
 {
     Spectrum passes = grid_passes(m, thickness);
@@ -22,10 +22,10 @@ inline void grid_weigh(Medium m, real thickness, Spectrum value, Spectrum pdf, m
     f->weight = spectrum_sel(active, spectrum_mul(f->weight, weight), f->weight);
 }
 
-/* The number that chooses the wavelength of a way. */
+/* The random number that chooses a wavelength. */
 inline real grid_hero(natural bits) { return unit_interval(hash_natural(bits ^ 0x51ed270bu)); }
 
-/* Weighs the last way, of flights that have come to their end. */
+/* Updates flights that reach the end of the ray. */
 inline void grid_weigh_end(Medium m, real thickness, mask active, GridFlight *f)
 {
     grid_weigh(m, thickness, spectrum_of(1.0f), spectrum_of(1.0f), active, f);
@@ -37,5 +37,5 @@ inline void grid_weigh(Medium m, real thickness, Spectrum value, Spectrum pdf, m
     Spectrum weight = spectrum_scale(value, 1.0f / max_r(pdf.x, (real)(1e-30f)));
     f->weight = spectrum_sel(active, spectrum_mul(f->weight, weight), f->weight);
 }
-#define grid_hero(bits) ((real)(0.0f))
-#define grid_weigh_end(m, thickness, active, f)
+inline real grid_hero(natural bits) { return (real)(0.0f); }
+inline void grid_weigh_end(Medium m, real thickness, mask active, GridFlight *f) {}

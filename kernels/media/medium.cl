@@ -1,21 +1,20 @@
-/* Media: what light does between surfaces. Its absorption and scattering [1/m] are those of a row in `materials`, and a
- * medium is named by 1 + the first word of that row; 0 is none.
+/* Media between surfaces. The name of a medium is 1 + the first word of its row in `materials`, with bits for its kind;
+ * 0 is a vacuum. The row holds absorption and scattering [1/m].
  *
- * The inside of a dielectric that absorbs is one: exp(-a t) of the light is left after t metres (Bouguer 1729, Lambert
- * 1760, Beer 1852). A path is in the medium of the dielectric that it went into last, and in what it came from once it
- * has left that: bodies may touch what is no dielectric, but not hold each other. Its coefficient alone is in the row.
- * What names no media and absorbs nothing leaves a path in the medium where it is.
+ * The interior of an absorbing dielectric is a medium: its transmittance after t metres is exp(-a t) (Bouguer 1729,
+ * Lambert 1760, Beer 1852). A path is in the dielectric that it entered last, and when it leaves it, in the medium
+ * before: such bodies may touch other shapes, but not contain each other. Their row holds the absorption alone. A
+ * boundary without media and absorption leaves a path in its medium.
  *
- * Media that shapes have inside and outside, or the camera around it, have MEDIUM_FLIES in their names: stage/flight.cl
- * dims what rays bring through them. Their rows hold sigma_a and sigma_s, and before them the word of their phase
- * function. Where some media emit, five words of the radiance that a thick body of each would emit stand before that.
- */
+ * The interiors and exteriors of shapes, and the medium of the camera, have MEDIUM_FLIES in their names:
+ * stage/flight.cl samples distances in them. Their rows hold sigma_a and sigma_s, and before them the word of the
+ * phase function. Where some media emit, five words with the radiance of a thick body stand before that word. */
 #include "generated/medium_bits.cl"
 #define MEDIUM_ROW(name) (((name) & 0xffffff) - 1)
 
 #include "generated/medium_steps.cl"
 
-/* The inside of a material, whose absorption stands in the row that it names; 0 where that is 0. */
+/* The interior medium of a material, by the row of its absorption; 0 without absorption. */
 inline integer medium_that_absorbs(Scene scene, integer name)
 {
     integer first = max_i(name - 1, (integer)(0));
@@ -23,7 +22,7 @@ inline integer medium_that_absorbs(Scene scene, integer name)
     return sel_i(clear, (integer)(0), name);
 }
 
-/* What is left of light after t metres, t up to FAR; medium_absorption and medium_scattering are generated. */
+/* Transmittance of t metres, t up to FAR; medium_absorption and medium_scattering are generated. */
 inline Spectrum medium_transmittance(Scene scene, integer medium, real t, Wavelengths lambdas)
 {
     Spectrum r = spectrum_of(1.0f);
@@ -41,14 +40,14 @@ inline Spectrum medium_transmittance(Scene scene, integer medium, real t, Wavele
 
 #include "generated/medium_dims.cl"
 
-/* The medium of a ray that ends on a boundary whose inside is `own` (0: it has none). A ray that knows
- * of no medium but meets the back began inside, as the camera's may. */
+/* The incident medium of a ray at a boundary with the interior `own`, 0 without an interior. A ray without a medium
+ * that hits the back began inside, as a camera's ray may. */
 inline integer medium_met(integer medium, integer own, mask front)
 {
     return sel_i(!front & (medium == 0), own, medium);
 }
-/* The medium of the ray that goes on from there; inward: to the back of the boundary; outside: what is before its
- * front, where a shape says so. */
+/* The medium of the ray beyond the boundary; inward: it goes to the back; outside: the exterior, if the shape names
+ * it. */
 inline integer medium_beyond(integer medium, integer own, integer outside, mask front, mask inward)
 {
     mask boundary = (own | outside) != 0;

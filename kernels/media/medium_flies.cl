@@ -1,7 +1,7 @@
-/* Media that rays fly through: what shapes have inside and outside, and what is around the camera. */
+/* Media of MEDIUM_FLIES: interiors and exteriors of shapes, and the medium of the camera. */
 #include "generated/light_media.cl"
 
-/* Absorption `a` with what such a medium scatters. */
+/* Extinction: absorption `a`, plus the scattering of such a medium. */
 inline Spectrum medium_extinction(Scene scene, integer medium, integer row, Spectrum a, Wavelengths lambdas)
 {
     mask flies = (medium & MEDIUM_FLIES) != 0;
@@ -15,7 +15,7 @@ typedef struct {
     integer phase;             /* material word of its phase function */
 } Medium;
 
-/* A medium that flies, in the lanes that have one. */
+/* The coefficients of a medium, in the lanes with MEDIUM_FLIES. */
 inline Medium medium_load(Scene scene, integer name, Wavelengths lambdas)
 {
     integer row = max_i(MEDIUM_ROW(name), (integer)(1));
@@ -26,15 +26,15 @@ inline Medium medium_load(Scene scene, integer name, Wavelengths lambdas)
     return m;
 }
 
-/* 1 + the row of `lights` that a medium is, 0 for none. */
+/* 1 + the row of a homogeneous medium in `lights`, 0 if it is no light. */
 inline integer medium_light_row(Scene scene, integer name)
 {
     integer row = max_i(MEDIUM_ROW(name), (integer)(MEDIUM_LIGHT + 1));
     return sel_i(name != 0, gather_i(scene.materials, row - MEDIUM_LIGHT - 1), (integer)(0));
 }
 
-/* What a metre of a medium that is the same everywhere emits [W m^-3 sr^-1 nm^-1]: by Kirchhoff's law as much of
- * `light`, the radiance of a thick body, as it absorbs of any. */
+/* Emission of a homogeneous medium [W m^-3 sr^-1 nm^-1]: by Kirchhoff's law its absorption times `light`, the
+ * radiance of a thick body. */
 inline Spectrum medium_metre(Scene scene, integer name, Medium m, Wavelengths lambdas)
 {
     integer row = max_i(MEDIUM_ROW(name), (integer)(MEDIUM_LIGHT)) - MEDIUM_LIGHT;
@@ -46,7 +46,7 @@ inline Spectrum medium_metre(Scene scene, integer name, Medium m, Wavelengths la
     return light;
 }
 
-/* What t metres of such a medium emit, and let through. */
+/* Radiance that t metres of a homogeneous medium emit, after their own extinction. */
 inline Spectrum medium_emission(Scene scene, integer name, Medium m, real t, Wavelengths lambdas)
 {
     Spectrum r = medium_metre(scene, name, m, lambdas);
@@ -59,7 +59,7 @@ inline Spectrum medium_emission(Scene scene, integer name, Medium m, real t, Wav
     return r;
 }
 
-/* The names of the media behind the front of a shape and before it. */
+/* The names of the interior and exterior media of a shape. */
 typedef struct { integer inside, outside; } ShapeMedia;
 
 inline ShapeMedia shape_media(Scene scene, integer shape)
@@ -69,9 +69,12 @@ inline ShapeMedia shape_media(Scene scene, integer shape)
     return m;
 }
 
-/* The medium that a surface has still to dim a ray by: none that it has flown through. */
-#define MEDIUM_LEFT(medium) sel_i(((medium) & MEDIUM_FLIES) != 0, (integer)(0), medium)
+/* The medium whose transmittance a vertex still applies: none where stage/flight.cl has applied it. */
+inline integer medium_left(integer medium) { return sel_i((medium & MEDIUM_FLIES) != 0, (integer)(0), medium); }
 
-/* Twin, where bodies absorb and nothing else. */
-#define medium_extinction(scene, medium, row, a, lambdas) (a)
-#define MEDIUM_LEFT(medium) (medium)
+/* Twin, where dielectrics absorb and no shape has media. */
+inline Spectrum medium_extinction(Scene scene, integer medium, integer row, Spectrum a, Wavelengths lambdas)
+{
+    return a;
+}
+inline integer medium_left(integer medium) { return medium; }

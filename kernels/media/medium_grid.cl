@@ -1,17 +1,19 @@
-/* A medium whose coefficients a density multiplies, which is given at the points of a lattice and trilinear between.
- * Bricks of 8^3 cells hold the density of their 9^3 points over the brick's highest, in 16 bits each. A ray goes from
- * brick to brick by integer steps (Amanatides and Woo 1987), and the highest density of each bounds the extinction
- * there. Flights are in media/grid_flight.cl; rays to lights are dimmed by ratio tracking (Novak et al. 2014).
+/* Media with coefficients times a density at the points of a lattice, trilinear between the points. Bricks of 8^3 cells
+ * hold the density of their 9^3 points over the brick's highest, in 16 bits each. A ray goes from brick to brick by
+ * integer steps (Amanatides and Woo 1987); the highest density of a brick gives the majorant there. Flights are in
+ * media/grid_flight.cl (delta tracking); shadow rays use ratio tracking (Novak et al. 2014).
  *
- * All that follows is linear in the density: one of the eight points around stands for it, each with its trilinear
- * weight as its chance. In `materials` there stand behind a medium's coefficients: the first word in `images`, the
- * number of bricks along x, y and z, a matrix of three rows from the world to the lattice, and the upper corner of the
- * box there; the lower one is (1/2, 1/2, 1/2). In `images` each brick has two words: where its points begin from the
- * first word on, and its highest density. A medium with MEDIUM_BYTES in its name has 8 bits for each number. */
+ * All estimates are linear in the density, so a random point of the eight around stands for it, with its trilinear
+ * weight as its probability. In `materials` follow behind a medium's coefficients: the first word in `images`, the
+ * number of bricks along x, y and z, a matrix of three rows from the world to the lattice, and the upper corner of
+ * the box there; the lower corner is (1/2, 1/2, 1/2). In `images` each brick has two words: where its points begin,
+ * counted from the first word, and its highest density. A medium with MEDIUM_BYTES in its name has 8 bits for each
+ * number. */
 #include "generated/brick_cells.cl"
-#define GRID_ROULETTE 0.05f /* what passes below this is at stake */
-/* Collisions of one way through a grid. A density of 1 beside empty cells, under a large coefficient, makes as many
- * null collisions as a file likes. A way with more makes its sample infinite, which the film rejects and counts. */
+#define GRID_ROULETTE 0.05f /* transmittance below which Russian roulette begins */
+/* The most collisions of a ray in a grid. A density of 1 beside empty cells, under a large coefficient, makes as
+ * many null collisions as a file likes. A ray with more makes its sample infinite, which the film rejects and
+ * counts. */
 #define MOST_NULL_COLLISIONS 262144u
 
 /* A ray in the lattice, and the brick where it is. */
@@ -19,17 +21,17 @@ typedef struct {
     vec3 o, d, inverse;
     real t, end; /* [m] */
     integer first, nx, ny, nz, x, y, z;
-    integer packed; /* base-2 logarithm of how many numbers a word holds */
+    integer packed; /* base-2 logarithm of the numbers in a word */
 } GridWalk;
 
-/* The brick of a walk: where its points begin, its highest density, where the ray leaves it and along which axis. */
+/* A brick on the ray: its first point, its highest density, where the ray leaves it [m], and the axis along which. */
 typedef struct {
     integer points;
     real most, exit;
     mask across_x, across_y;
 } GridBrick;
 
-/* A number by which the random numbers of a ray are known. */
+/* The key of the random numbers of a ray. */
 inline natural grid_key(Scene scene, natural pixel_key, integer sample, integer vertex)
 {
     natural key = hash_natural(as_natural(sample) + 0x9e3779b9u * scene.settings->seed);
@@ -38,7 +40,7 @@ inline natural grid_key(Scene scene, natural pixel_key, integer sample, integer 
 
 #include "generated/grid_numbers.cl"
 
-/* Whether the ray from o along d, t metres long, is in the box; where it begins there. */
+/* Begins a walk where the ray from o along d, t metres long, enters the box; returns the rays that do. */
 inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask active, GridWalk *w)
 {
     integer at = sel_i(active, MEDIUM_ROW(name) + 2 * MEDIUM_SCATTERING, (integer)(0));
@@ -95,7 +97,7 @@ inline GridBrick grid_brick(Scene scene, GridWalk w, mask active)
     return b;
 }
 
-/* Goes to the next brick; returns the rays that are still in the box. */
+/* Goes to the next brick; returns the rays that stay in the box. */
 inline mask grid_next(GridWalk *w, GridBrick b, mask active)
 {
     mask across_z = !b.across_x & !b.across_y, inside = active & (b.exit < w->end);
@@ -109,7 +111,7 @@ inline mask grid_next(GridWalk *w, GridBrick b, mask active)
     return inside;
 }
 
-/* One of the points around that at t, which `bits` choose: its number in the brick. */
+/* The index in the brick of the point that `bits` choose around the ray's point at w.t. */
 inline integer grid_corner(GridWalk w, natural bits)
 {
     integer at = 0;
@@ -135,10 +137,10 @@ inline real brick_density(Scene scene, GridWalk w, GridBrick b, mask active, nat
 
 inline real grid_length(natural bits) { return -log_r(1.0f - unit_interval(bits)); }
 
-/* The colour at the point that `bits` choose, of those that word `at` of a medium's row tells; 1 where there are none.
- * In `images` each brick has a word, where its points begin from the first one on, and a point three: a colour, or the
- * coefficients of its curve. The word is below 0 where colours and density are trilinear each by itself: these bits
- * choose the density's point, and others that of the colour. Else it is their product that is trilinear. */
+/* The colour at the point that `bits` choose; 1 for a grid without colours. Word `at` of a medium's row is the first
+ * word of the colours in `images`: a word for each brick, where its points begin from there, and three words for a
+ * point, a colour or the coefficients of its curve. Where that word is negative, colours and density are trilinear
+ * each by itself: `bits` choose the density's point, and other bits the colour's. Else their product is trilinear. */
 inline Spectrum grid_tint(Scene scene, integer name, int at, GridWalk w, mask active, natural bits, Wavelengths lambdas)
 {
     integer first = gather_i(scene.materials, sel_i(active, MEDIUM_ROW(name) + at, (integer)(0)));
@@ -155,8 +157,8 @@ inline Spectrum grid_tint(Scene scene, integer name, int at, GridWalk w, mask ac
 
 #include "generated/grid_steps.cl"
 
-/* The medium at the point that `bits` choose, where its density is 1: albedo and extinction may have colours there.
- * These are at most 1, so that the highest density of a brick bounds the extinction at all wavelengths. */
+/* The coefficients at the point that `bits` choose, for a density of 1. Colours of albedo and extinction are at most
+ * 1, so the majorant of a brick holds at all wavelengths. */
 inline Medium grid_medium(Scene scene, integer name, Medium m, GridWalk w, mask active, natural bits,
                           Wavelengths lambdas)
 {
@@ -166,7 +168,7 @@ inline Medium grid_medium(Scene scene, integer name, Medium m, GridWalk w, mask 
     return m;
 }
 
-/* How much of the light passes t metres from o along d through the medium `name`: an estimate. */
+/* Transmittance of t metres from o along d through the medium `name`, estimated by ratio tracking. */
 inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, vec3 d, real t, natural key,
                                    mask active, Wavelengths lambdas)
 {

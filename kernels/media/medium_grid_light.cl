@@ -1,12 +1,13 @@
-/* What a medium on a grid emits: as much of a radiance as it absorbs of any (Kirchhoff). That is the medium's, times
- * numbers on the grid, or that of a black body whose temperature is on the grid. Both have points as the density, and
- * are trilinear between; as Planck's law is not linear all eight points around count.
+/* Emission of a medium on a grid: absorption times a radiance (Kirchhoff). The radiance is the medium's, times numbers
+ * on the grid, or that of a black body with its temperature on the grid. These grids have the density's points, and are
+ * trilinear between them; all eight points around count, because Planck's law is not linear.
  *
- * In `materials` there stand behind the row of a grid: the first word in `images` of a table with a word for each
- * brick, 0 where all is dark: 1 + the row of `lights` that it is, 0 if it emits nothing, -1 if it is no light; 0, 1 for
- * black bodies, or 2 where these are normalised; the first word in `images` of the grid's bricks, 0 for none; a
- * factor of black bodies; of these in RGB mode the first float of their colours in `distributions`, and how many there
- * are to a kelvin. */
+ * In `materials` six words follow the row of a grid. The first is where in `images` a table begins with a word for
+ * each brick, 0 without light; that word is 1 + the brick's row of `lights`, 0 for a dark brick, -1 for a brick that
+ * emits and is no light. The second is 1 for black bodies, 2 for normalised black bodies, else 0. The third is where
+ * in `images` the numbers' bricks begin, 0 without numbers. The fourth is the factor of black bodies. The last two
+ * serve black bodies in RGB mode: the first float of their colours in `distributions`, and the number of colours to
+ * a kelvin. */
 #define GRID_LIGHT (2 * MEDIUM_SCATTERING + 19) /* words from a medium's row */
 
 inline integer grid_brick_number(GridWalk w) { return (w.z * w.ny + w.y) * w.nx + w.x; }
@@ -20,7 +21,7 @@ inline integer grid_light_row(Scene scene, integer name, GridWalk w, mask active
     return sel_i(active, row, (integer)(0));
 }
 
-/* The number at the walk's point in bricks that begin at word `first` of `images`. */
+/* The trilinear number at the walk's point, in bricks that begin at word `first` of `images`. */
 inline real grid_number(Scene scene, GridWalk w, integer first, mask active)
 {
     integer at = sel_i(active, first + 2 * grid_brick_number(w), (integer)(0));
@@ -47,7 +48,7 @@ inline real grid_number(Scene scene, GridWalk w, integer first, mask active)
 
 #include "generated/grid_glow.cl"
 
-/* What a metre emits at the walk's point [W m^-3 sr^-1 nm^-1]: an estimate, by the density of one point around. */
+/* Emission at the walk's point [W m^-3 sr^-1 nm^-1], estimated by the density of a random point around. */
 inline Spectrum grid_emission(Scene scene, integer name, Medium m, GridWalk w, GridBrick b, mask active, natural bits,
                               Wavelengths lambdas)
 {
@@ -65,7 +66,7 @@ inline Spectrum grid_emission(Scene scene, integer name, Medium m, GridWalk w, G
     return light;
 }
 
-/* The point p of a brick, as a walk that stays there. */
+/* A walk that stays at the point p of a brick. */
 inline GridWalk grid_point(Scene scene, integer name, integer number, vec3 p, mask active)
 {
     integer at = sel_i(active, MEDIUM_ROW(name) + 2 * MEDIUM_SCATTERING, (integer)(0));

@@ -1,4 +1,4 @@
-/* The frame in which a point of a medium scatters: z points to where the ray comes from. */
+/* The shading frame of a point in a medium: z points against the ray. */
 typedef struct { Frame frame; } ShadingFrame;
 
 inline ShadingFrame shading_frame_load(Scene scene, integer row, Surface s, vec3 d, Wavelengths lambdas)

@@ -1,8 +1,8 @@
-/* The media around a vertex of a path among bodies that overlap. */
+/* The media around a vertex of a path among overlapping bodies. */
 typedef struct {
-    integer medium;      /* that the ray has come through */
-    integer inside;      /* that rays come into, to the back */
-    integer outside;     /* and to the front */
+    integer medium;      /* incident: the ray travelled in it */
+    integer inside;      /* interior: behind the surface */
+    integer outside;     /* exterior: before the surface */
     BodyBoundary bodies;
 } VertexMedia;
 

@@ -1,11 +1,13 @@
 /* The media around a vertex of a path. */
 typedef struct {
-    integer medium;  /* that the ray has come through */
-    integer inside;  /* what is behind the surface */
-    integer outside; /* and before it, where its shape says so, or the path remembers */
-    integer around;  /* what the path remembers: the medium around the body that it is in, if that absorbs by itself */
-    mask absorbs;    /* such a body is met here, which names no media */
+    integer medium;  /* incident: the ray travelled in it */
+    integer inside;  /* interior: behind the surface, 0 for none */
+    integer outside; /* exterior: named by the shape, else `around` for an absorbing dielectric, 0 for none */
+    integer around;  /* stored in the path: the medium around the absorbing dielectric that the path is in */
+    mask absorbs;    /* the surface is of an absorbing dielectric that names no media */
 } VertexMedia;
+
+/* Step. */
 
 inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask active, integer row, mask front)
 {
@@ -24,6 +26,9 @@ inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask 
     return m;
 }
 
-/* Twin, where there are no media. */
-typedef integer VertexMedia;
-#define vertex_media(scene, path, hit, at, active, row, front) ((integer)(0))
+/* Twin, for scenes without media. */
+inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask active, integer row, mask front)
+{
+    VertexMedia m = {0, 0, 0, 0, mask_of(0)};
+    return m;
+}

@@ -1,10 +1,10 @@
-/* Walks in media: the camera's paths go from collision to collision in a block, while most of its lanes have one. */
+/* Multiple scattering of camera paths: a block of lanes goes from collision to collision while most lanes collide. */
 
-/* How many collisions in media paths are taken through in a block at a time. */
+/* The most collisions of a block in a row. */
 #define WALK 16
 
-/* Whether a block of paths that wait for a kind of phase function takes a further step through the medium, the n-th:
- * while more than half of the lanes wait for it still. Others are put to rest, and *ended keeps their states. */
+/* Whether a block of paths takes the n-th step through the medium: more than half of its lanes must wait for this
+ * kind of phase function. The other lanes pause, and *ended keeps their states. */
 called int queue_walks(Slab path, Slab hit, int kind, int n, integer *ended, uint block)
 {
     union { integer all; int each[LANES]; } kinds;
@@ -16,14 +16,11 @@ called int queue_walks(Slab path, Slab hit, int kind, int n, integer *ended, uin
     for (uint i = 0; i < LANES; i++) count += kinds.each[i] == kind;
     return n < WALK && 2 * count > LANES;
 }
-/* Wakes those that were put to rest. */
-called void queue_walked(Slab path, integer ended, uint block)
-{
-    store_path_state(path, block, ended != 0, ended);
-}
+/* Resumes the lanes that paused. */
+called void queue_walked(Slab path, integer ended, uint block) { store_path_state(path, block, ended != 0, ended); }
 
-/* Takes those that wait for a phase function so. Their slots are sorted again behind it. starts: of each kind's queue;
- * block: the first of LANES slots for a block. */
+/* Takes all paths that wait for a phase function through the medium, then sorts their slots again. starts: of each
+ * kind's queue; block: the first of LANES slots for a block. */
 inline void bounce_walk(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uint *queue, uint *starts, uint first,
                         uint end)
 {
@@ -49,5 +46,6 @@ inline void bounce_walk(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uin
     queue_sort(path, hit, queue, starts, first, end);
 }
 
-/* Twin, where no path from the camera is in a medium. */
-#define bounce_walk(slabs, scene, loop, which, queue, starts, first, end)
+/* Twin, where no camera path is in a medium. */
+inline void bounce_walk(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uint *queue, uint *starts, uint first,
+                        uint end) {}

@@ -2,10 +2,13 @@
  * symmetric S change linearly between two keys, the rotation R by slerp (Shoemake 1985), see clpt/scene/motion.py.
  * The table begins in `distributions` at MOTION_ROW: where the shutter, the camera's track, the tracks of shapes by
  * their number and those of lamps by their row begin. A track has its number of steps, and MOTION_STEP floats each. */
-#include "generated/motion_sizes.cl"
 
 /* x, y, z: rows of the matrix from the world at that time to where things were lowered; t: the way back [m]. */
 typedef struct { vec3 x, y, z, t; } Motion;
+
+/* Step. */
+#include "generated/motion_sizes.cl"
+
 
 inline integer motion_word(Scene scene, integer at) { return as_integer(gather(scene.distributions, at)); }
 
@@ -87,7 +90,7 @@ inline real motion_length_back(Motion m, vec3 d)
 #endif
 }
 
-/* Of one of the scene's shapes, by its number. */
+/* Of a shape of the scene, by its number. */
 inline Motion motion_of_shape(Scene scene, integer number)
 {
     integer first = as_int(scene.distributions[MOTION_ROW + 2]);
@@ -107,4 +110,4 @@ inline InstanceRow motion_of_instance(Scene scene, InstanceRow i)
 }
 
 /* Twin, where nothing moves. */
-#define motion_time(scene, u) ((real)(0.0f))
+inline real motion_time(Scene scene, real u) { return (real)(0.0f); }

@@ -1,8 +1,8 @@
-/* Vertices that move by themselves: each has a row for every key, side by side, and moves linearly from one to the
- * next. The table of motion/motion.cl says at MOTION_ROW + 4 where for each shape the word of its steps is: how many,
- * and for each when it begins [s] and one over how long it takes; none where it does not deform. */
+/* Deforming vertices: each has a row for every key, side by side, and moves linearly between keys. Word MOTION_ROW +
+ * 4 of motion/motion.cl's table is where a table begins with the first word of each shape's steps. There lie the
+ * number of steps, then each step's begin [s] and inverse length [1/s]; a shape that does not deform has no steps. */
 typedef struct {
-    integer count, key, next; /* rows of a vertex; the one before the time; from it to the one after it */
+    integer count, key, next; /* rows of a vertex; the row before the time; the share of the next row */
     real share;               /* of the way between these */
 } VertexKeys;
 
@@ -28,8 +28,8 @@ inline vec3 vertex_keyed(global const float *table, integer vertex, VertexKeys k
     return madd3(gather3(table, at), 1.0f - k.share, scale3(gather3(table, at + 3 * k.next), k.share));
 }
 
-/* Where the point of a triangle with the barycentrics u, v of its vertices 1 and 2 is at a time, before what its
- * instance does; number: of the scene's shape. */
+/* The point of a triangle at a time, before its instance's transform. u, v: barycentrics of vertices 1 and 2;
+ * number: of the scene's shape. */
 inline vec3 vertex_point(Scene scene, integer number, integer prim, real u, real v, real time)
 {
     VertexKeys k = vertex_keys(scene, number, time);

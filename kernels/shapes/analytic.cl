@@ -7,7 +7,7 @@ inline void surface_analytic(Scene scene, ShapeRow shape, integer prim, mask act
 {
     mask analytic = active & (shape.kind != 0);
     if (any(analytic)) {
-        ShapeMotion motion = shape_motion(scene, shape);
+        Motion motion = shape_motion(scene, shape);
         vec3 rest = onto_of_shape(scene, shape, prim, shape_point_back(motion, end));
         s->p = sel3(analytic, shape_point(motion, rest), s->p);
         spheres_move(scene, shape, prim, analytic, motion, rest, s);
@@ -17,4 +17,4 @@ inline void surface_analytic(Scene scene, ShapeRow shape, integer prim, mask act
 }
 
 /* Twin, where all is made of triangles. */
-#define surface_analytic(scene, shape, prim, active, end, s)
+inline void surface_analytic(Scene scene, ShapeRow shape, integer prim, mask active, vec3 end, Surface *s) {}

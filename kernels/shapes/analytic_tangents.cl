@@ -1,5 +1,5 @@
 /* Directions along an analytic shape. */
-inline void analytic_tangents(Scene scene, ShapeRow shape, integer prim, mask analytic, ShapeMotion motion, vec3 rest,
+inline void analytic_tangents(Scene scene, ShapeRow shape, integer prim, mask analytic, Motion motion, vec3 rest,
                               Surface *s)
 {
     vec3 dpdu = dpdu_of_shape(scene, shape, prim, rest, s->uv), dpdv = dpdv_of_shape(scene, shape, prim, rest, s->uv);
@@ -10,4 +10,5 @@ inline void analytic_tangents(Scene scene, ShapeRow shape, integer prim, mask an
 }
 
 /* Twin, where nothing asks for directions along a surface. */
-#define analytic_tangents(scene, shape, prim, analytic, motion, rest, s)
+inline void analytic_tangents(Scene scene, ShapeRow shape, integer prim, mask analytic, Motion motion, vec3 rest,
+                              Surface *s) {}

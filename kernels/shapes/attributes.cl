@@ -25,6 +25,6 @@ inline void surface_attributes_move(Surface s, real u, real v, TexturePoint *t)
 }
 
 /* Twin, where no texture reads attributes. */
-#define surface_attributes(scene, shape, prim, active, s)
-#define surface_attributes_tell(s, t)
-#define surface_attributes_move(s, u, v, t)
+inline void surface_attributes(Scene scene, ShapeRow shape, integer prim, mask active, Surface *s) {}
+inline void surface_attributes_tell(Surface s, TexturePoint *t) {}
+inline void surface_attributes_move(Surface s, real u, real v, TexturePoint *t) {}

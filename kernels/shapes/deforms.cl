@@ -15,4 +15,5 @@ inline void surface_deforms(Scene scene, ShapeRow shape, HitSpace space, integer
 }
 
 /* Twin, where nothing deforms, or no layer tells how. */
-#define surface_deforms(scene, shape, space, prim, active, h, s)
+inline void surface_deforms(Scene scene, ShapeRow shape, HitSpace space, integer prim, mask active, TraceHit h,
+                            Surface *s) {}

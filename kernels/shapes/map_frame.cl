@@ -5,11 +5,7 @@ typedef struct {
     real side; /* 1 where y is at x's left there, -1 where uv are mirrored */
 } MapFrame;
 
-inline MapFrame map_frame_plain(void)
-{
-    MapFrame m = {(real)(1.0f), (real)(0.0f), (real)(1.0f)};
-    return m;
-}
+inline MapFrame map_frame_plain(void) { MapFrame m = {(real)(1.0f), (real)(0.0f), (real)(1.0f)}; return m; }
 
 /* Along the map's own u and v. second: these are a mesh's second set; to_uv: how the surface's u and v make up those of
  * the map, as coordinates of these: x and y of u, z and w of v. Tangents that a mesh tells hold as they are. */

@@ -23,4 +23,4 @@ inline void triangle_second_uv(Scene scene, ShapeRow shape, HitSpace space, Corn
 }
 
 /* Twin, where no map lies on a second set of uv. */
-#define triangle_second_uv(scene, shape, space, c, s)
+inline void triangle_second_uv(Scene scene, ShapeRow shape, HitSpace space, Corners c, Surface *s) {}

@@ -1,17 +1,20 @@
 /* How a shape has moved since it was lowered. */
-typedef Motion ShapeMotion;
-#define shape_motion(scene, shape) motion_of_shape(scene, (shape).number)
-#define shape_point(motion, p) motion_point(motion, p)
-#define shape_point_back(motion, p) motion_point_back(motion, p)
-#define shape_vector(motion, v) motion_vector(motion, v)
+inline Motion shape_motion(Scene scene, ShapeRow shape) { return motion_of_shape(scene, shape.number); }
+inline vec3 shape_point(Motion m, vec3 p) { return motion_point(m, p); }
+inline vec3 shape_point_back(Motion m, vec3 p) { return motion_point_back(m, p); }
+inline vec3 shape_vector(Motion m, vec3 v) { return motion_vector(m, v); }
 
 /* What the way to where the shape was lowered and back rounds, as a primitive's size [m]. */
-#define shape_motion_size(motion, rest) (4.0f * (size3((motion).t) + size3(shape_vector(motion, rest))))
+inline real shape_motion_size(Motion m, vec3 rest) { return 4.0f * (size3(m.t) + size3(shape_vector(m, rest))); }
 
 /* Twin, where shapes stand still. */
-typedef integer ShapeMotion;
-#define shape_motion(scene, shape) ((integer)(0))
-#define shape_point(motion, p) (p)
-#define shape_point_back(motion, p) (p)
-#define shape_vector(motion, v) (v)
-#define shape_motion_size(motion, rest) 0.0f
+inline Motion shape_motion(Scene scene, ShapeRow shape)
+{
+    vec3 zero = v3(0.0f, 0.0f, 0.0f);
+    Motion m = {zero, zero, zero, zero};
+    return m;
+}
+inline vec3 shape_point(Motion m, vec3 p) { return p; }
+inline vec3 shape_point_back(Motion m, vec3 p) { return p; }
+inline vec3 shape_vector(Motion m, vec3 v) { return v; }
+inline real shape_motion_size(Motion m, vec3 rest) { return (real)(0.0f); }

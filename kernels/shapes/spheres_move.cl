@@ -1,5 +1,5 @@
 /* Where a point of a sphere that moves by itself is when the shutter opens and closes, for the layer of motion. */
-inline void spheres_move(Scene scene, ShapeRow shape, integer prim, mask analytic, ShapeMotion motion, vec3 rest,
+inline void spheres_move(Scene scene, ShapeRow shape, integer prim, mask analytic, Motion motion, vec3 rest,
                          Surface *s)
 {
     mask spheres = analytic & ((shape.flags & SHAPE_MANY) != 0);
@@ -11,4 +11,5 @@ inline void spheres_move(Scene scene, ShapeRow shape, integer prim, mask analyti
 }
 
 /* Twin, where spheres do not move by themselves, or no layer tells how. */
-#define spheres_move(scene, shape, prim, analytic, motion, rest, s)
+inline void spheres_move(Scene scene, ShapeRow shape, integer prim, mask analytic, Motion motion, vec3 rest,
+                         Surface *s) {}

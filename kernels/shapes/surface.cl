@@ -30,7 +30,7 @@ inline Surface surface_load(Scene scene, Slab hit, uint at, mask active, vec3 o,
 {
     TraceHit h = {load_hit_t(hit, at), load_hit_u(hit, at), load_hit_v(hit, at), load_hit_n(hit, at),
                   load_hit_plane(hit, at), load_hit_side(hit, at), load_hit_prim(hit, at), load_hit_shape(hit, at)};
-    hit_space_load(h, hit, at);
+    hit_space_load(&h, hit, at);
     return surface_at(scene, h, active, o, d, front);
 }
 
@@ -64,7 +64,7 @@ inline vec3 surface_offset(Surface s, vec3 w)
 }
 
 /* How far along the unit vector `w` that is, where it does not graze the surface. */
-inline real surface_lead(Surface s, vec3 w)
+inline real surface_ray_offset(Surface s, vec3 w)
 {
     return rounding_step(s.p, s.size) / max_r(fabs(dot3(s.n, w)), (real)(0.01f));
 }

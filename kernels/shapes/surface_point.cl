@@ -23,30 +23,8 @@ typedef struct {
 /* A point of a medium, as a surface without extent: it has no normal. */
 inline Surface surface_of_point(vec3 p)
 {
-    Surface s;
-    s.p = p;
-    s.size = 0.0f;
-    s.n = v3(0.0f, 0.0f, 0.0f);
-    s.ns = s.n;
-    s.dpdu = s.n;
-    s.dpdv = s.n;
-    s.along = s.n;
-    s.beside = s.n;
-    s.along1 = s.n;
-    s.beside1 = s.n;
-    s.told = mask_of(0);
-    s.uv.x = 0.0f;
-    s.uv.y = 0.0f;
-    s.flipped = mask_of(0);
+    Surface s = {p}; /* all else is 0 */
     s.light = -1;
-    s.attributes = 0;
-    s.face = 0;
-    s.b = s.uv;
-    s.dbdu = s.uv;
-    s.dbdv = s.uv;
-    s.footprint = 0.0f;
-    s.to_open = s.n;
-    s.to_close = s.n;
     return s;
 }
 

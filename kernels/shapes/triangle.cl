@@ -12,4 +12,4 @@ inline void surface_triangle(Scene scene, ShapeRow shape, HitSpace space, intege
 }
 
 /* Twin, where nothing asks for more than the flat triangle. */
-#define surface_triangle(scene, shape, space, prim, active, s)
+inline void surface_triangle(Scene scene, ShapeRow shape, HitSpace space, integer prim, mask active, Surface *s) {}

@@ -11,4 +11,4 @@ inline void triangle_normal(Scene scene, HitSpace space, Corners *c, Surface *s)
 }
 
 /* Twin, in a scene whose meshes have no normals. */
-#define triangle_normal(scene, space, c, s)
+inline void triangle_normal(Scene scene, HitSpace space, Corners *c, Surface *s) {}

@@ -23,4 +23,4 @@ inline void triangle_tangents(Scene scene, ShapeRow shape, HitSpace space, Corne
 }
 
 /* Twin, where no mesh has tangents, or nothing asks for them. */
-#define triangle_tangents(scene, shape, space, c, s)
+inline void triangle_tangents(Scene scene, ShapeRow shape, HitSpace space, Corners c, Surface *s) {}

@@ -13,4 +13,4 @@ inline void triangle_uv(Scene scene, ShapeRow shape, HitSpace space, Corners c, 
 }
 
 /* Twin, where no mesh has uv. */
-#define triangle_uv(scene, shape, space, c, s)
+inline void triangle_uv(Scene scene, ShapeRow shape, HitSpace space, Corners c, Surface *s) {}

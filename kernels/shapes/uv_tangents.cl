@@ -38,4 +38,4 @@ inline void uv_tangents(Scene scene, HitSpace space, Corners c, mask mapped, vec
 }
 
 /* Twin, where nothing asks for directions along a surface. */
-#define uv_tangents(scene, space, c, mapped, ta, tb, tc, s)
+inline void uv_tangents(Scene scene, HitSpace space, Corners c, mask mapped, vec2 ta, vec2 tb, vec2 tc, Surface *s) {}

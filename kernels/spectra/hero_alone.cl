@@ -10,4 +10,4 @@ inline void hero_goes_alone(BsdfSample *s, Spectrum *ratio)
 }
 
 /* Twin, where directions hold for all wavelengths. */
-#define hero_goes_alone(s, ratio)
+inline void hero_goes_alone(BsdfSample *s, Spectrum *ratio) {}

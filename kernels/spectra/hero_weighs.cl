@@ -19,5 +19,5 @@ inline void hero_weighs(Bsdf m, vec3 wo, BsdfSample *s, Spectrum *ratio)
 }
 
 /* Twin, where densities of directions are those of all wavelengths. */
-#define hero_pdf(m, wo, wi, ratio) bsdf_pdf(m, wo, wi)
-#define hero_weighs(m, wo, s, ratio)
+inline real hero_pdf(Bsdf m, vec3 wo, vec3 wi, Spectrum ratio) { return bsdf_pdf(m, wo, wi); }
+inline void hero_weighs(Bsdf m, vec3 wo, BsdfSample *s, Spectrum *ratio) {}

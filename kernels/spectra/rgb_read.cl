@@ -54,10 +54,7 @@ inline Spectrum spectrum_packed_texel(global const uint *table, PackedTexel t, i
 }
 /* Light of a grey: as bright in all channels. */
 inline Spectrum spectrum_grey_light(Scene scene, real value, Wavelengths lambdas) { return spectrum_of(value); }
-inline Wavelengths wavelengths_sample(Scene scene, real u)
-{
-    return spectrum_of(0.0f);
-}
+inline Wavelengths wavelengths_sample(Scene scene, real u) { return spectrum_of(0.0f); }
 /* What a sample adds to a pixel: rgb. */
 inline vec3 film_value(Scene scene, Spectrum radiance, Wavelengths lambdas)
 {

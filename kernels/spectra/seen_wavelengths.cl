@@ -6,4 +6,4 @@ inline Wavelengths seen_wavelengths(Scene scene, Slab path, uint at, Wavelengths
 }
 
 /* Twin, where nothing fluoresces. */
-#define seen_wavelengths(scene, path, at, lambdas) (lambdas)
+inline Wavelengths seen_wavelengths(Scene scene, Slab path, uint at, Wavelengths lambdas) { return lambdas; }

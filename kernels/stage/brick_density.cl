@@ -1,6 +1,6 @@
 /* A density on the device becomes the bricks of kernels/media/medium_grid.cl, which has their form: here every brick
  * has points, whether it holds any density or not, so that nobody need know before. The numbers are to the bit those of
- * clpt.render.media.encode_grids.
+ * clpt.render.media.grids.
  *
  * values: (nx, ny, nz) from `begin` on, z fastest; what is negative or not finite counts as 0. Bricks lie x fastest,
  * `bricks_x` and `bricks_y` of them along these axes, from the word `first` of `images` on.

@@ -44,12 +44,12 @@ STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
 #endif
         photon.to_light = octahedral_pack(neg3(d));
         photon.normal = octahedral_pack(s.n);
-        photon.rival = photon_rival(load_path_rival(path, at), dot3(s.n, d));
+        photon.mis_ratio = photon_mis_ratio(load_path_mis_ratio(path, at), dot3(s.n, d));
 #if USES_ABSORPTION
         integer medium = sel_i(active, load_path_medium(path, at), (integer)(0));
-        real through = load_hit_t(hit, at) + sel(active, load_path_lead(path, at), (real)(0.0f));
+        real through = load_hit_t(hit, at) + sel(active, load_path_ray_offset(path, at), (real)(0.0f));
         Wavelengths lambdas = load_path_lambdas(path, at);
-        medium = MEDIUM_LEFT(medium);
+        medium = medium_left(medium);
         photon.power = spectrum_mul(photon.power, medium_transmittance(scene, medium, through, lambdas));
 #endif
         group = merging_group_of(scene, light_path_sampler(settings, pixel_index, sample));

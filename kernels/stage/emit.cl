@@ -25,6 +25,7 @@
 #include "generated/merging.cl"
 #include "generated/motion.cl"
 #include "generated/join_light.cl"
+#include "generated/light_path_endless.cl"
 #include "generated/emit_steps.cl"
 
 /* The ray with which a light path begins, and the wavelengths that it has; sets the scene's time. */
@@ -39,10 +40,10 @@ inline LightRay first_light_ray(Scene *scene, Sampler sampler, integer sample, W
                       sampler_pair(sampler, (natural)(DIMENSION_LENS)), *lambdas);
 }
 
-/* The rival of a light path that begins, see transport/rivals.cl. */
-inline real first_rival(Scene scene, LightRay r)
+/* The mis_ratio of a light path that begins, see transport/mis_ratio.cl. */
+inline real first_mis_ratio(Scene scene, LightRay r)
 {
-    return aimed_rival((real)(1.0f / scene.settings->light_paths), r);
+    return mis_ratio_aimed((real)(1.0f / scene.settings->light_paths), r);
 }
 
 /* Puts a ray from a light into the slots that `go` on, and, where the camera sees lights, one from it to the camera
@@ -72,14 +73,15 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     store_path_beta(path, at, go, r.power);
     store_path_weight(path, at, go, 1.0f / max_r(strength, (real)(1e-37f)));
     store_path_nulls(path, at, go, (integer)(0));
+    light_path_begins(path, at, go);
     store_path_null_distance(path, at, go, (real)(0.0f));
     store_path_medium(path, at, go, light_medium(scene, lit));
     store_path_bodies(path, at, go, light_bodies(scene, lit));
     store_path_around(path, at, go, (integer)(0));
-    store_path_lead(path, at, go, (real)(0.0f));
+    store_path_ray_offset(path, at, go, (real)(0.0f));
     store_path_ratio(path, at, go, spectrum_of(1.0f));
-    store_path_pending(path, at, go, (real)(0.0f));
-    store_path_rival(path, at, go, first_rival(scene, r));
+    store_path_merge_ratio(path, at, go, (real)(0.0f));
+    store_path_mis_ratio(path, at, go, first_mis_ratio(scene, r));
     light_kept(path, at, go, r);
     integer state = sel_i(alive, (integer)(PATH_ALIVE), (integer)(0));
     return state + light_joined(scene, shadow, at, ended, go, sampler, s, r, lambdas);
@@ -92,6 +94,7 @@ STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
     STAGE_AT
     PathEnd end = path_end(path, hit, at);
     if (path_end_of_half(end)) {
+        light_path_endless(path, at, end, counters);
         NextSample next = next_light_path(scene, path, at, BEGIN_PASSED, end);
         mask go = end.ended & !next.done;
         integer state = begin_light_path(scene, path, shadow, at, end.ended, go, next.pixel_index, next.sample);

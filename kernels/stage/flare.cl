@@ -49,12 +49,13 @@ inline integer begin_ghost(Scene scene, Slab path, Slab shadow, uint at, mask en
     Spectrum share;
     CameraPoint c = lens_ghost_land(scene, camera, f, d, other.y, lambdas, &share);
     mask away = ls.t >= FAR, shine = go & c.seen & (ls.pdf != 0.0f) & mask_of(settings->hide_lights == 0);
+    shine = shine & light_shows(scene, ls.row, mask_of(1));
     shine = shine & !(away & mask_of(settings->alpha != 0)); /* the film sees no sky */
     real w = c.importance * grows / sel(shine, fabs(ls.pdf), (real)(1.0f));
     Spectrum value = spectrum_scale(spectrum_mul(ls.radiance, spectrum_mul(camera_start(), share)), w);
-    store_shadow_through(shadow, at, shine, camera_through(settings));
+    store_shadow_through(shadow, at, shine, camera_through(scene));
 #if USES_ABSORPTION
-    value = medium_dims(scene, MEDIUM_LEFT((integer)(settings->camera_medium)), ls.t, lambdas, value);
+    value = medium_dims(scene, medium_left((integer)(settings->camera_medium)), ls.t, lambdas, value);
 #endif
     store_shadow_o(shadow, at, shine, front.o);
     store_shadow_d(shadow, at, shine, ls.wi);

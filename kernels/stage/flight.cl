@@ -16,7 +16,7 @@
 /* A ray through a medium, and the numbers of its flight. */
 typedef struct {
     vec3 o, d;
-    real end, lead; /* where the ray ends, and how far before its origin the medium begins [m] */
+    real end, ray_offset; /* where the ray ends, and how far before its origin the medium begins [m] */
     vec2 u;
     integer vertex;
 } FlightRay;
@@ -42,9 +42,10 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS FLIGHT_ARGS STAGE_AT_ARG)
         vec2 u = sampler_pair(sampler, as_natural(DIMENSION_FLIGHT + vertex));
         mask scatters = flies & (spectrum_max(m.sigma_s) > 0.0f);
         /* The medium begins at the surface, before the ray's origin, which lies off it. */
-        real lead = sel(flies, load_path_lead(path, at), (real)(0.0f));
-        vec3 d = load_path_d(path, at), o = madd3(d, -lead, load_path_o(path, at));
-        real sigma = spectrum_pick(m.sigma_t, ratio, u.y), end = sel(met, load_hit_t(hit, at) + lead, (real)(FAR));
+        real ray_offset = sel(flies, load_path_ray_offset(path, at), (real)(0.0f));
+        vec3 d = load_path_d(path, at), o = madd3(d, -ray_offset, load_path_o(path, at));
+        real sigma = spectrum_pick(m.sigma_t, ratio, u.y);
+        real end = sel(met, load_hit_t(hit, at) + ray_offset, (real)(FAR));
         FlightNear near = flight_near(scene, sampler, vertex, name, o, d, end, m, scatters, &u.x);
         FlightDye dye = flight_dye(name, m, end, scatters, &u.x);
         real t = -log_r(max_r(1.0f - u.x, (real)(1e-9f))) / max_r(sigma, (real)(1e-30f));
@@ -60,11 +61,11 @@ STAGE(flight)(SLAB_ARGS, SCENE_ARGS FLIGHT_ARGS STAGE_AT_ARG)
         pdf = spectrum_sel(scatters, pdf, spectrum_of(1.0f));
         Spectrum weight = flight_weight(path, at, flies, ratio, f, pdf);
         Spectrum light = flight_emission(scene, flies, name, m, end, lambdas);
-        FlightRay ray = {o, d, end, lead, u, vertex};
+        FlightRay ray = {o, d, end, ray_offset, u, vertex};
         flight_grids(scene, path, at, flies, name, ray, ratio, lambdas, &light, &weight, &collides, &t, &m);
         flight_light(scene, path, at, flies, state, light FLIGHT_PASSED);
         store_path_beta(path, at, flies, spectrum_mul(load_path_beta(path, at), weight));
-        store_hit_t(hit, at, collides, t - lead);
+        store_hit_t(hit, at, collides, t - ray_offset);
         store_hit_prim(hit, at, collides, (integer)(0));
         store_hit_material(hit, at, collides, m.phase);
     }

@@ -61,7 +61,7 @@ inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end,
 {
     Wavelengths lambdas = load_path_lambdas(path, at);
     Spectrum radiance = sky_gather(scene, path, at, end, lambdas, load_path_radiance(path, at));
-    sky_layers(scene, path, at, end, lambdas, light_layers);
+    sky_layers(scene, path, at, end, lambdas LIGHT_LAYER_PASSED);
     lambdas = seen_wavelengths(scene, path, at, lambdas);
     mask finished = end.ended & end.begun;
     real scale = exposure_weight(path, at) * scene.settings->film_scale;
@@ -100,14 +100,14 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_radiance(path, at, go, spectrum_of((real)(0.0f)));
     store_path_pdf(path, at, go, -b.ray.far);
     store_path_eta(path, at, go, (real)(1.0f));
-    store_path_rival(path, at, go, (real)(settings->light_paths));
+    store_path_mis_ratio(path, at, go, (real)(settings->light_paths));
     store_path_expected(path, at, go, (real)(0.0f));
-    store_path_pending(path, at, go, (real)(0.0f));
+    store_path_merge_ratio(path, at, go, (real)(0.0f));
     store_path_nulls(path, at, go, (integer)(0));
     store_path_null_distance(path, at, go, (real)(0.0f));
     store_path_medium(path, at, go, (integer)(settings->camera_medium));
     store_path_around(path, at, go, (integer)(0));
-    store_path_lead(path, at, go, (real)(0.0f));
+    store_path_ray_offset(path, at, go, (real)(0.0f));
     store_path_escape_width(path, at, go, (real)(0.0f));
     store_path_bodies(path, at, go, (integer)(settings->camera_bodies));
     store_path_ratio(path, at, go, camera_start());
@@ -124,9 +124,9 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         integer slot = LANE_INDEX + (int)at;
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);
         integer part = film_part(settings, sample);
-        mask scouted = scouts_ended(end), unseen = LAYERS_END(end, scouted) & (end.depth == 0);
-        layers_count(scene, path, at, layers, unseen);
-        layers_of_sky(scene, path, at, layers, unseen);
+        mask scouted = scouts_ended(end), unseen = layers_end(end, scouted) & (end.depth == 0);
+        layers_count(scene, path, at, unseen LAYER_PASSED);
+        layers_of_sky(scene, path, at, unseen LAYER_PASSED);
         mask begins = end.ended;
         end.ended = end.ended & !scouted;
         end.missed = end.missed & !scouted;

@@ -20,7 +20,7 @@ STAGE(shadow)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
         store_path_radiance(path, at, lit, shadow_adds(value, passes, load_path_radiance(path, at)));
 #if LIGHT_LAYERS
         integer surfaces = load_path_state(path, at) & PATH_DEPTH, row = load_path_light(path, at);
-        light_layers_add(scene, path, at, lit, surfaces, row, light, light_layers);
+        light_layers_add(scene, path, at, lit, surfaces, row, light LIGHT_LAYER_PASSED);
 #endif
     }
 }

@@ -1,14 +1,16 @@
-/* The cone around a path's ray, by whose width images choose among their levels (Akenine-Moller et al. 2019, "Texture
- * Level of Detail Strategies for Real-Time Ray Tracing"). It begins as wide as a pixel. A lobe that it is scattered by
+/* The cone around a path's ray, whose width chooses among the levels of images (Akenine-Moller et al. 2019, "Texture
+ * Level of Detail Strategies for Real-Time Ray Tracing"). It begins as wide as a pixel. Scattering
  * widens it, the more the lower the density of the sampled direction; a mirror keeps it, curved or not. A cone without
- * width asks for the images themselves: so have paths from lights. */
+ * width asks for the finest level: light paths have such a cone. */
 typedef struct {
     real width;  /* [m] */
     real spread; /* what it grows by, per metre */
 } Cone;
 
+/* Step. */
+
 #define CONE_SHARE 0.25f  /* of the width of a lobe: what differs within it is averaged by samples */
-#define CONE_WIDEST 0.4f  /* what a lobe adds at most, as a diffuse one does */
+#define CONE_WIDEST 0.4f  /* the most that a lobe adds, as a diffuse lobe does */
 #define CONE_UPPER ((int)0xffff0000) /* bits of a float that are kept */
 
 /* The word of Path.cone: 16 bits each, which keep 8 bits of the mantissa. */
@@ -27,7 +29,7 @@ inline Cone cone_after(integer word, real t)
     return c;
 }
 
-/* A camera's ray and one that begins a pixel's side farther, both along x and along y of the film. */
+/* A camera's ray, and the rays a pixel's side farther along x and along y of the film. */
 inline Cone cone_of_pixel(vec3 o, vec3 d, vec3 beside_o, vec3 beside_d)
 {
     vec3 from = sub3(beside_o, o), turned = sub3(beside_d, d);
@@ -52,6 +54,7 @@ inline real cone_footprint(Cone c, vec3 d, vec3 n, vec3 dpdu, vec3 dpdv)
 }
 
 /* Twin, where no image has levels to choose among. */
-typedef integer Cone;
-#define cone_after(word, t) (word)
-#define cone_footprint(c, d, n, dpdu, dpdv) ((real)(0.0f))
+inline integer cone_word(Cone c) { return (integer)(0); }
+inline integer cone_scattered(Cone c, real pdf, mask delta) { return (integer)(0); }
+inline Cone cone_after(integer word, real t) { Cone c = {(real)(0.0f), (real)(0.0f)}; return c; }
+inline real cone_footprint(Cone c, vec3 d, vec3 n, vec3 dpdu, vec3 dpdv) { return (real)(0.0f); }

@@ -1,4 +1,4 @@
-/* The word of Path.cone with which a path begins at the camera: of its ray, and one that begins a pixel farther. */
+/* The first Path.cone of a camera path, from its ray and a ray a pixel farther. */
 #include "textures/cone.cl"
 
 inline integer first_cone(Scene scene, CameraRay ray, vec2 position, vec2 lens, Wavelengths lambdas)

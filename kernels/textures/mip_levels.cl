@@ -1,12 +1,12 @@
-/* Levels of an image: itself, then copies of half the size each. Which one has texels as large as what is looked at
- * follows from the footprint (Williams 1983, "Pyramidal Parametrics"); between two levels is interpolated. */
+/* Levels of an image: itself, then copies of half the size each. The footprint tells the level with texels of its size
+ * (Williams 1983, "Pyramidal Parametrics"); values are interpolated between two levels. */
 typedef struct {
-    integer level; /* the finer one */
-    real coarser;  /* weight of the one after it; 0: that need not be there */
+    integer level; /* the finer level */
+    real coarser;  /* weight of the next level, which may be missing for 0 */
 } MipLevels;
 
-/* to_u, to_v: from uv to the image; texels: width times height. A uv that is made of the place, or a mesh's second one,
- * has no known footprint. */
+/* to_u, to_v: from uv to the image; texels: width times height. A uv by a mapping of points, or a mesh's second uv, has
+ * no known footprint. */
 inline MipLevels mip_levels(TexturePoint point, vec3 to_u, vec3 to_v, integer mapping, real texels, integer levels)
 {
     real density = sqrt(fabs(to_u.x * to_v.y - to_u.y * to_v.x) * texels);
@@ -17,7 +17,7 @@ inline MipLevels mip_levels(TexturePoint point, vec3 to_u, vec3 to_v, integer ma
     return found;
 }
 
-/* One of both, with its weight as its chance; u: uniform, and so again afterwards. */
+/* A random level of both, with its weight as its chance; u: uniform, and so again afterwards. */
 inline integer mip_random(MipLevels found, real *u)
 {
     mask next = *u < found.coarser;

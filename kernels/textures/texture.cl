@@ -8,11 +8,11 @@
  *
  *   Spectrum <kind>_texel      (<Kind> t, Scene scene, TexturePoint point, vec2 u, Wavelengths lambdas);
  *
- * one of these texels, each with its weight as its chance, so that the mean is the reflectance (Fajardo et al. 2023,
+ * a random texel, with its weight as its probability, so that the mean is the reflectance (Fajardo et al. 2023,
  * "Stochastic Texture Filtering"). It serves where light is linear in the value.
  *
- * The struct <Kind> is a Record in clpt/render/records/texture_rows.py whose rows lie in `textures`. What
- * combines others is no kind here but a program of them: textures/program.cl.
+ * The struct <Kind> is a Record in clpt/render/records/texture_rows.py whose rows lie in `textures`. A texture
+ * that combines others is a program: textures/program.cl.
  */
 
 /* A colour or spectrum that stands in `textures` in the five words that parameters have. */
@@ -54,8 +54,8 @@ inline real texture_vertex_number(Scene scene, TexturePoint point, integer numbe
 }
 #endif
 
-/* u, v and 1: of the surface, or of a point in a texture's space by one of the mappings that pbrt has, or a mesh's
- * second set. USES_MAPPINGS: some texture asks for one of these. */
+/* u, v and 1: of the surface, of a point in a texture's space by a mapping of pbrt's, or of a mesh's second set.
+ * USES_MAPPINGS: some texture has such a mapping. */
 inline vec3 texture_uv(Scene scene, integer mapping, integer transform, TexturePoint point)
 {
     vec3 uv = v3(point.uv.x, point.uv.y, (real)(1.0f));

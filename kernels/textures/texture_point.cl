@@ -44,7 +44,7 @@ inline TexturePoint texture_point(vec2 uv, vec3 p)
     t.footprint = 0.0f;
     return t;
 }
-/* For what is on no surface. */
+/* For values without a surface. */
 inline TexturePoint texture_point_nowhere(void)
 {
     vec2 uv = {0.0f, 0.0f};

@@ -1,4 +1,4 @@
-/* What shapes share that rays meet as they are, not as triangles. Lengths in metres. */
+/* Functions of analytic shapes. Lengths in metres. */
 #include "core/rounding.cl"
 #include "core/twofold.cl"
 

@@ -1,8 +1,8 @@
-/* Hits of shapes beside curves, such as a sphere that is a lamp. They are few: each is tested against all lanes. */
+/* Hits of few other shapes beside curves, such as a spherical lamp: each is tested against all lanes. */
 #include "generated/shape_tree.cl"
-#define CURVE_OTHERS scene.settings->single_count /* primitives below are no pieces */
+#define CURVE_OTHERS scene.settings->single_count /* primitives below are not curves */
 
-/* `hit` with the hits before t of the active lanes whose primitive is no piece. */
+/* Adds to `hit` the active lanes' hits before t of primitives that are not curves. */
 inline ShapeHit curve_others(Scene scene, integer prim, mask active, vec3 o, vec3 d, real t, ShapeHit hit)
 {
     TraceInteger prims = {prim}, left = {active & (prim < CURVE_OTHERS)};
@@ -21,5 +21,8 @@ inline ShapeHit curve_others(Scene scene, integer prim, mask active, vec3 o, vec
 }
 
 /* Twin, where there are none. */
-#define curve_others(scene, prim, active, o, d, t, hit) (hit)
+inline ShapeHit curve_others(Scene scene, integer prim, mask active, vec3 o, vec3 d, real t, ShapeHit hit)
+{
+    return hit;
+}
 #define CURVE_OTHERS 0

@@ -1,4 +1,4 @@
-/* Light of lamps that comes to where a sealed medium is left, see media/escape.cl. */
+/* Lamps' light along rays that leave a sealed medium, see media/escape.cl. */
 #include "generated/textures.cl"
 #include "generated/shapes.cl"
 #include "shapes/surface.cl"
@@ -7,10 +7,11 @@
 #include "materials/bsdf.cl"
 #include "generated/smooth_boundary.cl"
 
-#define escape_waits(t) ((t) > 2.0f * FAR) /* a ray in the shadow slab is of this kind */
+/* Whether a ray in the shadow slab is of this kind. */
+inline mask escape_waits(real t) { return t > 2.0f * FAR; }
 
-/* `passes`, or of the rays that are of this kind, what comes to o from lamps along d. The first surface must be a
- * smooth boundary from within, which bends the ray; what is then met shines or does not. */
+/* `passes`, or for rays of this kind the lamps' light to o along d. The first surface must be a smooth boundary from
+ * inside, which refracts the ray; the next surface may emit. */
 inline Spectrum escape_light(TRACE_ARGS, Scene scene, Slab path, uint at, vec3 o, vec3 d, real t, mask active,
                              Spectrum passes)
 {
@@ -24,7 +25,7 @@ inline Spectrum escape_light(TRACE_ARGS, Scene scene, Slab path, uint at, vec3 o
     out = out & !front & (MATERIAL_KIND(word) == SMOOTH_BOUNDARY);
     if (any(out)) {
         Wavelengths lambdas = load_path_lambdas(path, at);
-        integer medium = sel_i(out, load_path_medium(path, at), (integer)(0)); /* where the path still is */
+        integer medium = sel_i(out, load_path_medium(path, at), (integer)(0)); /* the path is still inside */
         Spectrum value = medium_transmittance(scene, medium, h.t, lambdas);
         integer row = sel_i(out, MATERIAL_ROW(word), (integer)(0));
         Dielectric m = dielectric_load(scene, row, surface_texture_point(s), lambdas);
@@ -48,5 +49,6 @@ inline Spectrum escape_light(TRACE_ARGS, Scene scene, Slab path, uint at, vec3 o
 }
 
 /* Twin, where no ray leaves a sealed medium toward a lamp. */
-#define escape_waits(t) mask_of(0)
-#define escape_light(trace, scene, path, at, o, d, t, active, passes) (passes)
+inline mask escape_waits(real t) { return mask_of(0); }
+inline Spectrum escape_light(TRACE_ARGS, Scene scene, Slab path, uint at, vec3 o, vec3 d, real t, mask active,
+                             Spectrum passes) { return passes; }

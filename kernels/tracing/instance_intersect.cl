@@ -1,11 +1,11 @@
-/* One ray and one instance: the ray is transformed into the group's space and goes through its tree by
- * LAYOUT(verb). Its direction keeps the length that it gets, so that t is the world's. */
+/* A ray and an instance: the ray is transformed into the group's space and traverses its tree by LAYOUT(verb). Its
+ * direction is not normalised, so that t is the world's. */
 #include "tracing/instances.cl"
 #include "generated/motion.cl"
 #include "generated/keyed_layout.cl"
 
-/* If the instance at row `at` is met between tmin and hit->t, 1 is returned and the hit becomes that one,
- * still in the group's space. With `first_only` the hit stays. */
+/* If the ray hits the instance at row `at` between tmin and hit->t, returns 1 and replaces the hit, in the group's
+ * space. With `first_only` the hit stays. */
 inline int instance_meet(global const float *nodes, global const float *leaves, Scene scene, uint at, vec3 o,
                          vec3 d, float tmin, TriHit *hit, int first_only)
 {

@@ -1,5 +1,5 @@
-/* From the space of a group to the world, by an InstanceRow, whose x, y and z are the rows of the inverse: of the
- * matrix from the world to the group. They are scaled first, so that neither tiny nor huge instances leave float. */
+/* Transforms from a group's space to the world by an InstanceRow; x, y and z are the rows of the inverse, the matrix
+ * from the world to the group. Rows are scaled first, so that tiny and huge instances stay in float's range. */
 #include "generated/motion.cl"
 
 typedef struct { vec3 x, y, z, origin; real scale; } InstanceFrame;
@@ -18,11 +18,8 @@ inline InstanceFrame instance_frame(Scene scene, mask placed, integer instance)
     return f;
 }
 
-/* A normal, by the inverse transpose: it stays on the side of the front. Its length is not kept. */
-inline vec3 instance_normal(InstanceFrame f, vec3 n)
-{
-    return madd3(f.x, n.x, madd3(f.y, n.y, scale3(f.z, n.z)));
-}
+/* A normal, by the inverse transpose, which keeps the front side but not the length. */
+inline vec3 instance_normal(InstanceFrame f, vec3 n) { return madd3(f.x, n.x, madd3(f.y, n.y, scale3(f.z, n.z))); }
 
 /* A vector, by the inverse (Cramer's rule). */
 inline vec3 instance_vector(InstanceFrame f, vec3 v)
@@ -32,7 +29,7 @@ inline vec3 instance_vector(InstanceFrame f, vec3 v)
     return scale3(sum, f.scale / dot3(f.x, yz));
 }
 
-/* About the greatest length that a vector of length 1 gets in the world. */
+/* About the greatest length of a transformed unit vector. */
 inline real instance_stretch(InstanceFrame f)
 {
     vec3 yz = cross3(f.y, f.z);

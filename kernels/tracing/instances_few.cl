@@ -1,8 +1,8 @@
-/* So few instances that each ray goes to all of them, by their rows. */
+/* Few instances without a tree: each ray tests all rows. */
 #include "tracing/instance_intersect.cl"
 
-/* The row of the nearest instance that is met between tmin and hit->t, with `first_only` of any, and the
- * hit as `instance_meet` leaves it; BVH_MISS if there is none. */
+/* The row of the nearest hit instance between tmin and hit->t, or of any with `first_only`, and the hit of
+ * `instance_meet`; BVH_MISS without a hit. */
 inline uint instances_trace(global const float *nodes, global const float *leaves,
                             global const float *instance_nodes, Scene scene, vec3 o, vec3 d, float tmin,
                             TriHit *hit, int first_only)

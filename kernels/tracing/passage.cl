@@ -1,4 +1,4 @@
-/* What share of light passes a surface: a number, or with FREE_PANES one for each wavelength. */
+/* The transmittance of a surface: a number or, with FREE_PANES, a number for each wavelength. */
 #if FREE_PANES
 #define Passage Spectrum
 #define passage_of(x) spectrum_of(x)

@@ -1,5 +1,5 @@
-/* The row in `shapes` of an analytic primitive. The first single_count ones have a row each; behind them
- * the rows are of many spheres, and say at which primitive theirs begin. */
+/* The row in `shapes` of an analytic primitive. The first single_count primitives have a row each; the next rows hold
+ * many spheres each, and the number of their first primitive. */
 inline int shape_row_of(Scene scene, int prim)
 {
     int low = scene.settings->first_analytic + min(prim, scene.settings->single_count);

@@ -1,7 +1,7 @@
-/* Tracing the rays of a work-item's lanes where there are curves, and few shapes but triangles beside them. Rays step
- * from node to node of the tree over pieces in turn, while what each needs next is fetched, until they come to a piece
- * that they do not pass beside. When all have come to one, or ended, these pieces are tested in lanes. Triangles are
- * met before, by one ray after another. The hits are those of tracing/trace_one.cl, to the bit. */
+/* Tracing a work-item's rays in scenes with curves, triangles and few other shapes. Rays step in turn from node to node
+ * of the tree over pieces, with prefetches, until each reaches a piece that it does not pass beside, or ends. Then
+ * these pieces are tested in lanes. Triangles are traced before, ray by ray. Hits equal the hits of
+ * tracing/trace_one.cl to the bit. */
 #include "tracing/trace.cl"
 #include "generated/layout.cl"
 #include "generated/trace_args.cl"
@@ -23,8 +23,8 @@ typedef struct {
 
 typedef struct { global const float *nodes; global const uint *indices; global const float *pieces; } CurveTree;
 
-/* The row in `shapes` of the first curves, and where in memory primitive 0 would be if it were a piece: pieces follow
- * each other, those of the next shape behind those of the one before. */
+/* The row in `shapes` of the first curves, and the address of primitive 0 if it were a piece: pieces are consecutive,
+ * shape by shape. */
 inline integer curve_row_first(Scene scene)
 {
     return (integer)((scene.settings->first_analytic + scene.settings->single_count) * SHAPE_ROW_WORDS);
@@ -51,7 +51,7 @@ inline void curve_ray_visit(CurveTree tree, CurveRay *r, uint at)
     }
 }
 
-/* Visit what waits next; return 0 at the end. */
+/* Pop the next node or leaf; return 0 at the end. */
 inline int curve_ray_next(CurveTree tree, CurveRay *r)
 {
     uint at;
@@ -60,7 +60,7 @@ inline int curve_ray_next(CurveTree tree, CurveRay *r)
     return 1;
 }
 
-/* Take one step; return 0 at the end. */
+/* Take a step; return 0 at the end. */
 inline int curve_ray_step(CurveTree tree, CurveRay *r)
 {
     if (r->at & BVH_LEAF) return curve_ray_next(tree, r);
@@ -71,14 +71,14 @@ inline int curve_ray_step(CurveTree tree, CurveRay *r)
     return 1;
 }
 
-/* Whether a ray is at a piece, or at another shape, that it may meet. */
+/* Whether a ray is at a piece or another shape that it may hit. */
 inline int curve_ray_waits(CurveTree tree, Scene scene, const CurveRay *r)
 {
     if (!(r->at & BVH_LEAF)) return 0;
     return r->piece < CURVE_OTHERS || !curve_beside(tree.pieces + CURVE_WORDS * r->piece, r->o, r->d);
 }
 
-/* Start the active rays that are finite; return how many they are. */
+/* Start the finite active rays; return their number. */
 inline uint curve_rays_start(const TraceRays *rays, CurveRay *states, mask active, uint *going)
 {
     uint begun[LANES], count = trace_active(active, begun), n = 0;
@@ -96,8 +96,8 @@ inline uint curve_rays_start(const TraceRays *rays, CurveRay *states, mask activ
     return n;
 }
 
-/* The nearest primitive that each active ray meets before *t, which becomes its distance, or with `first_only` any;
- * -1 if none. */
+/* The nearest primitive of each active ray before *t, or any with `first_only`; -1 without a hit. *t becomes its
+ * distance. */
 inline integer curves_trace(CurveTree tree, Scene scene, vec3 o, vec3 d, mask active, int first_only, real *t)
 {
     CurveRay states[LANES];

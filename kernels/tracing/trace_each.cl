@@ -1,4 +1,4 @@
-/* The rays of a work-item's lanes and where they end, to be traced one by one: `at[i]` is that of lane i. */
+/* The rays of a work-item's lanes and their ends, for sequential tracing: `at[i]` belongs to lane i. */
 typedef union { real v; float at[LANES]; } TraceReal;
 typedef union { integer v; int at[LANES]; } TraceInteger;
 typedef struct { TraceReal ox, oy, oz, dx, dy, dz, t; } TraceRays;
@@ -12,7 +12,7 @@ inline TraceRays trace_rays(vec3 o, vec3 d, real far)
     return r;
 }
 
-/* The lanes with a ray, in their order, and how many they are. */
+/* The lanes with a ray, in order, and their number. */
 inline uint trace_active(mask active, uint *rays)
 {
     TraceInteger is = {active};

@@ -1,4 +1,4 @@
-/* Where a ray ends, in lane types. */
+/* A ray's hit, in lane types. */
 typedef struct {
     real t, u, v;  /* FAR and beyond: nothing */
     vec3 n;        /* see Hit.n in clpt/records.py */

@@ -1,7 +1,7 @@
-/* What a ray that goes alone meets among instances, by `instances_trace` of a layout. */
+/* A single ray's hits of instances, by `instances_trace` of a layout. */
 #include "core/rounding.cl"
 
-/* The nearest hit, if there is one nearer than h: it becomes that one, in the world. */
+/* Replaces h by a nearer hit of an instance, in the world. */
 inline void instances_closest(global const float *nodes, global const float *leaves,
                               global const float *instance_nodes, Scene scene, vec3 o, vec3 d, TriHit tri,
                               TraceHit *h)
@@ -19,7 +19,7 @@ inline void instances_closest(global const float *nodes, global const float *lea
     vec3 own = v3(tri.nx, tri.ny, tri.nz), n = instance_normal(f, own);
     real size = triangle_size(tri.side, 1.0f / wide_length3(own));
     h->side = size * instance_stretch(f) + size3(sub3(madd3(d, tri.t, o), f.origin));
-    real length = h->side * h->side / wide_length3(n); /* as of a triangle that is not thin */
+    real length = h->side * h->side / wide_length3(n); /* like a triangle that is not thin */
     h->n = scale3(n, length);
     h->plane = tri.plane * f.scale * length + dot3(h->n, f.origin);
 }

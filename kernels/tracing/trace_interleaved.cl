@@ -1,12 +1,11 @@
-/* Tracing the rays of a work-item's lanes through the 8-wide tree, interleaved, for a tree of
- * nothing but triangles that is larger than a processor's caches. Where most rays have about the direction of the one
- * before, they are traced one after another: see bvh/query_interleaved.cl. */
+/* Interleaved tracing of a work-item's rays through the 8-wide tree, for trees of triangles larger than a processor's
+ * caches. Coherent rays are traced sequentially: see bvh/query_interleaved.cl. */
 #include "tracing/trace.cl"
 #include "bvh/wide8_interleaved.cl"
 #include "generated/trace_args.cl"
 #include "tracing/trace_each.cl"
 
-/* Whether three quarters of the rays have about the direction of the one before. */
+/* Whether three quarters of the rays have about their predecessor's direction. */
 inline int trace_alike(const TraceRays *r, const uint *rays, uint count)
 {
     uint alike = 0;

@@ -1,4 +1,4 @@
-/* Tracing one ray a work-item: triangles through LAYOUT(verb), analytic shapes through bvh/shapes.cl. */
+/* Tracing with a ray a work-item: triangles through LAYOUT(verb), analytic shapes through bvh/shapes.cl. */
 #include "tracing/trace.cl"
 #include "generated/layout.cl"
 #include "generated/trace_args.cl"

@@ -1,4 +1,4 @@
-/* The tree over analytic shapes, for traversals that go one ray a work-item. */
+/* The tree over analytic shapes, for tracing with a ray a work-item. */
 typedef Scene ShapeTable;
 inline int shape_intersect(Scene scene, uint prim, float3 from, float3 along, float tmin, float *t)
 {

@@ -1,5 +1,5 @@
-/* How much of the light between two points passes, 0 to 1, where some surfaces transmit a part of it as if nothing
- * were there: masks, and null boundaries. Each is met in turn, and its transmittance multiplied. */
+/* The transmittance between two points, 0 to 1, through surfaces that transmit a part of light unchanged: masks and
+ * null boundaries. Surfaces are traced in turn, and their transmittances multiplied. */
 #include "shapes/shape.cl"
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
@@ -24,8 +24,8 @@ inline Passage trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real
             own = passage_scale(own, (real)(surfaces < MOST_NULL_SURFACES ? 1.0f : 0.0f));
             transmittance = passage_sel(active, passage_mul(transmittance, own), transmittance);
             active = active & (passage_most(own) > 0.0f);
-            /* On along d: beside it, the ray would miss its end, and a round light would shade itself. */
-            real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_lead(s, d);
+            /* Continue exactly along d: off the line, the ray would miss its end and a sphere shade itself. */
+            real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_ray_offset(s, d);
             o = sel3(active, madd3(d, on, o), o);
             t = sel(active, t - on, t);
             surfaces++;

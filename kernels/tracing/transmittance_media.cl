@@ -1,6 +1,6 @@
-/* How much of the light between two points passes, where some surfaces transmit a part of it as if nothing were there,
- * and media dim it between them. Each surface is met in turn; it may be where one medium ends and another begins.
- * key: of the random numbers in media on grids; into: the medium where it must end, 0 for any. */
+/* The transmittance between two points through media, and through surfaces that transmit a part of light unchanged.
+ * Surfaces are traced in turn; each may be a boundary between media.
+ * key: of the random numbers in media on grids; into: the medium at the end, 0 for any. */
 #include "shapes/shape.cl"
 #include "generated/textures.cl"
 #include "generated/mixture.cl"
@@ -12,12 +12,12 @@
 
 #include "generated/way_steps.cl"
 
-/* What is left of light after `way` metres along d in a medium. */
+/* The transmittance of `way` metres along d in a medium. */
 inline Spectrum way_transmittance(Scene scene, integer medium, vec3 o, vec3 d, real way, natural key, mask active,
                                   Wavelengths lambdas)
 {
     Spectrum dims = medium_transmittance(scene, sel_i(active, medium, (integer)(0)), way, lambdas);
-    return grid_way(scene, medium, o, d, way, key, active, lambdas, dims);
+    return grid_shadow_transmittance(scene, medium, o, d, way, key, active, lambdas, dims);
 }
 
 inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, integer medium,
@@ -26,7 +26,7 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
     Spectrum passes = spectrum_sel(active, spectrum_of(1.0f), spectrum_of(0.0f));
     int surfaces = 0;
     integer bodies = medium;
-    medium = way_medium(scene, bodies, active, medium);
+    medium = shadow_medium(scene, bodies, active, medium);
     integer last = medium;
     while (any(active)) {
         TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, t, active);
@@ -43,13 +43,13 @@ inline Spectrum trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, rea
             integer word = sel_i(active, sel_i(front, shape.front, shape.back), (integer)(0));
             Passage own = null_transmittance(scene, word, surface_texture_point(s), lambdas, fabs(dot3(s.ns, d)));
             own = passage_scale(own, (real)(surfaces < MOST_NULL_SURFACES ? 1.0f : 0.0f));
-            own = way_passage(scene, row, &bodies, front, surfaces, own);
+            own = shadow_passage(scene, row, &bodies, front, surfaces, own);
             passes = spectrum_sel(active, passage_dims(passes, own), passes);
             active = active & (passage_most(own) > 0.0f);
-            medium = way_onward(scene, row, bodies, active, front, medium);
+            medium = shadow_medium_beyond(scene, row, bodies, active, front, medium);
             last = sel_i(active, medium, last);
-            /* On along d: beside it, the ray would miss its end, and a round light would shade itself. */
-            real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_lead(s, d);
+            /* Continue exactly along d: off the line, the ray would miss its end and a sphere shade itself. */
+            real on = h.t * (1.0f + SURFACE_ROUNDING) + surface_ray_offset(s, d);
             o = sel3(active, madd3(d, on, o), o);
             t = sel(active, t - on, t);
             surfaces++;

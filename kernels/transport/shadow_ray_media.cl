@@ -7,7 +7,7 @@ inline Spectrum shadow_ray_transmittance(TRACE_ARGS, Scene scene, Slab path, Sla
     vec3 o = load_shadow_o(shadow, at), d = load_shadow_d(shadow, at);
     store_shadow_t(shadow, at, active, (real)(-1.0f));
     integer medium = sel_i(active, load_shadow_through(shadow, at), (integer)(0));
-    natural key = grid_way_key(scene, path, at);
+    natural key = grid_shadow_key(scene, path, at);
     integer into = sel_i(active, load_shadow_into(shadow, at), (integer)(0));
     Wavelengths lambdas = load_path_lambdas(path, at);
     mask straight = active & !escape_waits(t);

@@ -1,15 +1,14 @@
-/* What integrators share at a vertex of a path: the ray that arrives, the surface that it meets, how the material
- * scatters there, and how the path goes on. The ray's throughput has been dimmed by what absorbs along it. */
+/* A vertex of a path: the incident ray (its throughput includes absorption), the surface, scattering, continuation. */
 #include "generated/cone.cl"
 #include "generated/vertex_media.cl"
 
 typedef struct {
-    vec3 o, d;            /* the ray that arrives; d of unit length */
-    real t;               /* and its length [m] */
+    vec3 o, d;            /* incident ray; d of unit length */
+    real t;               /* its length [m] */
     Wavelengths lambdas;
     Spectrum beta;        /* throughput, here */
     integer state, depth; /* see transport/path_state.cl */
-    integer met;          /* surfaces so far, with the null ones, which are no depth */
+    integer met;          /* number of surfaces, with null surfaces, which add no depth */
     Surface s;
     mask front;           /* the front was hit */
     integer row;          /* of the material */
@@ -30,15 +29,14 @@ typedef struct {
 
 #define VERTEX_COUNTS (!BSDF_IS_NULL && !BSDF_IS_PANE) /* it is a step of its path, whatever the lobe */
 
-/* The material at a vertex, and the random numbers of the vertex. */
 typedef struct {
     Sampler sampler;
     natural dimension;     /* the first of the vertex */
     vec2 choice;           /* chooses a light, and a lobe; 0 where there is nothing to choose */
-    Wavelengths lambdas;   /* by which light comes: others than the vertex's where it fluoresces */
+    Wavelengths lambdas;   /* of incident light: other than the vertex's at fluorescence */
     Bsdf bsdf;
     ShadingFrame shading;
-    vec3 wo;               /* to where the ray comes from, in shading.frame */
+    vec3 wo;               /* to the previous vertex, in shading.frame */
 } Scattering;
 
 inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active)
@@ -93,7 +91,6 @@ inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active
     return scatter;
 }
 
-/* Whether a collision is in a medium that no ray to a light leaves. */
 #if USES_LIGHTS && BSDF_IS_PHASE && SEALED_MEDIA
 #define BSDF_IS_SEALED 1
 #define vertex_sealed(v) (((v).media.medium & MEDIUM_SEALED) != 0)
@@ -102,14 +99,13 @@ inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active
 #define vertex_sealed(v) mask_of(0)
 #endif
 
-/* To which hemisphere the material sends light, or to the whole sphere, and with what gloss along `away`. */
+/* The hemisphere, or 0 for the sphere, of the material's scattered light, and its gloss along `away`. */
 inline Receiver vertex_receiver(Scene scene, Vertex v, Scattering scatter, vec3 away)
 {
     real sign = BSDF_TRANSMITS ? (real)(0.0f) : sel(scatter.wo.z < 0.0f, (real)(-1.0f), (real)(1.0f));
     return receiver_at(scene, v.row, scale3(scatter.shading.frame.n, sign), away);
 }
 
-/* Whether what leaves by such a lobe has met a null surface. */
 inline mask vertex_is_null(integer lobe)
 {
     return BSDF_IS_NULL ? mask_of(1) : BSDF_IS_PANE ? (lobe & LOBE_NULL) != 0 : mask_of(0);
@@ -122,11 +118,11 @@ inline mask vertex_continues(Scene scene, Vertex v, mask null)
     return BSDF_IS_NULL ? beyond : BSDF_IS_PANE ? sel_i(null, beyond, more) : more;
 }
 
-/* The `next` paths go on from here, along d; null: for which nothing has happened, as the surface is none. */
+/* Continues the `next` paths along d; null: paths that cross a null surface. */
 inline void vertex_leave(Slab path, uint at, mask next, mask null, Vertex v, vec3 d, Spectrum beta)
 {
     if (BSDF_IS_NULL || BSDF_IS_PANE) { /* the camera's ray has its end, and lights are weighed by what was before */
-        real pdf = load_path_pdf(path, at), onward = v.t + surface_lead(v.s, d);
+        real pdf = load_path_pdf(path, at), onward = v.t + surface_ray_offset(v.s, d);
         store_path_pdf(path, at, next & null & (v.depth == 0), pdf + onward);
         store_path_null_distance(path, at, next & null, load_path_null_distance(path, at) + onward);
     }
@@ -135,11 +131,11 @@ inline void vertex_leave(Slab path, uint at, mask next, mask null, Vertex v, vec
     store_path_beta(path, at, next, beta);
     store_path_medium(path, at, next, vertex_medium(v, d));
     store_path_around(path, at, next, vertex_around(v, d));
-    store_path_lead(path, at, next, surface_lead(v.s, d));
+    store_path_ray_offset(path, at, next, surface_ray_offset(v.s, d));
     store_path_bodies(path, at, next, vertex_through(v, d));
 }
 
-/* The `active` paths are a vertex longer, if it is not a null surface; those that do not go on are no longer alive. */
+/* Adds the vertex to the depth, unless it is a null surface; ends the paths outside of `next`. */
 inline void vertex_end(Slab path, uint at, mask active, mask next, mask null, integer state)
 {
     state = sel_i(next, state, state - (state & PATH_ALIVE));
@@ -153,5 +149,5 @@ inline void hide_light(Slab path, uint at, mask hidden, Vertex v) /* the camera'
     store_path_pdf(path, at, hidden, load_path_pdf(path, at) + v.t);
     store_path_null_distance(path, at, hidden, load_path_null_distance(path, at) + v.t);
     store_path_cone(path, at, hidden, cone_word(v.cone));
-    store_path_rival(path, at, hidden, (real)(0.0f)); /* the light is in the way of what light paths bring there */
+    store_path_mis_ratio(path, at, hidden, (real)(0.0f)); /* the light hides it from light paths */
 }

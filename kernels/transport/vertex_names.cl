@@ -26,4 +26,4 @@ inline void vertex_names(Scene scene, Slab hit, uint at, mask active, Vertex *v)
 }
 
 /* Twin, where no layer names what is seen. */
-#define vertex_names(scene, hit, at, active, v)
+inline void vertex_names(Scene scene, Slab hit, uint at, mask active, Vertex *v) {}

@@ -52,7 +52,7 @@ def test_a_crash_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_process_that_stops_early_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
     (figure,) = ended(monkeypatch, "raise SystemExit('no memory')")
-    assert figure.refused == "it died (status 1) after it began: no memory"
+    assert figure.refused == "it died (status 1) after its start: no memory"
 
 
 def test_a_process_that_hangs_is_a_row_and_killed(
@@ -67,7 +67,7 @@ def test_a_process_that_hangs_is_a_row_and_killed(
 
     monkeypatch.setattr(apart.subprocess, "Popen", noted)
     (figure,) = ended(monkeypatch, "time.sleep(3600)", limit=0.5)
-    assert figure.refused == "it hangs: nothing came for 0.5 s after it began"
+    assert figure.refused == "it hangs: nothing came for 0.5 s after its start"
     assert began[0].returncode is not None
 
 

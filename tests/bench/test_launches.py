@@ -81,7 +81,7 @@ def test_words_that_are_off_are_counted_and_named(flight: Flight, noted: dict[st
     comparison = launch.compare(found)
     assert comparison.wrong
     one = agreement.Checked(launch, comparison, agreement.members(flight, comparison))
-    assert one.told.endswith("% of what it writes is wrong (beta)")
+    assert one.problem.endswith("% of what it writes is wrong (beta)")
 
 
 @pytest.fixture

@@ -40,7 +40,7 @@ def scene() -> Scene:
 
 def test_scenes() -> None:
     with pytest.raises(UnknownKindError, match="atrium"):
-        benchmark.scenes.made("atrum")
+        benchmark.scenes.build_scene("atrum")
     with pytest.raises(SceneError):
         benchmark.opened("none.json")
     assert benchmark.opened("cornell").film.mode == "spectral"

@@ -54,6 +54,15 @@ def test_a_render_goes_on_with_more_samples(folder, capsys):
         assert file.parts[0].name() == "picture"
 
 
+@pytest.mark.parametrize("length", [244, 248, 255])
+def test_pictures_with_long_names_have_checkpoints(folder, length):
+    name = "x" * (length - 4) + ".npy"
+    for more in (), ("--checkpoint", "1h"), ("--spp", "5", "--resume"):
+        assert render("--spp", "3", *more, output=name) == 0
+    assert images.read(name).shape[:2] == (16, 24)
+    assert len([one for one in folder.iterdir() if ".resume.exr" in one.name]) == 2
+
+
 def test_what_differs_is_named_and_nothing_begins_anew(folder, capsys):
     assert render("--spp", "3", "--checkpoint", "1h") == 0
     before = (folder / "a.resume.exr").read_bytes()
@@ -139,7 +148,7 @@ def test_a_host_without_room_for_a_film(folder, monkeypatch, capsys):
     def full(self, **_):
         raise MemoryError
 
-    monkeypatch.setattr(Renderer, "_saved_film", full)
+    monkeypatch.setattr(Renderer, "saved_film", full)
     command = ["render", killing.SCENE, "-o", "a.npy", *COMMON[:-1], "--spp", "30"]
     assert run([*command, "--checkpoint", "0.001s"]) == 0
     error = capsys.readouterr().err

@@ -193,7 +193,7 @@ def test_a_worker_with_two_devices(more, two, expected, tmp_path):
             assert not renderer.run(10**6, lambda progress: next(stops, False))
             assert not renderer.refused
             renderer._hold()
-            held = renderer._saved_film(held=True).film
+            held = renderer.saved_film(held=True).film
             assert held.samples.max() == held.samples.min() >= before
     finally:
         two.end(third)

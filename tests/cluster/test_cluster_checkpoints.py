@@ -113,10 +113,10 @@ def test_gaps_are_filled(hub, folder, capsys):
         one.run(5)
         one.reset(first_sample=0)
         one.run(3)
-        first = one._saved_film()
+        first = one.saved_film()
         one.reset(first_sample=8)
         one.run(4)
-        film_file.write(Path(SAVED), first.merged(one._saved_film()))
+        film_file.write(Path(SAVED), first.merged(one.saved_film()))
     assert render("--spp", "20") == 2
     told = capsys.readouterr().err
     assert "samples 0 to 2, 8 to 11, not those from 0 on" in told and "--cluster local:1" in told
@@ -140,10 +140,10 @@ def test_what_a_stop_cuts_is_not_in_what_is_held(hub, folder):
 
         assert not renderer.run(10**6, stop)
         renderer._hold()
-        held, every = renderer._saved_film(held=True).film, renderer.film_state()
+        held, every = renderer.saved_film(held=True).film, renderer.film_state()
         assert every.samples.sum() >= held.samples.sum() == 32 * 24 * held.samples[0, 0]
         assert held.samples[0, 0] == sum(end - first for first, end in held.taken)
-        film_file.write(Path(SAVED), renderer._saved_film(held=True))
+        film_file.write(Path(SAVED), renderer.saved_film(held=True))
     with ClusterRenderer(box(), hub.client) as renderer:
         renderer.load_state(SAVED)
         last = held.taken[-1][1]

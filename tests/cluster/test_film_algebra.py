@@ -210,7 +210,7 @@ def whole(plan: Plan, wholes: dict[Plan, Whole], tmp_path: Path) -> Whole:
     if plan not in wholes:
         with clpt.Renderer(plan.scene, halves=plan.halves) as one:
             assert one.run(sum(plan.splits), noise=plan.noise)
-            films = one._saved_film(), pictures(one), one.film.get(), one.active
+            films = one.saved_film(), pictures(one), one.film.get(), one.active
             wholes[plan] = Whole(*films, files(one, tmp_path))
     return wholes[plan]
 
@@ -219,7 +219,7 @@ def pictures(source: Pictures) -> dict[str, np.ndarray]:
     """All pictures of a film, by name."""
     found = {"image": source.image(), "colours": source.colours(), **source.layers()}
     found["per pixel"] = source.samples_per_pixel()
-    if source._form.bands:
+    if source.form.bands:
         bands = source.spectral_image()
         found["bands"], found["centres"] = bands.values, np.array(bands.lambdas)
     try:
@@ -257,7 +257,7 @@ def check_film(found: clpt.FilmState, wanted: clpt.FilmState) -> None:
 
 def check(source: DevicePictures | SavedFilm, whole: Whole) -> None:
     """Check that a film, its pictures and its figures are those of one run."""
-    saved = source._saved_film()
+    saved = source.saved_film()
     check_film(saved.film, whole.saved.film)
     assert saved.form == whole.saved.form and saved.origin == whole.saved.origin
     check_arrays(pictures(source), whole.pictures)
@@ -342,7 +342,7 @@ def test_a_saved_film_is_gone_on_with(saving, loading, make, plan, whole, tmp_pa
     renderer._hold()
     little = plan.noise and 1e-4
     assert not renderer.run(10**6, lambda progress: False, noise=little)
-    film_file.write(path, renderer._saved_film(held=True))
+    film_file.write(path, renderer.saved_film(held=True))
     assert film_file.read(path).film.taken == ((0, first),)
     for who, samples, slots in ((loading, second, 128), (saving, third, 64)):
         renderer = make(who, slots=slots)
@@ -372,7 +372,7 @@ def test_noise_is_decided_as_by_one_device(maker, make, plan):
         renderer = make(who)
         for samples, noise in ((3, None), (60, NOISE), (1, None), (200, NOISE)):
             assert renderer.run(samples, noise=noise)
-        films.append(renderer._saved_film())
+        films.append(renderer.saved_film())
     check_film(films[1].film, films[0].film)
     assert len(np.unique(films[0].film.samples)) > 1
     assert films[1].counts["samples"] == films[0].counts["samples"]
@@ -384,7 +384,7 @@ def test_noise_is_decided_as_by_one_device(maker, make, plan):
 def test_a_film_that_does_not_fit_changes_nothing(maker, make, plan):
     renderer = make("device")
     assert renderer.run(SPLIT[0], noise=plan.noise)
-    saved = renderer._saved_film()
+    saved = renderer.saved_film()
     torn = {name: array for name, array in saved.adaptive.items() if name != "next"}
     narrow = dataclasses.replace(saved.film, words=saved.film.words[..., :-1])
     other = dataclasses.replace(saved.origin, kernels="0")
@@ -410,10 +410,10 @@ def test_a_stop_before_a_film_is_put_leaves_all_as_it_was(maker, make, plan, mon
     """Also the state of adaptive sampling, and where it is saved."""
     renderer = make("device")
     assert renderer.run(MOST, noise=plan.noise)
-    other = renderer._saved_film()
+    other = renderer.saved_film()
     renderer = make(maker)
     assert renderer.run(SPLIT[0], noise=plan.noise)
-    before = renderer._saved_film()
+    before = renderer.saved_film()
 
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
@@ -422,7 +422,7 @@ def test_a_stop_before_a_film_is_put_leaves_all_as_it_was(maker, make, plan, mon
         patched.setattr(type(renderer), "_put", stop)
         with pytest.raises(KeyboardInterrupt):
             renderer._restore(other)
-    after = renderer._saved_film()
+    after = renderer.saved_film()
     check_film(after.film, before.film)
     check_arrays(dict(after.adaptive), dict(before.adaptive))
     assert not np.array_equal(after.adaptive["next"], other.adaptive["next"])
@@ -437,8 +437,8 @@ def test_a_worker_s_renderer_keeps_no_choice_of_another_scene():
     job = tasks._Job(without, [dev.choose()], {})
     for scene in (with_ball, without):
         job.block(0, 1, None, lambda: True)
-        assert job.shows(scene)
-        assert job.renderer._form.weighed == (scene is with_ball)
+        assert job.try_scene(scene)
+        assert job.renderer.form.weighed == (scene is with_ball)
         made = tasks._Job(scene, [dev.choose()], {})
         blocks = [
             tasks.state_from_arrays(one.block(2, 4, None, lambda: True)) for one in (job, made)

@@ -285,7 +285,7 @@ def test_a_device_fails_after_a_film_was_loaded(scenes, tmp_path, pair, faults, 
         faults[pair[0].queue] = FailsAfter(0)
         several.run(95, noise=noise)
         assert same(several.film_state(), state) and len(several.devices) == 1
-        assert len(several._saved_film().sessions) == 2
+        assert len(several.saved_film().sessions) == 2
     other = with_film(scene, exposure=2.0)
     several = clpt.MultiRenderer(other, pair[1:])
     with several, pytest.raises(SceneError, match=r"film\.exposure"):
@@ -404,9 +404,9 @@ def test_films_are_held_on_their_devices(scene, pair, faults, monkeypatch, noise
             faults[queue] = FailsAfter(0)
         if when == "in a run" and noise is None:
             with pytest.raises(SceneError, match="had a part of the film"):
-                several._saved_film(held=True)
+                several.saved_film(held=True)
             return
-        saved = several._saved_film(held=True)
+        saved = several.saved_film(held=True)
         assert same(saved.film, state) and saved.counts["samples"] >= state.samples.sum()
-        assert several._saved_film(held=True) is saved
+        assert several.saved_film(held=True) is saved
         assert len(several.devices) == (2 if when == "never" or noise else 1)

@@ -199,11 +199,11 @@ def test_python_goes_on_while_a_binary_is_made(opened: dev.Device) -> None:
 def test_what_another_process_makes_is_waited_for(opened: dev.Device, tmp_path) -> None:
     """The second process compiles nothing: it finds what the first has made."""
     made = []
-    with disk_cache.alone("entry"):
-        assert disk_cache.is_being_made("entry")
+    with disk_cache.exclusive("entry"):
+        assert disk_cache.is_being_built("entry")
 
         def second() -> None:
-            with disk_cache.alone("entry"):
+            with disk_cache.exclusive("entry"):
                 made.append(disk_cache.load("entry"))
 
         thread = threading.Thread(target=second)
@@ -212,4 +212,4 @@ def test_what_another_process_makes_is_waited_for(opened: dev.Device, tmp_path) 
         assert not made
     thread.join(60)
     assert made == [("{}", b"binary")]
-    assert not disk_cache.is_being_made("entry") and not [*(tmp_path / "locks").iterdir()]
+    assert not disk_cache.is_being_built("entry") and not [*(tmp_path / "locks").iterdir()]

@@ -23,7 +23,7 @@ needs_clang = pytest.mark.skipif(CLANG is None, reason="clang is not installed")
 
 
 def check(given: Iterable[str]) -> None:
-    found = errors([declarations.declared() + text for text in given], functions=OURS)
+    found = errors([declarations.declarations() + text for text in given], functions=OURS)
     assert found
     for error in found:
         assert not error, error[:3000]
@@ -83,6 +83,6 @@ def test_what_is_not_declared_is_tried_with_the_header(value: str, tries: int) -
 
 
 def test_no_macro_is_left() -> None:
-    text = declarations.declared()
+    text = declarations.declarations()
     left = {line.split()[1].partition("(")[0] for line in text.splitlines() if "#define" in line}
     assert left == {line.split()[1] for line in text.splitlines() if "#undef" in line}

@@ -260,7 +260,7 @@ def test_few_registers_are_tried_where_a_driver_tells(
         limits[program.int_ptr] = limit
         return program
 
-    def said(program, _device):
+    def log_of(program, _device):
         limit = limits[program.int_ptr]
         if limit in cached:
             return ""
@@ -270,7 +270,7 @@ def test_few_registers_are_tried_where_a_driver_tells(
 
     native = native_programs.build
     monkeypatch.setattr(native_programs, "build", made)
-    monkeypatch.setattr(native_programs, "said", said)
+    monkeypatch.setattr(native_programs, "log_of", log_of)
     limited = dataclasses.replace(source(), registers=(96, 128, 160))
     assert building._natively(device, limited, []) and not limits.popitem()[1]
     monkeypatch.setattr(context.DeviceInfo, "limits_registers", True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 
 import pytest
 
@@ -82,3 +83,15 @@ def test_an_unwritable_cache_is_a_warning(wheel, monkeypatch, tmp_path, caplog):
     monkeypatch.setattr(runtimes.disk_cache, "folder", lambda: tmp_path / "file")
     assert not announce()
     assert "cannot be made known" in caplog.text
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such limit")
+def test_a_limit_of_address_space_is_told(monkeypatch):
+    """Drivers are not loaded below it, as if there were none."""
+    import resource
+
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (400 << 20, resource.RLIM_INFINITY))
+    assert "400 MiB of address space (ulimit -v)" in runtimes.advice()
+    unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+    monkeypatch.setattr(resource, "getrlimit", lambda _: unlimited)
+    assert runtimes.advice() == runtimes.ADVICE

@@ -29,7 +29,7 @@ def test_each_file_once_even_in_a_circle():
 def test_lines_are_counted_past_an_include():
     virtual = {"a": 'one\n#include "b"\nthree\n#include "b"\nfive', "b": "x\ny"}
     source = assemble("a", virtual, {"one": 1})
-    places = {text: source.place(row) for row, text in enumerate(source.text.splitlines(), 1)}
+    places = {text: source.location(row) for row, text in enumerate(source.text.splitlines(), 1)}
     assert places["y"] == ("b", 2)
     assert places["three"] == ("a", 3)
     assert places["five"] == ("a", 5)
@@ -49,7 +49,7 @@ def test_a_comment_at_a_files_head_stands_in_front_of_what_is_left_of_it():
     source = assemble("a", {**virtual, "c": "int c;"})
     lines = ["/* A. */", '#line 1 "c"', "int c;", '#line 4 "b"', "/* B. */", "int x;"]
     assert source.text.splitlines() == ['#line 1 "a"', *lines, '#line 5 "a"', "int x;"]
-    assert source.place(7) == ("b", 5)
+    assert source.location(7) == ("b", 5)
     assert source.files == ("a", "c", "b")
 
 
@@ -175,7 +175,7 @@ def test_a_file_has_two_halves() -> None:
     text = (kernels_folder() / "spectra/hero_alone.cl").read_text("utf-8").splitlines()
     rows = twin.text.splitlines()
     at = next(i for i, row in enumerate(rows) if "hero_goes_alone" in row)
-    file, line = twin.place(at + 1)
+    file, line = twin.location(at + 1)
     assert file == "spectra/hero_alone.cl" and line is not None and text[line - 1] == rows[at]
     with pytest.raises(KernelBuildError, match="no file"):
         assemble("a", {"a": '#include "core/lanes.cl#none"'})

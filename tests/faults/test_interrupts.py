@@ -106,7 +106,7 @@ def test_a_hold_that_was_stopped_holds_nothing(trial: Trial) -> None:
     with raising_at(lines[0] - 3), pytest.raises(Injected):
         renderer._hold()
     with pytest.raises(clpt.SceneError, match="no film is held"):
-        renderer._saved_film(held=True)
+        renderer.saved_film(held=True)
 
 
 def test_a_handler_cancels_whatever_it_interrupts(trial: Trial) -> None:

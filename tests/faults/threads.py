@@ -49,7 +49,7 @@ def calls(renderer: clpt.Renderer, rng: random.Random, folder: Path) -> list[Cal
         lambda: renderer.resolve().get(),
         lambda: (renderer.counts, renderer.samples, renderer.active, renderer.first_sample),
         lambda: renderer._hold(),
-        lambda: renderer._saved_film(held=True),
+        lambda: renderer.saved_film(held=True),
         lambda: renderer.save_state(path),
         lambda: renderer.prepare(),
         lambda: renderer.samples_per_pixel(),

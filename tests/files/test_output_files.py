@@ -467,3 +467,18 @@ except clpt.SceneError as error: print(error)
     done = subprocess.run([sys.executable, "-c", code], env=own, capture_output=True, text=True)
     assert done.stdout.strip() == "b.png: its folder does not exist", done.stderr
     assert (tmp_path / "a.png").exists()
+
+
+@pytest.mark.parametrize("letter", ["x", "\u00e9", "\U0001f600"])
+def test_names_beside_long_ones_are_cut_and_stay_apart(tmp_path: Path, letter):
+    """Those of up to 255 bytes are as they were; of longer ones no two are the same."""
+    size = len(letter.encode())
+    short = tmp_path / (letter * (240 // size) + ".png")
+    assert output_files.beside(short, ".a.exr").name == short.stem + ".a.exr"
+    names = set()
+    for count in range(244 // size, 251 // size + 1):
+        made = output_files.beside(tmp_path / (letter * count + ".png"), ".resume.exr", 253)
+        made.touch()
+        assert made.name.endswith(".resume.exr") and len(made.name.encode()) <= 253
+        names.add(made.name)
+    assert len(names) == 251 // size - 244 // size + 1

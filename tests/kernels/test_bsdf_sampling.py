@@ -48,6 +48,7 @@ def test_lobes_are_told_truly(cls, mode):
     for i, params in enumerate(settings(cls, mode, rng, SETTINGS)):
         checks.lobes_are_told_truly(probe, params, rng, hero_alone=2 * i >= SETTINGS)
         checks.flags_are_told_truly(probe, params, rng)
+        checks.tangents_are_declared(probe, params, rng)
 
 
 @rotating("cls, mode, lanes", LEAVES, MODES, [1, 8], turn=other_mode_and_lanes)

@@ -9,7 +9,7 @@ import pytest
 
 from clpt import spectra, transforms
 from clpt.errors import SceneError
-from clpt.render.camera.encode import lower_camera
+from clpt.render.camera.encode import encode_camera
 from clpt.render.flow import stages
 from clpt.render.records import CameraFeatures
 from clpt.render.records import camera_rows as camera_records
@@ -34,7 +34,7 @@ def _text(kind: str) -> dict[str, str]:
 
 def rays(camera, width, height, film, lens=None, lanes=8, index=None):
     """Origins and directions (n, 3) at film positions (n, 2); index: of a lens's glass."""
-    kind, words = lower_camera(camera, width, height)
+    kind, words = camera.kind, encode_camera(camera, width, height)
     call = f"{kind}_ray(camera, film, lens)"
     if kind in camera_records.WEIGHTED:
         call = f"{kind}_ray(scene, camera, film, lens, lambdas, &weight)"
@@ -268,4 +268,4 @@ SINGULAR = np.diag([1.0, 0.0, 1.0, 1.0])
 )
 def test_unusable_cameras(camera, part):
     with pytest.raises(SceneError, match=part.replace(".", r"\.")):
-        lower_camera(camera, 4, 4)
+        encode_camera(camera, 4, 4)

@@ -20,7 +20,7 @@ from tests.kernels.scene_harness import SceneProbe
 
 TIMES = (0.0, 0.3, 1.0)
 COUNT = 4096
-NONE = "vec3 none = v3((real)(0.0f), (real)(0.0f), (real)(0.0f));"
+NONE = "Receiver none = {v3((real)(0.0f), (real)(0.0f), (real)(0.0f))};"
 SAMPLE = f"""
     scene.time = x[0];
     vec2 u = {{x[2], x[3]}}, v = {{x[4], x[5]}};

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from clpt.errors import SceneError
-from clpt.render.film import encode_filters as filters
-from clpt.render.film.filters import radius, value
+from clpt.render.film import filters
 from clpt.scene import integrators as scene
 from clpt.scene.params import params
 from tests.kernels.scene_harness import SceneProbe
@@ -47,7 +46,7 @@ def sampled(chosen, u, lanes=8, fast=True):
         files=("film/filter.cl",),
         lanes=lanes,
         defines=defines,
-        tables={"distributions": filters.table(chosen)},
+        tables={"distributions": filters.sampling_table(chosen)},
     )
     out = probe(*u.T)
     return out[:2].T, out[2]
@@ -58,14 +57,18 @@ def test_samples_follow_the_filter(chosen):
     """Along either axis, the weighted share of samples up to x is the filter's integral up to x."""
     n = 20 * filters.CELLS
     even, half = (np.arange(n) + 0.5) / n, np.full(n, 0.5)
-    end = radius(chosen)
+    end = chosen.half_width
     edges = np.linspace(-end, end, 4001)
-    integral = np.concatenate([[0], np.cumsum(value(chosen, (edges[1:] + edges[:-1]) / 2))])
+    integral = np.concatenate([[0], np.cumsum(chosen.value((edges[1:] + edges[:-1]) / 2))])
     for axis, u in enumerate((np.column_stack([even, half]), np.column_stack([half, even]))):
         offsets, weights = sampled(chosen, u)
         along = offsets[:, axis]
         assert (np.diff(along) >= 0).all(), "samples must keep the order of their numbers"
-        across = weights[0] if chosen.kind == "box" else filters.table(chosen)[2 + filters.CELLS]
+        across = (
+            weights[0]
+            if chosen.kind == "box"
+            else filters.sampling_table(chosen)[2 + filters.CELLS]
+        )
         cdf = np.concatenate([[0], np.cumsum(weights / across, dtype=np.float64)]) / n
         assert cdf[-1] == pytest.approx(1.0, abs=2e-6)
         wanted = np.interp(along, edges, integral / integral[-1])
@@ -77,7 +80,7 @@ def test_samples_stay_inside(chosen):
     ends = np.float32([0.0, 0.25, 0.5, np.nextafter(np.float32(1), np.float32(0))])
     u = np.stack(np.meshgrid(ends, ends), axis=-1).reshape(-1, 2)
     offsets, weights = sampled(chosen, u)
-    assert np.abs(offsets).max() <= np.float32(radius(chosen))
+    assert np.abs(offsets).max() <= np.float32(chosen.half_width)
     assert np.isfinite(weights).all()
 
 
@@ -131,10 +134,10 @@ def test_same_functions_as_mitsuba(chosen):
     if chosen.kind != "tent":
         given.pop("radius")
     theirs = mi.load_dict({"type": chosen.kind, **given})
-    x = np.linspace(0.0, 0.999 * radius(chosen), 57)
+    x = np.linspace(0.0, 0.999 * chosen.half_width, 57)
     values = np.array([theirs.eval(float(v)) for v in x])
-    assert theirs.radius() == pytest.approx(radius(chosen))
-    ours = value(chosen, x)
+    assert theirs.radius() == pytest.approx(chosen.half_width)
+    ours = chosen.value(x)
     scale = values[0] / ours[0]  # only the shape matters
     within = 7e-4 if chosen.kind == "gaussian" else 2e-6  # theirs is a polynomial
     np.testing.assert_allclose(ours * scale, values, atol=within * abs(values[0]))
@@ -143,7 +146,7 @@ def test_same_functions_as_mitsuba(chosen):
 @pytest.mark.parametrize("chosen", [scene.Mitchell(b=1e9), scene.Mitchell(b=1e38)])
 def test_filters_without_an_integral(chosen):
     with pytest.raises(SceneError, match="integral"):
-        filters.table(chosen)
+        filters.sampling_table(chosen)
 
 
 def test_filter_comes_first():
@@ -152,4 +155,4 @@ def test_filter_comes_first():
             return 7
 
     with pytest.raises(SceneError, match="first"):
-        filters.lower_filter(scene.Box(), Full(), False)
+        filters.encode_filter(scene.Box(), Full(), False)

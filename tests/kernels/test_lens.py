@@ -10,9 +10,7 @@ from clpt.errors import SceneError
 from clpt.lenses import Prescription, Surface
 from clpt.lenses.coatings import quarter_wave
 from clpt.lenses.tracing import Rays, trace
-from clpt.render.camera.encode import lower_camera
-from clpt.render.camera.encode_lens import ghost_pairs
-from clpt.render.camera.lens import glasses
+from clpt.render.camera.encode import encode_camera, ghost_pairs
 from clpt.render.flow import stages
 from clpt.render.records import CameraFeatures
 from clpt.scene.cameras import Lens
@@ -33,8 +31,8 @@ GRID = np.linspace(360.0, 830.0, 471)
 
 def probe(camera: Lens, lanes: int = 8, ghosts: bool = False) -> SceneProbe:
     """The lens as a function of film x and y, two random numbers and a wavelength [nm]."""
-    rows = glasses(camera)
-    _, words = lower_camera(camera, WIDTH, HEIGHT, range(len(rows)))
+    rows = camera.dispersive_glasses
+    words = encode_camera(camera, WIDTH, HEIGHT, range(len(rows)))
     table = np.concatenate([np.zeros(1), *(glass.sample(GRID) for glass in rows)])[bool(rows) :]
     features = CameraFeatures("lens", disperses=bool(rows), losses=camera.reflects)
     return SceneProbe(
@@ -192,4 +190,4 @@ def test_energy_of_ghosts():
 )
 def test_unusable_lenses(given, message):
     with pytest.raises(SceneError, match=message):
-        lower_camera(Lens(**given), 4, 4)
+        encode_camera(Lens(**given), 4, 4)

@@ -14,7 +14,7 @@ from clpt import transforms as T
 from clpt.records import LIGHT
 from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights import tree as light_tree
-from clpt.render.lights.lobes import Lobes
+from clpt.render.lights.tree_nodes import Lobes
 from clpt.render.records import light_rows as light_records
 from clpt.render.records.light_rows import LINE, WIDTH
 from clpt.scene.lights import Area, Constant, Directional, Goniometric, Point, Projector, Spot
@@ -25,17 +25,19 @@ from tests.kernels.light_probe import Lit, lit
 DEEPEST = 16  # groups on the way to a light: two bits each of a trail
 SIGMAS = 4.5  # of the Monte Carlo estimates: a chance of 7e-6 each
 PMF = """
-    r[0] = light_tree_pmf(scene, to_integer(x[0]), v3(x[1], x[2], x[3]), v3(x[4], x[5], x[6]));
+    Receiver side = {v3(x[4], x[5], x[6])};
+    r[0] = light_tree_pmf(scene, to_integer(x[0]), v3(x[1], x[2], x[3]), side);
 """
 PICK = """
     real u = x[3], pmf;
-    vec3 side = v3(x[5], x[6], x[7]);
+    Receiver side = {v3(x[5], x[6], x[7])};
     r[0] = to_real(light_tree_pick(scene, v3(x[0], x[1], x[2]), side, &u, x[4], &pmf));
     r[1] = pmf;
     r[2] = u;
 """
 INFINITE = """
-    vec3 side = v3(x[3], x[4], x[5]), d = v3(x[6], x[7], x[8]);
+    Receiver side = {v3(x[3], x[4], x[5])};
+    vec3 d = v3(x[6], x[7], x[8]);
     Spectrum le;
     infinite_light(scene, 0, v3(x[0], x[1], x[2]), side, d, lambdas, &le, &r[0]);
 """
@@ -57,7 +59,7 @@ SLACK, DARK = 1e-3, 1e-5
 SPREAD, MOST = 0.1, 0.95  # RECEIVER_SPREAD and RECEIVER_MOST
 SAMPLE = """
     vec2 u = {x[4], x[5]};
-    vec3 side = v3(x[6], x[7], x[8]);
+    Receiver side = {v3(x[6], x[7], x[8])};
     LightSample s = light_sample(scene, v3(x[0], x[1], x[2]), side, x[3], u, lambdas);
     r[0] = s.wi.x; r[1] = s.wi.y; r[2] = s.wi.z; r[3] = s.pdf; r[4] = s.radiance.y;
 """

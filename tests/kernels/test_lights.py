@@ -42,7 +42,7 @@ NAMES = {"rgb": "xyz", "spectral": "xyzw"}
 
 SAMPLE = """
     vec2 u = {x[4], x[5]};
-    vec3 both = v3(0.0f, 0.0f, 0.0f);
+    Receiver both = {v3(0.0f, 0.0f, 0.0f)};
     LightSample s = light_sample(scene, v3(x[0], x[1], x[2]), both, x[3], u, lambdas);
     r[0] = s.wi.x; r[1] = s.wi.y; r[2] = s.wi.z; r[3] = s.t; r[4] = s.pdf;
     r[5] = s.radiance.x; r[6] = s.radiance.y; r[7] = s.radiance.z;
@@ -50,19 +50,20 @@ SAMPLE = """
 INFINITE = """
     Spectrum s;
     real pdf;
-    vec3 none = v3(0.0f, 0.0f, 0.0f);
-    infinite_light(scene, 0, none, none, v3(x[0], x[1], x[2]), lambdas, &s, &pdf);
+    Receiver both = {v3(0.0f, 0.0f, 0.0f)};
+    infinite_light(scene, 0, both.hemisphere, both, v3(x[0], x[1], x[2]), lambdas, &s, &pdf);
     r[0] = s.x; r[1] = s.y; r[2] = s.z; r[3] = pdf;
 """
 PDF = """
-    r[0] = light_pdf(scene, to_integer(x[0]), v3(x[1], x[2], x[3]), v3(0.0f, 0.0f, 0.0f),
+    Receiver both = {v3(0.0f, 0.0f, 0.0f)};
+    r[0] = light_pdf(scene, to_integer(x[0]), v3(x[1], x[2], x[3]), both,
                      v3(x[4], x[5], x[6]), x[7], v3(x[8], x[9], x[10]));
 """
 
 
 SIDED = """
     vec2 u = {x[3], x[4]};
-    vec3 side = v3(x[0], x[1], x[2]);
+    Receiver side = {v3(x[0], x[1], x[2])};
     LightSample s = light_sample(scene, v3(0.0f, 0.0f, 0.0f), side, 0.0f, u, lambdas);
     Spectrum le;
     infinite_light(scene, 0, v3(0.0f, 0.0f, 0.0f), side, s.wi, lambdas, &le, r + 8);
@@ -343,7 +344,7 @@ def test_images_are_chosen_by_what_they_send(name):
     value = r[5] / r[4]
     assert (r[4] > 0.0).all()
     assert value.std() < 0.1 * value.mean()
-    mean = image_lights.mean_radiance(lamp, image_lights.content(lamp, scene.encoder.look))
+    mean = image_lights.mean_radiance(image_lights.content(lamp, scene.encoder.look))
     assert value.mean() == pytest.approx(4.0 * np.pi * mean, rel=0.02)
 
 

@@ -120,7 +120,7 @@ def coat_points():
 
 
 def test_coat_tables_are_the_ones_that_are_made():
-    kept, made = coats.kept(), coats.made()
+    kept, made = coats.kept(), coats.computed()
     assert kept.keys() == made.keys()
     for name, table in made.items():
         np.testing.assert_array_equal(kept[name], table, err_msg=name)

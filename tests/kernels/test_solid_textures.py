@@ -9,8 +9,8 @@ from clpt import spectra
 from clpt.errors import SceneError
 from clpt.render.flow.features import of_textures
 from clpt.render.materials.encoder import Encoder
-from clpt.render.textures import noise
 from clpt.render.textures.cases import dispatch_text
+from clpt.render.textures.encode import MARBLE, PERMUTATION
 from clpt.scene import textures as scene
 from clpt.scene.roles import NAMED, Param
 from clpt.spectra.spectrum import d65
@@ -60,7 +60,7 @@ def look_up(made, role, places=PLACES, mode="rgb", lanes=8):
 
 def perlin(p):
     """Improving Noise (Perlin 2002) at p (n, 3), in float64."""
-    table = np.tile(noise.PERMUTATION.astype(int), 2)
+    table = np.tile(PERMUTATION.astype(int), 2)
     cell = np.floor(p).astype(int)
     d, (x, y, z) = p - cell, (cell % 256).T
     fade = d**3 * (d * (d * 6 - 15) + 10)
@@ -116,11 +116,11 @@ def test_marble():
     def curve(colours):
         return 1.5 * sum(w * colours[segment + i] for i, w in enumerate(weights))
 
-    expected = curve(noise.MARBLE)
+    expected = curve(MARBLE)
     np.testing.assert_allclose(look_up([made], "reflectance")[2:], expected[2:], atol=2e-3)
     luminance = spectra.luminance(expected)
     np.testing.assert_allclose(look_up([made], "real")[2:], luminance[2:], atol=2e-3)
-    lamp = curve(np.array([spectra.RGB(*c).sample(LAMBDAS) for c in noise.MARBLE]))
+    lamp = curve(np.array([spectra.RGB(*c).sample(LAMBDAS) for c in MARBLE]))
     found = look_up([made], "emission", mode="spectral")
     np.testing.assert_allclose(found[2:], (lamp * d65().sample(LAMBDAS))[2:], atol=4e-3)
 

@@ -94,7 +94,7 @@ def test_what_is_refused(queue, small, transforms):
     flat[3, :3, :3] = 1
     for arguments, message in (
         ((which + 1, transforms), "prototypes: 1 is none of 1 meshes"),
-        (([], transforms[:0]), "prototypes: one whole number or more"),
+        (([], transforms[:0]), "prototypes: whole numbers .k,. with k > 0"),
         ((which, transforms[:3]), "transforms: 40 instances have 3"),
         ((which, transforms[:, :3]), r"transforms: .*\(40, 3, 4\)"),
         ((which, flat), "transforms: instance 3 is singular"),

@@ -82,10 +82,11 @@ def test_a_physical_material_of_trimesh() -> None:
         alphaMode="MASK",
     )
     made = shapes.Mesh.from_trimesh(box)
-    mask = made.material
+    sides = made.material
+    assert isinstance(sides, materials.TwoSided) and isinstance(sides.back, materials.Null)
+    mask = sides.front
     assert isinstance(mask, materials.Mask) and isinstance(mask.opacity, textures.Bitmap)
-    assert mask.opacity.channel == "a" and isinstance(mask.material, materials.TwoSided)
-    bent = mask.material.front
+    bent = mask.material
     assert isinstance(bent, materials.NormalMap) and bent.map is not None and bent.map.raw
     assert bent.along_v
     tin = bent.material

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -67,6 +69,50 @@ FAULTS = {
 }
 
 
+NAP = (
+    """
+    inline real edge_of(Chalk m, vec3 w) { real x = sqrt_r(m.dust) * w.x; return 1.0f - x * x; }
+    real chalk_pdf(""",
+    "edge * chalk_pdf",
+    "pow_r(max_r(wo.z, (real)(0.0f)) * s.wi.z, m.dust)",
+)
+
+
+def nap(**attributes: Any) -> type[materials.Material]:
+    """A cloth whose fibres lie along the tangent: it turns with the surface's u."""
+    head, edge, power = NAP
+    source = Chalk.source.replace("real chalk_pdf(", head, 1)
+    source = source.replace(edge, "edge_of(m, wo) * edge_of(m, wi) * chalk_pdf")
+    source = source.replace(power, "edge_of(m, wo) * edge_of(m, s.wi)")
+    dust = real(0.5, "how dark it is along the fibres", low=0.0, high=1.0)
+    annotations = {"dust": Any}
+    body = {"source": source, "dust": dust, "__annotations__": annotations, **attributes}
+    return dataclass(frozen=True, kw_only=True, eq=False)(type("Chalk", (Chalk,), body))
+
+
+@pytest.mark.parametrize("name", ["turns", "uses_tangents"])
+def test_a_material_that_turns_with_its_tangents_says_so(name: str, on: device.Device) -> None:
+    """Only `uses_tangents` is read; another name for it says nothing."""
+    cls = nap(**{name: property(lambda self: True)})
+    if name == "uses_tangents":
+        testing.check_material(cls, device=on, modes=("rgb",))
+    else:
+        with pytest.raises(AssertionError, match="define `uses_tangents`"):
+            testing.check_material(cls, device=on, modes=("rgb",))
+
+
+def test_it_says_so_for_the_numbers_that_need_it(on: device.Device) -> None:
+    """A property that answers True for some parameters must answer so for all that turn."""
+    right, wrong = (
+        nap(uses_tangents=property(answer))
+        for answer in (lambda self: self.dust != 0.0, lambda self: self.dust > 1.0)
+    )
+    testing.check_material(right, device=on, modes=("rgb",))
+    with pytest.raises(AssertionError, match="define `uses_tangents`"):
+        testing.check_material(wrong(dust=0.7), device=on, modes=("rgb",))
+    testing.check_material(wrong(dust=0.0), device=on, modes=("rgb",))
+
+
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_named(fault: str, on: device.Device) -> None:
     cls = type("Chalk", (Chalk,), {"source": Chalk.source.replace(*FAULTS[fault])})
@@ -78,3 +124,12 @@ def test_what_is_no_kind_is_refused() -> None:
     bare = type("Bare", (materials.Material,), {})
     with pytest.raises(clpt.SceneError, match="no `source`"):
         testing.check_material(bare)
+
+
+def test_the_page_names_attributes_that_a_material_has() -> None:
+    """An attribute that nothing reads would be set in vain."""
+    page = (Path(__file__).parents[2] / "docs" / "custom_materials.md").read_text("utf-8")
+    table = page.partition("| attribute | set it if |")[2].partition("\n\n")[0]
+    names = re.findall(r"^\| `(\w+)", table, re.MULTILINE)
+    assert "uses_tangents" in names
+    assert [name for name in names if not hasattr(materials.Material, name)] == []

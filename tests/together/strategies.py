@@ -21,13 +21,11 @@ from clpt.errors import SceneError
 from clpt.geometry import shapes as geometry
 from clpt.images.spectral_exr import SpectralImage
 from clpt.lenses import Prescription, Surface
-from clpt.render.camera.check import check_camera
-from clpt.render.camera.find import CONNECTED
+from clpt.render.camera.encode import check_camera
 from clpt.render.flow.check import check
 from clpt.render.geometry.check import check_shapes
 from clpt.render.lights.check import check_light
 from clpt.render.materials.check import check_material
-from clpt.render.media.bodies import BENDS, OPEN
 from clpt.render.textures.check import check_textures
 from clpt.scene import (
     Scene,
@@ -551,7 +549,7 @@ def _any_scene(choose: Callable[[int], int]) -> Scene:
     self.rigid = True
     lamps = [self.kind(PLACED_LIGHTS) for _ in self.several(3)]
     lamps += [lights.Point(position=(0.0, 0.0, 2.0 + i)) for i in range(self.one([0] * 7 + [17]))]
-    camera = self.kind([cls for cls in cameras.KINDS if not traced or cls.kind in CONNECTED])
+    camera = self.kind([cls for cls in cameras.KINDS if not traced or cls.connects])
     plain = {} if isinstance(integrator, integrators.HAVE_LAYERS) else {"layers": ()}
     return Scene(
         camera=camera,
@@ -567,9 +565,9 @@ def _any_scene(choose: Callable[[int], int]) -> Scene:
 
 def _as_body(self: Drawer, shape: Any) -> Any:
     """A shape that overlaps others by a priority, where it is one that can."""
-    if isinstance(shape, (*OPEN, shapes.Instance)):
+    if shape.is_open or isinstance(shape, shapes.Instance):
         return shape
-    if not isinstance(shape.material, (*BENDS, materials.Null)):
+    if not (shape.material.bounds_body or shape.material.is_null):
         return shape
     return dataclasses.replace(shape, priority=self.one([0, 1, 2]), exterior=None)
 

@@ -68,7 +68,7 @@ def test_an_orbit_ends_before_the_pole(camera: Camera) -> None:
 def test_pan_and_look_follow_the_pointer(camera: Camera) -> None:
     """A drag by a tenth of the height moves what is in the middle by that."""
     at, aspect = viewpoint.pose(camera), 1.5
-    height = 2.0 * navigation.half_height(camera, aspect)
+    height = 2.0 * camera.half_height(aspect)
     distance = float(np.linalg.norm(TARGET - ORIGIN))
     panned = navigation.pan(camera, distance, 0.1, 0.05, aspect)
     assert np.allclose(on_screen(panned, TARGET), (0.1 * height, 0.05 * height))
@@ -81,7 +81,7 @@ def test_pan_and_look_follow_the_pointer(camera: Camera) -> None:
 def test_dolly_and_fly(camera: Camera) -> None:
     near = navigation.dolly(camera, TARGET, math.log(2.0))
     if isinstance(camera, Orthographic):
-        half = navigation.half_height
+        half = type(camera).half_height
         assert half(near, 1.0) == pytest.approx(half(camera, 1.0) / 2.0)
     else:
         assert np.allclose(viewpoint.pose(near).origin, (ORIGIN + TARGET) / 2.0)

@@ -97,6 +97,23 @@ def test_another_host_name_is_refused(server: Server, key: str, host: str | None
     assert status in (0, 400, 403) and b"<!doctype" not in content
 
 
+@pytest.mark.parametrize("host", ["0.0.0.0", "::"])
+def test_a_server_for_all_interfaces_has_the_names_that_it_announces(host: str) -> None:
+    """And the address at which a request has come, but no stranger's."""
+    if host == "::" and not socket.has_ipv6:
+        pytest.skip("there is no IPv6")
+    with contextlib.closing(Server(host)) as server:
+        key = cookie(server)
+        announced = server.address.removeprefix("http://").partition("/")[0]
+        came = "127.0.0.1" if host == "0.0.0.0" else "[::1]"
+        machine = socket.gethostname()
+        for named in (announced, *(f"{one}:{server.port}" for one in (came, "localhost", machine))):
+            assert ask(server, "/", f"Cookie: {key}", host=named)[0] == 200, named
+        assert announced.rpartition(":")[0].strip("[]") != host
+        for named in ("evil.example", f"evil.example:{server.port}", f"192.0.2.7:{server.port}"):
+            assert ask(server, "/", f"Cookie: {key}", host=named)[0] == 403, named
+
+
 def test_confirmations_of_frames_are_not_counted(server: Server, key: str) -> None:
     """As many frames as a fast device makes; other messages keep to their rate."""
     with opened(server, key) as client:

@@ -26,7 +26,7 @@ def tell_of_first_light(device: str | None, target: Path, limit: float) -> int:
         status.update(checks[0].name)
         for result in first_light.run(device, min(limit, LONGEST), checks):
             results.append(result)
-            row = f"{result.check.name:18} {result.seconds:4.0f} s  {result.told}"
+            row = f"{result.check.name:18} {result.seconds:4.0f} s  {result.summary}"
             console.print(Text(row, style="red" if result.wrong else ""))
             if len(results) < len(checks):
                 status.update(checks[len(results)].name)

@@ -25,17 +25,17 @@ HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
 
 
 def tell_of_devices(device: str | None, settings: Mapping[str, Any], report: Report) -> int:
-    """Measure the devices of a name, or all, and tell of them; return the exit status."""
+    """Measure a device or all devices, and print the figures; return the exit status."""
     console = output_console()
     which: list[Which] = [(device, None)]
     if device == "all":
         which = [(info.index, info.label) for info in dev.devices()]
-    failed = [_report(console, one, settings, report) for one in which]
+    failed = [_report(console, choice, settings, report) for choice in which]
     return SLOWER if any(failed) else 0
 
 
 def _report(console: Console, which: Which, settings: Mapping[str, Any], report: Report) -> bool:
-    """Measure a device, and tell of it; return whether a figure is refused, or too low."""
+    """Measure a device and report; return whether a figure is refused or too low."""
     about, figures = _measured(console, which, settings, report.limit)
     failed = any(figure.refused for figure in figures)
     if report.target is not None:
@@ -52,7 +52,7 @@ def _report(console: Console, which: Which, settings: Mapping[str, Any], report:
     if report.plot is not None and some:
         from ..plots import bench as bench_plot
 
-        then = {figures.index(one.figure): float(one.then["value"]) for one in ratios}
+        then = {figures.index(r.figure): float(r.then["value"]) for r in ratios}
         bench_plot.write(report.plot, f"{label}, clpt bench", figures, then)
     if report.card is not None:
         card.card({**records.circumstances(), **about}, figures).write(report.card)
@@ -62,7 +62,7 @@ def _report(console: Console, which: Which, settings: Mapping[str, Any], report:
 def _measured(
     console: Console, which: Which, settings: Mapping[str, Any], limit: float
 ) -> tuple[apart.About, list[Figure]]:
-    """Return what the device is and all figures; print each table when it is complete."""
+    """Return the device's description and all figures; print each complete table."""
     figures: list[Figure] = []
     about: apart.About = {"device": which[1] or which[0] or "the default device"}
     table = None
@@ -80,14 +80,13 @@ def _measured(
 
 
 def _heading(about: apart.About) -> Text:
-    """Return a line of what a device is."""
     more = [about["opencl"], f"driver {about['driver']}"] if "opencl" in about else []
     return Text(", ".join([str(about["device"]), *more]), style="bold")
 
 
 def _table(figure: Figure) -> Table:
     title = " of ".join(filter(None, (figure.part, figure.scene)))
-    if figure.part == "pictures":  # each row has a scene of its own
+    if figure.part == "pictures":  # each row has another scene
         title = f"pictures, {figure.more['size']}"
     table = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
     for i, heading in enumerate(HEADINGS):
@@ -118,7 +117,7 @@ def _cells(figure: Figure) -> list[str | Text]:
 
 
 def _shown(figure: Figure) -> str:
-    """Return the value of a figure in digits, or nothing if it has none."""
+    """Return a figure's value as text, "" without a value."""
     if not figure.rounds or (figure.refused and figure.part == "pictures"):
         return ""
     return f"{figure.value:.3g}" if figure.value < 1000 else f"{figure.value:.0f}"
@@ -131,16 +130,17 @@ def _show_ratios(console: Console, ratios: Sequence[Ratio], limit: float | None)
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     for heading in ("figure", "now", "then", "unit", "ratio", "noise", ""):
         table.add_column(heading, justify="left" if heading in ("figure", "unit", "") else "right")
-    for one in ratios:
-        worse = limit is not None and one.below(limit)
-        clear = abs(one.ratio - 1.0) > one.noise
+    for ratio in ratios:
+        figure = ratio.figure
+        worse = limit is not None and ratio.below(limit)
+        clear = abs(ratio.ratio - 1.0) > ratio.noise
         table.add_row(
-            f"{one.figure.part} {one.figure.name}",
-            f"{one.figure.value:.4g}",
-            f"{one.then['value']:.4g}",
-            one.figure.unit,
-            f"{one.ratio:.2f}",
-            f"{one.noise:.1%}",
+            f"{figure.part} {figure.name}",
+            f"{figure.value:.4g}",
+            f"{ratio.then['value']:.4g}",
+            figure.unit,
+            f"{ratio.ratio:.2f}",
+            f"{ratio.noise:.1%}",
             f"below {limit:g}" if worse else "" if clear else "within noise",
             style="red" if worse else "",
         )

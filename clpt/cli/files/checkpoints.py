@@ -23,6 +23,7 @@ from .targets import CHECKPOINT, FILM, default
 
 PERIOD = 300.0  # seconds from one checkpoint to the next
 PATIENCE = 600.0  # seconds of a render after which it has checkpoints unasked
+FORMER = ".1"  # ends the name of the checkpoint before the last one
 ADVICE = "render that again, or begin anew with --no-resume"
 
 
@@ -33,12 +34,13 @@ def path_of(scene: Path, targets: tuple[Path, ...]) -> Path:
     """
     files = [path for path in targets if not is_standard(path)]
     target = (files or default(scene))[0]
-    return target.with_name(target.stem + CHECKPOINT)
+    longest = output_files.LONGEST - len(FORMER)
+    return output_files.beside(target, CHECKPOINT, longest)
 
 
 def former_of(path: Path) -> Path:
     """Return where the checkpoint before the last one is."""
-    return path.with_name(path.name + ".1")
+    return path.with_name(path.name + FORMER)
 
 
 def find(path: Path, resume: bool | None, note: Callable[[str], None]) -> SavedFilm | None:
@@ -203,7 +205,7 @@ class Checkpoints:
 
     def _begin_to_write(self) -> None:
         try:
-            saved = self._renderer._saved_film(held=True)
+            saved = self._renderer.saved_film(held=True)
         except MemoryError as error:
             self._failure = outputs.failure(self._path, error)
             return

@@ -40,8 +40,8 @@ def film_summary(path: Path) -> dict[str, Any]:
 
 def film_contents(path: Path) -> ImageContents:
     """Return the picture of a film, and what it says of itself. Raises SceneError."""
-    picture, summary = film_file.read(path)._developed(), film_summary(path)
-    form, lambdas, quantity = picture._form, None, "value (linear)"
+    picture, summary = film_file.read(path).developed(), film_summary(path)
+    form, lambdas, quantity = picture.form, None, "value (linear)"
     colours = picture.colours()
     values = picture.image()
     if form.bands:

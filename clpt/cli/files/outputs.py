@@ -9,6 +9,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+from clpt.files import output_files
+
 from ...device import disk_cache
 from ...errors import ClptError, SceneError
 from ...render.film import film_file, layer_channels
@@ -88,17 +90,17 @@ def _rescue(
     path: Path, film: Film, source: Source, stats: dict[str, str | int | float], grading: Grading
 ) -> str:
     """Write a picture, or else its film, where there is room for it; return what to say."""
-    label = f"{path.stem}-{secrets.token_hex(4)}"
+    label = f"-{secrets.token_hex(4)}"
     folders = Path(tempfile.gettempdir()), disk_cache.folder()
     for folder in folders:
-        other = folder / f"{label}{path.suffix}"
+        other = output_files.beside(folder / path.name, f"{label}{path.suffix}")
         with suppress(*FAILURES):
             write(other, source, stats, grading)
             return f"the picture is in {other}"
     for folder in folders:
-        other = folder / f"{label}{FILM}"
+        other = output_files.beside(folder / path.name, f"{label}{FILM}")
         with suppress(*FAILURES):
-            film_file.write(other, film._saved_film())
+            film_file.write(other, film.saved_film())
             return f"the film is in {other}, of which clpt merge makes the picture"
     return f"nor can it in {' or '.join(map(str, folders))}"
 
@@ -116,7 +118,7 @@ def write(
 ) -> None:
     """Write the picture so far, or the film. Raises SceneError, OSError."""
     if path.suffix.lower() == FILM and not isinstance(source, DenoisedPicture):
-        saved = source._saved_film(held=True)
+        saved = source.saved_film(held=True)
         if not saved.film.taken:
             raise SceneError("no pass has come to its end: there is no film yet", file=path)
         film_file.write(path, saved)

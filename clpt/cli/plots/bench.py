@@ -16,7 +16,7 @@ from clpt.bench.pictures import POINTS
 from ...errors import SceneError
 from .pixels import FAINT, FORMATS, INK, LINES, PAPER, save
 
-SPAN = 30.0  # between the smallest and the largest stage, from which the scale is logarithmic
+SPAN = 30.0  # ratio of stages' speeds above which the scale is logarithmic
 BAR, HEAD = 0.25, 0.9  # [inches] of a figure, and of a panel's title and axis
 COLOURS = (*LINES[2:3], *LINES[1:2], *LINES[3:])
 
@@ -34,8 +34,8 @@ def write(path: Path, title: str, figures: Sequence[Figure], then: Mapping[int, 
     written.
     """
     check(path)
-    good = [(i, one) for i, one in enumerate(figures) if one.rounds and not one.refused]
-    measured = [(i, one) for i, one in good if one.unit != POINTS]  # a panel has one unit
+    good = [(i, figure) for i, figure in enumerate(figures) if figure.rounds and not figure.refused]
+    measured = [(i, figure) for i, figure in good if figure.unit != POINTS]  # a unit a panel
     panels = {
         part: [(i, figure) for i, figure in measured if figure.part == part]
         for part in PARTS
@@ -43,11 +43,11 @@ def write(path: Path, title: str, figures: Sequence[Figure], then: Mapping[int, 
     }
     if not panels:
         raise SceneError("there is no figure to plot", file=path)
-    heights = [HEAD + BAR * len(own) for own in panels.values()]
+    heights = [HEAD + BAR * len(rows) for rows in panels.values()]
     sheet = Sheet(figsize=(8.0, 0.5 + sum(heights)), dpi=120, facecolor=PAPER, layout="constrained")
     column = sheet.subplots(len(panels), 1, squeeze=False, height_ratios=heights)[:, 0]
-    for axes, (part, own) in zip(column, panels.items(), strict=True):
-        _panel(axes, part, own, then)
+    for axes, (part, rows) in zip(column, panels.items(), strict=True):
+        _panel(axes, part, rows, then)
     sheet.suptitle(title, x=0.012, ha="left", color=INK, weight="bold", size=11)
     if then:
         mark = Line2D([], [], color=INK, marker="|", linestyle="", markersize=10)
@@ -59,13 +59,13 @@ def write(path: Path, title: str, figures: Sequence[Figure], then: Mapping[int, 
 
 
 def _panel(
-    axes: Axes, part: str, own: Sequence[tuple[int, Figure]], then: Mapping[int, float]
+    axes: Axes, part: str, rows: Sequence[tuple[int, Figure]], then: Mapping[int, float]
 ) -> None:
-    values = [figure.value for _, figure in own]
-    shown = [*values, *(then[i] for i, _ in own if i in then)]
+    values = [figure.value for _, figure in rows]
+    shown = [*values, *(then[i] for i, _ in rows if i in then)]
     logarithmic = part == "stages" and max(shown) > SPAN * min(shown)
-    kinds = list(dict.fromkeys(_kind(figure) for _, figure in own))
-    for row, (i, figure) in enumerate(own):
+    kinds = list(dict.fromkeys(_kind(figure) for _, figure in rows))
+    for row, (i, figure) in enumerate(rows):
         colour = COLOURS[kinds.index(_kind(figure)) % len(COLOURS)]
         axes.barh(row, figure.value, 0.72, color=colour)
         edge = figure.value * (1.0 + figure.spread)
@@ -83,11 +83,11 @@ def _panel(
     low = min(shown) / 2 if logarithmic else 0.0
     axes.set_xscale("log" if logarithmic else "linear")
     axes.set_xlim(low, max(shown) * (30.0 if logarithmic else 1.25))
-    axes.set_yticks(range(len(own)), [figure.name for _, figure in own])
-    axes.set_ylim(len(own) - 0.4, -0.6)
-    scene = own[0][1].scene if len({figure.scene for _, figure in own}) == 1 else ""
+    axes.set_yticks(range(len(rows)), [figure.name for _, figure in rows])
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    scene = rows[0][1].scene if len({figure.scene for _, figure in rows}) == 1 else ""
     axes.set_title(f"{part}{' of ' if scene else ''}{scene}", loc="left", size=10, color=INK)
-    unit = own[0][1].unit
+    unit = rows[0][1].unit
     axes.set_xlabel(f"{unit}, less is better" if unit == SECONDS else unit, color=INK, size=9)
     axes.grid(axis="x", color=FAINT, linewidth=0.8)
     axes.set_axisbelow(True)
@@ -98,5 +98,5 @@ def _panel(
 
 
 def _kind(figure: Figure) -> str:
-    """Return what decides the colour of a figure in its panel."""
+    """Return the layout, which decides a figure's colour in its panel."""
     return str(figure.more.get("layout", "")) if figure.part in ("rays", "build") else ""

@@ -30,8 +30,8 @@ def write(path: Path, lens: Prescription, waves: list[float], angles: list[float
     for axes, angle in zip(drawn, angles, strict=True):
         _spot(axes, lens, angle, waves)
     drawn[0].set_ylabel("[um]", color=INK)
-    found = cardinal(lens)
-    title = f"{lens.name}: f = {found.focal_length:.4g} mm, f/{found.f_number:.3g}"
+    points = cardinal(lens)
+    title = f"{lens.name}: f = {points.focal_length:.4g} mm, f/{points.f_number:.3g}"
     figure.suptitle(title, x=0.012, ha="left", color=INK, weight="bold", size=11)
     save(figure, path)
 
@@ -66,12 +66,12 @@ def _section(axes: Axes, lens: Prescription, angles: list[float]) -> None:
 
 
 def _rays(lens: Prescription, angle: float, front: float, film: float) -> list[np.ndarray]:
-    """Ways (n, 2) in z and y of rays in the section's plane that get through."""
-    found = cardinal(lens)
-    wanted = np.linspace(-1.6, 1.6, 400) * found.entrance_radius
-    o = np.column_stack([0.0 * wanted, wanted, np.full(len(wanted), found.entrance)])
+    """Return the paths (n, 2) in z and y of transmitted rays in the section's plane."""
+    points = cardinal(lens)
+    heights = np.linspace(-1.6, 1.6, 400) * points.entrance_radius
+    o = np.column_stack([0.0 * heights, heights, np.full(len(heights), points.entrance)])
     rays = Rays.of(o, np.array([[0.0, np.tan(np.radians(angle)), 1.0]]))
-    rays.o += rays.d * ((front - found.entrance) / rays.d[:, 2:])
+    rays.o += rays.d * ((front - points.entrance) / rays.d[:, 2:])
     ways, d, alive, indices = [rays.o], rays.d, rays.alive, lens.indices(LINE_D)
     for i, surface in enumerate(lens.surfaces):
         shifted = ways[-1] - [0.0, 0.0, lens.vertices[i]]

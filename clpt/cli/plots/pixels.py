@@ -22,9 +22,9 @@ FORMATS = (".png", ".svg", ".pdf")
 INK, FAINT, PAPER = "#22262b", "#d9dde2", "#ffffff"
 LINES = ("#22262b", "#c1440e", "#1f6f8b", "#6a8d2f", "#8c4a94", "#c9931a")
 CHANNELS = {"R": "#c94f43", "G": "#4e9a51", "B": "#4a6fb5", "A": "#9aa1a9", "Y": "#6b7178"}
-WIDTH = 12.0  # [nm] of those bands, at half their height
+WIDTH = 12.0  # [nm] of these bands, at half their height
 DOTS: dict[str, Any] = {"marker": "o", "markersize": 3.2, "clip_on": False}
-MARKED = 64  # bands up to which each gets a dot
+MARKED = 64  # the most bands with dots
 
 
 def write(path: Path, image: ImageContents, values: dict[Pixel, np.ndarray]) -> None:

@@ -11,6 +11,8 @@ from typing import Any
 
 import click
 
+from clpt.files import output_files
+
 MOST_FRAMES = 10**6
 DIGITS = 4  # of a frame's number in a name that says nothing else
 
@@ -52,7 +54,7 @@ def has_number(path: Path) -> bool:
 def numbered(path: Path, frame: int) -> Path:
     """Return the name of a frame's file: #### or %04d is its number, or else it gets one."""
     if not has_number(path):
-        return path.with_name(f"{path.stem}.{frame:0{DIGITS}}{path.suffix}")
+        return output_files.beside(path, f".{frame:0{DIGITS}}{path.suffix}")
 
     def number(found: re.Match[str]) -> str:
         digits = len(found[0]) if found[0][0] == "#" else int(found[1] or 1)

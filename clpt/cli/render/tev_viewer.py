@@ -37,9 +37,9 @@ def shown(source: Film) -> dict[str, NDArray[np.float32]]:
     picture = source.picture()
     made = {letter: picture[..., i] for i, letter in enumerate("RGBA"[: picture.shape[2]])}
     made |= channels_of(source.layers())
-    if source._form.adaptive:
+    if source.form.adaptive:
         made["samples.X"] = source.samples_per_pixel()
-    if source._form.bands:
+    if source.form.bands:
         spectral = source.spectral_image()
         for nm, band in zip(spectral.lambdas, np.moveaxis(spectral.values, 2, 0), strict=True):
             made[f"bands.{nm:g}nm"] = band

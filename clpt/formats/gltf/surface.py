@@ -14,17 +14,18 @@ import numpy as np
 from clpt.formats.gltf import volume
 from clpt.formats.gltf.document import ROUNDING, Element
 from clpt.formats.gltf.textures import texture
+from clpt.scene import gltf_material
+from clpt.scene.gltf_material import WHITE
 from clpt.scene.materials import GltfSurface
 from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product, turned
 from clpt.scene.values import TexturedNumber
-from clpt.spectra import Cauchy, RGBUnbounded
+from clpt.spectra import Cauchy
 
 CLEARCOAT = "KHR_materials_clearcoat"
 DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"
 GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 NORMAL = "clearcoatNormalTexture"
 AXES = {"x": "r", "y": "g", "z": "b"}  # of a normal, in the channels of its image
-WHITE = (1.0, 1.0, 1.0)
 LEAST_ABBE = 1.0  # of any glass is above 9
 
 
@@ -69,27 +70,15 @@ def colour(
     rgb = owner.numbers(factor, count, (*default, 1.0)[:count], low=0.0)[:3]
     rgb = tuple(1.0 if 1.0 < value <= 1.0 + ROUNDING else value for value in rgb)
     child = owner.child(info)
-    if child is None:
-        return rgb
-    image = texture(child)
-    if rgb == WHITE:
-        return image
-    return Product(first=image, second=unbounded(rgb), rgb=max(rgb) > min(rgb))
+    return gltf_material.tinted(None if child is None else texture(child), rgb)
 
 
 def number(owner: Element, factor: str, info: str, channel: str, default: float) -> Any:
     """Return a factor in [0, 1], times a texture's channel where there is one."""
     value = owner.number(factor, default, low=0.0, high=1.0)
     child = owner.child(info)
-    if child is None:
-        return value
-    image = texture(child, raw=True, channel=channel)
-    return image if value == 1.0 else Product(first=image, second=value)
-
-
-def unbounded(rgb: tuple[float, ...]) -> Any:
-    """Return a colour as a factor that may exceed one."""
-    return RGBUnbounded(*rgb) if max(rgb) > 1.0 else rgb
+    image = None if child is None else texture(child, raw=True, channel=channel)
+    return gltf_material.times(image, value)
 
 
 def _rough(element: Element) -> dict[str, Any]:

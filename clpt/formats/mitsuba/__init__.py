@@ -8,13 +8,15 @@ instead.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from clpt.choices import Missing
-from clpt.formats.mitsuba import old_words, sensors
+from clpt.formats.blockers import attempt
+from clpt.formats.mitsuba import dicts, old_words, sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter
 from clpt.formats.mitsuba.grids import Bounds
@@ -26,10 +28,11 @@ from clpt.formats.mitsuba.xml import Document, Element, parse
 from clpt.scene import Scene, integrators
 from clpt.scene.framing import framing_camera, world_bounds
 from clpt.scene.integrators import Film, Integrator
+from clpt.scene.lights import Light
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Instance, Shape
 
-__all__ = ["load"]
+__all__ = ["load", "load_dict"]
 
 # What may stand in the scene itself only for others to refer to.
 REFERENCED = ("spectrum", "volume", "film", "sampler", "rfilter", "medium", "phase")
@@ -45,6 +48,21 @@ def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scen
     document = parse(path, variables)
     if document.is_old:
         document.renamed = old_words.rename(document.root)
+    return _from_document(path, document, missing)
+
+
+def load_dict(scene: Mapping[str, Any], folder: Path, missing: Missing = "error", /) -> Scene:
+    """Make a scene of Mitsuba 3's dictionary; `folder`: of its file names; missing: see clpt.load.
+
+    Raises SceneError with the names of the entry for anything broken or not supported.
+    """
+    root = dicts.tree(scene, folder)
+    if root.tag != "scene":
+        raise root.error("the outermost 'type' must be 'scene'")
+    return _from_document(Path("dict"), Document(root, [folder]), missing)
+
+
+def _from_document(path: Path, document: Document, missing: Missing) -> Scene:
     context = Context(document, missing)
     scene = _scene(path, document, context)
     if not context.endless:
@@ -56,9 +74,9 @@ def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scen
 def _room(medium: Medium, scene: Scene) -> Bounds:
     """The box that a medium fills: that of the shapes it is in, or of all if it is around them."""
     camera: Any = scene.camera
-    around = camera.medium is medium or any(_is_around(one, medium) for one in scene.shapes)
+    around = camera.medium is medium or any(_is_around(item, medium) for item in scene.shapes)
     return world_bounds(
-        [one for one in scene.shapes if around or any(p.interior is medium for p in _parts(one))]
+        [item for item in scene.shapes if around or any(p.interior is medium for p in _parts(item))]
     )
 
 
@@ -82,8 +100,7 @@ def _with_layers(film: Film, how: Integrator, props: Properties, context: Contex
 def _scene(path: Path, document: Document, context: Context) -> Scene:
     props = Properties(document.root, context)
     shapes = shapes_of(props.objects("shape"), context)
-    emitters = [emitter(element, context) for element in props.objects("emitter")]
-    lights = [light for light in emitters if light is not None]
+    lights = _lights(props, context)
     for element in props.objects("bsdf"):
         bsdf(element, context)
     for element in _textures(props):
@@ -95,11 +112,11 @@ def _scene(path: Path, document: Document, context: Context) -> Scene:
     number = _chosen(all_sensors, document)
     first = None if number is None else all_sensors[number]
     if document.camera is None and len(all_sensors) > 1:
-        names = ", ".join(one.name or str(i) for i, one in enumerate(all_sensors))
+        names = ", ".join(item.name or str(i) for i, item in enumerate(all_sensors))
         context.warn(props.element, f"the first of several cameras is used; there are: {names}")
     props.finish()
     camera = framing_camera(shapes) if first is None else first.camera
-    how = _default() if integrator is None else sensors.integrator(integrator, context)
+    how = _integrator(integrator, context)
     film = sensors.default_film() if first is None else first.film
     return Scene(
         camera=camera,
@@ -115,14 +132,22 @@ def _scene(path: Path, document: Document, context: Context) -> Scene:
         extra={
             "format": "mitsuba",
             "variables": dict(document.variables),
-            "cameras": [f"{one.camera.kind} {one.name}".strip() for one in all_sensors],
+            "cameras": [f"{item.camera.kind} {item.name}".strip() for item in all_sensors],
             "sampler": sensors.DEFAULT_SAMPLER if first is None else first.sampler,
         },
     )
 
 
-def _default() -> integrators.Integrator:
-    return integrators.Path(max_depth=-1)
+def _lights(props: Properties, context: Context) -> list[Light]:
+    lamps = [attempt(partial(emitter, one, context), None) for one in props.objects("emitter")]
+    return [lamp for lamp in lamps if lamp is not None]
+
+
+def _integrator(element: Element | None, context: Context) -> integrators.Integrator:
+    default: Integrator = integrators.Path(max_depth=-1)
+    if element is None:
+        return default
+    return attempt(lambda: sensors.integrator(element, context), default)
 
 
 def _textures(props: Properties) -> list[Element]:
@@ -137,10 +162,17 @@ def _sensors(props: Properties, context: Context) -> list[sensors.Sensor]:
     all_sensors: list[sensors.Sensor] = []
     for element in props.objects("sensor"):
         is_batch = element.type == "batch"
-        all_sensors += sensors.batch(element, context) if is_batch else [sensor(element, context)]
+        if is_batch:
+            all_sensors += attempt(partial(sensors.batch, element, context), [])
+        else:
+            all_sensors += attempt(partial(_one_sensor, element, context), [])
     if not all_sensors:
         context.warn(props.element, "has no sensor; a camera that sees everything is used")
     return all_sensors
+
+
+def _one_sensor(element: Element, context: Context) -> list[sensors.Sensor]:
+    return [sensor(element, context)]
 
 
 def _chosen(all_sensors: Sequence[sensors.Sensor], document: Document) -> int | None:
@@ -151,8 +183,8 @@ def _chosen(all_sensors: Sequence[sensors.Sensor], document: Document) -> int | 
     wanted = document.camera
     if wanted is None:
         return 0 if all_sensors else None
-    for number, one in enumerate(all_sensors):
-        if wanted in (str(number), one.name):
+    for number, item in enumerate(all_sensors):
+        if wanted in (str(number), item.name):
             return number
-    names = ", ".join(one.name or str(i) for i, one in enumerate(all_sensors)) or "none"
+    names = ", ".join(item.name or str(i) for i, item in enumerate(all_sensors)) or "none"
     raise document.root.error(f"has no camera {wanted!r}; it has: {names}")

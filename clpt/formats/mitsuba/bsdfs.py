@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from clpt import measured, spectra
+from clpt.formats.blockers import attempt
 from clpt.formats.missing import EVEN, GREY
 from clpt.formats.mitsuba.fluorescence import fluorescent
-from clpt.formats.mitsuba.hair import hair
+from clpt.formats.mitsuba.hair import at_yellow, hair
 from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.principled import principled, principled_thin
 from clpt.formats.mitsuba.properties import Context, Properties, numbers, unknown
@@ -27,9 +28,11 @@ from clpt.formats.mitsuba.spectra import (
     texture,
 )
 from clpt.formats.mitsuba.xml import Element
+from clpt.formats.pbrt import coated_albedo
+from clpt.formats.pbrt.map_values import map_values
 from clpt.scene import materials
 from clpt.scene.materials import Material
-from clpt.scene.params import defaults, params
+from clpt.scene.params import defaults, fields_of, params
 from clpt.scene.textures import Bitmap, Product, Texture
 from clpt.spectra import Constant, RGBUnbounded, Spectrum
 
@@ -39,6 +42,13 @@ SMOOTHEST = 1e-4  # Mitsuba's own floor of a roughness
 WITHOUT_DATA = ("Cu2O", "CuO", "HgTe", "Se", "Se-e", "SnTe", "Ta")
 GREY_METAL = 0.3  # what they reflect head-on
 PHONG = ("phong", "as")  # distributions of Mitsuba 0.6, of exponent 2 / alpha^2 - 2
+COATINGS = ("coating", "roughcoating")
+COATED_METALS = {
+    "conductor": ("eta", "k", "specular_reflectance"),
+    "rough_conductor": (
+        "eta", "k", "specular_reflectance", "distribution", "alpha_u", "alpha_v",
+    ),
+}  # fmt: skip
 MOST_PARTS = 32  # of a `mixturebsdf`
 TINY = 1e-30
 AIR = 1.000277  # the default of `ext_eta`: src/bsdfs/ior.h
@@ -46,11 +56,14 @@ AIR = 1.000277  # the default of `ext_eta`: src/bsdfs/ior.h
 
 def bsdf(element: Element, context: Context) -> Material:
     """Make the material that a <bsdf> describes, once for all references to it."""
-    return context.once(element, lambda _: _bsdf(element, context))
+    grey: Material = materials.Diffuse()
+    return context.once(element, lambda _: attempt(lambda: _bsdf(element, context), grey))
 
 
 def _bsdf(element: Element, context: Context) -> Material:
     name = element.attributes.get("id", "")
+    if element.type in COATINGS:
+        return _coated(element, context)
     if element.type not in PLUGINS:
         return context.stand_in(unknown(element, PLUGINS), element, materials.Diffuse(name=name))
     cls, read = PLUGINS[element.type]
@@ -65,6 +78,18 @@ def _diffuse(props: Properties) -> Parameters:
     old = "diffuse_reflectance"  # Mitsuba 0.6's name
     name = old if old in props.named else "reflectance"
     return {"reflectance": reflectance(props, name, 0.5)}
+
+
+def _rough_diffuse(props: Properties) -> Parameters:
+    """Read Mitsuba 0.6's `roughdiffuse`: alpha is the root of twice the slopes' variance."""
+    alpha = real(props, "alpha", 0.2)
+    degrees = np.degrees(np.sqrt(0.5))
+    scaled = Product(first=alpha, second=float(degrees)) if isinstance(alpha, Texture) else None
+    return {
+        **_diffuse(props),
+        "sigma": scaled or min(max(alpha * degrees, 0.0), 90.0),
+        "interreflection": not props.flag("use_fast_approx", False),
+    }
 
 
 def _phong(props: Properties) -> Parameters:
@@ -171,20 +196,20 @@ def _layer(element: Element, context: Context) -> materials.Layer:
     if element.type != "layer":
         raise element.error("only a <bsdf> of the type 'layer' can stand here")
     props = Properties(element, context)
-    given = props.named.get("eta")
+    values = props.named.get("eta")
     with element.locating():
-        if given is not None and given.tag == "string":
+        if values is not None and values.tag == "string":
             eta = spectra.glass(props.text("eta", ""))
         else:
             eta = index(props, "eta", spectra.glass("water"))
-        made = materials.Layer(
+        result = materials.Layer(
             eta=eta,
             k=index(props, "k", 0.0),
             thickness=props.number("thickness", 400.0),
             profile=real(props, "profile", 1.0),
         )
     props.finish()
-    return made
+    return result
 
 
 def _distribution(props: Properties) -> str:
@@ -257,18 +282,18 @@ def _grating(props: Properties) -> Parameters:
     """Ours, see docs/mitsuba_plugins.md: names are those of clpt.scene.materials.Grating."""
     kind = materials.Grating
     declared, usual = params(kind), defaults(kind)
-    given: Parameters = {
+    values: Parameters = {
         name: props.text(name, usual[name], declared[name].choices) for name in ("mode", "profile")
     }
     for name in ("period", "angle", "depth", "fill"):
-        given[name] = real(props, name, usual[name])
-    given["orders"] = float(props.integer("orders", int(kind.orders)))
+        values[name] = real(props, name, usual[name])
+    values["orders"] = float(props.integer("orders", int(kind.orders)))
     child = props.take("efficiencies")
     if child is not None:
-        given["efficiencies"] = numbers(child, "value")
+        values["efficiencies"] = numbers(child, "value")
     if "ior" in props.named:
-        given["ior"] = ior(props, "ior", "bk7")
-    return {**given, **_metal(props), "reflectance": reflectance(props, "reflectance", 1.0)}
+        values["ior"] = ior(props, "ior", "bk7")
+    return {**values, **_metal(props), "reflectance": reflectance(props, "reflectance", 1.0)}
 
 
 def _measured(props: Properties) -> Parameters:
@@ -323,6 +348,55 @@ def _diffuse_transmission(props: Properties) -> Parameters:
     return {"transmittance": reflectance(props, "transmittance", 0.5), "reflectance": 0.0}
 
 
+def _ward(props: Properties) -> Parameters:
+    variants = {"balanced": "balanced", "ward-duer": "duer", "ward": "ward"}
+    both = _alpha(props, "alpha", 0.1)
+    return {
+        "diffuse": reflectance(props, "diffuse_reflectance", 0.5),
+        "specular": reflectance(props, "specular_reflectance", 0.2),
+        "variant": variants[props.text("variant", "balanced", tuple(variants))],
+        "alpha_u": _alpha(props, "alpha_u", both),
+        "alpha_v": _alpha(props, "alpha_v", both),
+    }
+
+
+def _coated(element: Element, context: Context) -> Material:
+    """Read Mitsuba 0.6's `coating` and `roughcoating`, which send no light back to the base.
+
+    A coat over a diffuse base is Plastic, whose base is the darker by the light that ours sends
+    back; over metal it is CoatedConductor. Over others it is left out, with a warning.
+    """
+    props = Properties(element, context)
+    (inner,) = _nested(props, 1, 1)
+    indices = {"int_ior": ior(props, "int_ior", "bk7"), "ext_ior": ior(props, "ext_ior", "air")}
+    rough = element.type == "roughcoating"
+    kept: Parameters = {"name": element.attributes.get("id", "")}
+    if rough:
+        kept["distribution"] = _distribution(props)
+    alpha = _alpha(props, "alpha", 0.1) if rough else SMOOTHEST
+    specular = reflectance(props, "specular_reflectance", 1.0)
+    if coefficient(props, "sigma_a") not in (0.0, Constant(0.0)):
+        context.warn(element, "'sigma_a' of the coat is left out: it absorbs nothing")
+    props.ignore("thickness")
+    props.finish()
+    parts = fields_of(inner)
+    if inner.kind in COATED_METALS:
+        metal = {name: parts[name] for name in COATED_METALS[inner.kind]}
+        smooth = {} if "alpha_u" in metal else {"alpha_u": SMOOTHEST, "alpha_v": SMOOTHEST}
+        coat = {"coat_ior": indices["int_ior"], "ext_ior": indices["ext_ior"], "coat_alpha": alpha}
+        return materials.CoatedConductor(**{**kept, **coat, **metal, **smooth})
+    if inner.kind != "diffuse":
+        context.warn(element, f"a coat over {inner.kind} is left out: it would darken it")
+        return inner
+    relative = at_yellow(indices["int_ior"]) / at_yellow(indices["ext_ior"])
+    inside = float(coated_albedo.EVEN @ coated_albedo.internal_fresnel(relative))
+    base = map_values(parts["reflectance"], lambda r: r / (1.0 + inside * r))
+    plastic = {**kept, **indices, "diffuse_reflectance": base, "specular_reflectance": specular}
+    if rough:
+        return materials.RoughPlastic(**plastic, alpha=alpha, nonlinear=True)
+    return materials.Plastic(**plastic, nonlinear=True)
+
+
 def _share(props: Properties, name: str) -> Any:
     value = real(props, name, 0.5)
     return value if isinstance(value, Texture) else min(max(value, 0.0), 1.0)
@@ -337,25 +411,25 @@ def _bent(props: Properties) -> Parameters:
 
 
 def _normal_map(props: Properties) -> Parameters:
-    given = _bent(props)
+    values = _bent(props)
     if "normalmap" not in props.named:
         raise props.element.error("needs the texture 'normalmap'")
-    made = factor(props, "normalmap", None)
-    if isinstance(made, (Constant, RGBUnbounded)):
-        made = Bitmap(image=made.to_rgb("unbounded").astype(np.float32)[None, None], raw=True)
-    if isinstance(made, Bitmap) and made.image is GREY:
-        made = replace(made, image=EVEN)
-    if not isinstance(made, Bitmap):
+    result = factor(props, "normalmap", None)
+    if isinstance(result, (Constant, RGBUnbounded)):
+        result = Bitmap(image=result.to_rgb("unbounded").astype(np.float32)[None, None], raw=True)
+    if isinstance(result, Bitmap) and result.image is GREY:
+        result = replace(result, image=EVEN)
+    if not isinstance(result, Bitmap):
         raise props.element.error("'normalmap' must be a bitmap, or one colour")
-    return {**given, "map": made}
+    return {**values, "map": result}
 
 
 def _bump_map(props: Properties) -> Parameters:
-    given = _bent(props)
-    found = nested_textures(props)
-    if len(found) != 1:
-        raise props.element.error(f"needs one texture of heights, not {len(found)}")
-    return {**given, "height": texture(found[0], props), "scale": props.number("scale", 1.0)}
+    values = _bent(props)
+    matches = nested_textures(props)
+    if len(matches) != 1:
+        raise props.element.error(f"needs one texture of heights, not {len(matches)}")
+    return {**values, "height": texture(matches[0], props), "scale": props.number("scale", 1.0)}
 
 
 def _nested(props: Properties, low: int, high: int) -> list[Material]:
@@ -369,6 +443,8 @@ def _nested(props: Properties, low: int, high: int) -> list[Material]:
 PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = {
     "diffuse": (materials.Diffuse, _diffuse),
     "phong": (materials.Phong, _phong),
+    "roughdiffuse": (materials.OrenNayar, _rough_diffuse),
+    "ward": (materials.Ward, _ward),
     "dielectric": (materials.Dielectric, _coated_dielectric),
     "thindielectric": (materials.ThinDielectric, _thin_dielectric),
     "roughdielectric": (materials.RoughDielectric, _rough_dielectric),

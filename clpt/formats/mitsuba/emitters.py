@@ -122,8 +122,8 @@ def _aspect(image: object) -> float:
     """Width over height of an image; 1 for what is none."""
     if not isinstance(image, Bitmap):
         return 1.0
-    given: Any = image.image
-    values = images.read_stored(given).values if isinstance(given, (str, Path)) else given
+    entries: Any = image.image
+    values = images.read_stored(entries).values if isinstance(entries, (str, Path)) else entries
     height, width = np.shape(values)[:2]
     return width / height
 
@@ -190,10 +190,10 @@ def _sky(props: Properties) -> Parameters:
     element, old = props.element, props.context.old
     dated = old and "sun_direction" not in props.named
     d = _sun_direction(props)
-    own = props.placement()
+    inner = props.placement()
     if not dated:
-        d = np.linalg.inv(own[:3, :3]) @ d  # the file gives it in the world
-    place = own if old else own @ transforms.rotate([1, 0, 0], 90.0)  # +y up
+        d = np.linalg.inv(inner[:3, :3]) @ d  # the file gives it in the world
+    place = inner if old else inner @ transforms.rotate([1, 0, 0], 90.0)  # +y up
     east, above, south = d if old else (d[0], d[2], -d[1])
     elevation = float(np.degrees(np.arctan2(above, np.hypot(east, south))))
     turbidity = props.number("turbidity", 3.0)

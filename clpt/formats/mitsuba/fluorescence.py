@@ -12,19 +12,19 @@ from clpt.spectra import Constant, Spectrum
 
 def fluorescent(props: Properties) -> dict[str, Any]:
     """Take the parameters of materials.Fluorescent and phases.Reradiating."""
-    made: dict[str, Any] = {"amount": real(props, "amount", 1.0)}
-    own = reflectance(props, "reflectance", 0.5) if "reflectance" in props.named else None
+    result: dict[str, Any] = {"amount": real(props, "amount", 1.0)}
+    inner = reflectance(props, "reflectance", 0.5) if "reflectance" in props.named else None
     if "filename" in props.named:
         child, path = props.named["filename"], props.file()
         with child.locating():
-            made["reradiation"] = spectra.read_reradiation(path)
-            if own is None and path.suffix.lower() == ".bfc":
-                own = spectra.read_bispectral(path)[0]
+            result["reradiation"] = spectra.read_reradiation(path)
+            if inner is None and path.suffix.lower() == ".bfc":
+                inner = spectra.read_bispectral(path)[0]
     elif "emission" in props.named:
-        made["reradiation"] = dye(props)
+        result["reradiation"] = dye(props)
     else:
         raise props.element.error("needs 'filename', or 'absorption' and 'emission'")
-    return made if own is None else {**made, "reflectance": own}
+    return result if inner is None else {**result, "reflectance": inner}
 
 
 def dye(props: Properties) -> spectra.Fluorophore:

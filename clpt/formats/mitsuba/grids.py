@@ -41,10 +41,10 @@ def one_channel(element: Element, context: Context) -> Volume:
 
 
 def _one_channel(element: Element, context: Context) -> Volume:
-    made = channels(element, context)
-    if made.values.shape[3] != 1:
-        raise element.error(f"its file has {made.values.shape[3]} channels; read is 1")
-    return Volume(made.values[..., 0], made.to_world)
+    result = channels(element, context)
+    if result.values.shape[3] != 1:
+        raise element.error(f"its file has {result.values.shape[3]} channels; read is 1")
+    return Volume(result.values[..., 0], result.to_world)
 
 
 def colours(element: Element, context: Context) -> Volume:
@@ -53,11 +53,11 @@ def colours(element: Element, context: Context) -> Volume:
 
 
 def _colours(element: Element, context: Context) -> Volume:
-    made = channels(element, context)
-    if made.values.max() > 1.0:
+    result = channels(element, context)
+    if result.values.max() > 1.0:
         context.warn(element, "its albedo exceeds 1 somewhere; it is clamped")
-    values = np.minimum(made.values, np.float32(1.0))
-    return Volume(np.repeat(values, 3 // values.shape[3], axis=3), made.to_world)
+    values = np.minimum(result.values, np.float32(1.0))
+    return Volume(np.repeat(values, 3 // values.shape[3], axis=3), result.to_world)
 
 
 def channels(element: Element, context: Context) -> Volume:
@@ -66,10 +66,10 @@ def channels(element: Element, context: Context) -> Volume:
 
 
 def _kept(
-    what: str, element: Element, context: Context, make: Callable[[Element, Context], Any]
+    label: str, element: Element, context: Context, make: Callable[[Element, Context], Any]
 ) -> Any:
     """Make something of a grid once, so that all references to the grid share its arrays."""
-    key = what, id(element)
+    key = label, id(element)
     if key not in context.volumes:
         context.volumes[key] = make(element, context)
     return context.volumes[key]
@@ -78,9 +78,16 @@ def _kept(
 def _read(element: Element, context: Context) -> Volume:
     props = Properties(element, context)
     props.ignore("raw", "accel")
-    path, to_world = props.file(), props.placement()
-    with element.locating():
-        values, box = vol.read_channels(path)
+    to_world, array = props.placement(), props.array("data", "grid")
+    if array is None:
+        path = props.file()
+        with element.locating():
+            values, box = vol.read_channels(path)
+    else:  # (z, y, x) or (z, y, x, channels), as Mitsuba's tensors
+        values, box = (
+            (array if array.ndim == 4 else array[..., None]).transpose(2, 1, 0, 3),
+            np.eye(4),
+        )
     if props.flag("use_grid_bbox", context.old):  # 0.6: src/volume/gridvolume.cpp
         to_world = to_world @ box
     if props.text("wrap_mode", "clamp", ("clamp", "repeat", "mirror")) != "clamp":
@@ -102,9 +109,9 @@ def even_box(props: Properties, name: str) -> NDArray[np.float64]:
     child = props.named.get(name)
     target = props.element if child is None else props.context.resolve(child)
     if target.tag == "volume":
-        own = Properties(target, props.context)
-        if "to_world" in own.named:
-            return own.placement()
+        inner = Properties(target, props.context)
+        if "to_world" in inner.named:
+            return inner.placement()
     message = (
         f"as in Mitsuba it fills the unit cube alone: {name!r} is a <volume> without to_world, "
         "or none"
@@ -137,14 +144,14 @@ def together(first: Volume, *others: Volume) -> list[Volume]:
         size = np.array(first.values.shape[:3])
     shape = tuple(int(n) for n in size)
     return [
-        one
-        if one.values.shape[:3] == shape and np.allclose(one.to_world, box, 1e-6, 1e-9)
-        else Volume(resampled(one.values, one.to_world, shape, box, hold=True), box)
-        for one in (first, *others)
+        item
+        if item.values.shape[:3] == shape and np.allclose(item.to_world, box, 1e-6, 1e-9)
+        else Volume(resampled(item.values, item.to_world, shape, box, hold=True), box)
+        for item in (first, *others)
     ]
 
 
-def spread(given: Volume, bounds: Bounds, element: Element) -> Volume:
+def spread(entries: Volume, bounds: Bounds, element: Element) -> Volume:
     """Return a grid whose box holds those bounds too: beyond its own it goes on as at its ends.
 
     Raises SceneError where that takes too many points.
@@ -152,32 +159,32 @@ def spread(given: Volume, bounds: Bounds, element: Element) -> Volume:
     low, high = bounds
     corners = np.array([[low[0], high[0]], [low[1], high[1]], [low[2], high[2]]])
     points = np.stack(np.meshgrid(*corners, indexing="ij"), axis=-1).reshape(-1, 3)
-    size = np.array(given.values.shape[:3])
-    own = transforms.transform_points(np.linalg.inv(given.to_world), points) * size
-    before = np.ceil(np.maximum(-own.min(axis=0), 0.0) - 1e-4)
-    after = np.ceil(np.maximum(own.max(axis=0) - size, 0.0) - 1e-4)
+    size = np.array(entries.values.shape[:3])
+    inner = transforms.transform_points(np.linalg.inv(entries.to_world), points) * size
+    before = np.ceil(np.maximum(-inner.min(axis=0), 0.0) - 1e-4)
+    after = np.ceil(np.maximum(inner.max(axis=0) - size, 0.0) - 1e-4)
     if np.prod(size + before + after) > MOST_POINTS:
         message = "its grid is too fine for so large a shape: make the shape smaller, or its box"
         raise element.error(message)
     pairs = [(int(a), int(b)) for a, b in zip(before, after, strict=True)]
-    values = np.pad(given.values, [*pairs, *[(0, 0)] * (given.values.ndim - 3)], "edge")
+    values = np.pad(entries.values, [*pairs, *[(0, 0)] * (entries.values.ndim - 3)], "edge")
     larger = transforms.translate(-before / size) @ transforms.scale((size + before + after) / size)
-    return Volume(values, np.asarray(given.to_world, float) @ larger)
+    return Volume(values, np.asarray(entries.to_world, float) @ larger)
 
 
 def density(element: Element, context: Context) -> tuple[Any, Volume, Volume | None]:
     """Return `sigma_t` of a grid: a colour, a density, and colours on the grid where they vary."""
-    made: tuple[Any, Volume, Volume | None] = _kept("density", element, context, _density)
-    return made
+    result: tuple[Any, Volume, Volume | None] = _kept("density", element, context, _density)
+    return result
 
 
 def _density(element: Element, context: Context) -> tuple[Any, Volume, Volume | None]:
-    made = channels(element, context)
-    if made.values.shape[3] == 1:
-        return 1.0, Volume(made.values[..., 0], made.to_world), None
-    sigma_t, numbers, tints = volumes.factored(made.values)
-    placed = None if tints is None else Volume(tints, made.to_world)
-    return sigma_t, Volume(numbers, made.to_world), placed
+    result = channels(element, context)
+    if result.values.shape[3] == 1:
+        return 1.0, Volume(result.values[..., 0], result.to_world), None
+    sigma_t, numbers, tints = volumes.factored(result.values)
+    placed = None if tints is None else Volume(tints, result.to_world)
+    return sigma_t, Volume(numbers, result.to_world), placed
 
 
 def ones(to_world: Any, shape: Sequence[int] = (1, 1, 1)) -> Volume:

@@ -21,11 +21,11 @@ def hair(props: Properties) -> dict[str, Any]:
         "longitudinal_roughness": real(props, "longitudinal_roughness", 0.3),
         "azimuthal_roughness": real(props, "azimuthal_roughness", 0.3),
         "scale_tilt": props.number("scale_tilt", 2.0),
-        "eta": _at_yellow(inside) / _at_yellow(outside),
+        "eta": at_yellow(inside) / at_yellow(outside),
     }
 
 
-def _at_yellow(index: Any) -> float:
+def at_yellow(index: Any) -> float:
     return float(index.sample(589.3)) if isinstance(index, Spectrum) else float(index)
 
 

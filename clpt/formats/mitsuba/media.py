@@ -21,24 +21,26 @@ from clpt.scene.textures import Texture
 from clpt.scene.volumes import Volume
 from clpt.spectra import RGBUnbounded
 
+SUBSURFACE = ("dipole", "singlescatter")
+
 
 def medium(element: Element, context: Context) -> Medium:
     """Make the medium that a <medium> describes, the same for every reference."""
-    return context.once(element, lambda one: _made(one, context, MEDIA))
+    return context.once(element, lambda item: _made(item, context, MEDIA))
 
 
 def phase(element: Element, context: Context) -> Phase:
     """Make the phase function that a <phase> describes."""
-    return context.once(element, lambda one: _made(one, context, PHASES))
+    return context.once(element, lambda item: _made(item, context, PHASES))
 
 
 def side(props: Properties, name: str) -> Medium | None:
     """Take the medium of a side of a shape, `interior` or `exterior`, or of a sensor."""
-    found = [child for child in props.nested if child.name == name and child.tag == "medium"]
-    child = props.take(name) if not found else found[0]
+    matches = [child for child in props.nested if child.name == name and child.tag == "medium"]
+    child = props.take(name) if not matches else matches[0]
     if child is None:
         return None
-    if found:
+    if matches:
         props.nested.remove(child)
     target = props.context.resolve(child)
     if target.tag != "medium":
@@ -57,9 +59,9 @@ def _made(element: Element, context: Context, plugins: dict[str, Any]) -> Any:
         raise unknown(element, plugins)
     props = Properties(element, context)
     with element.locating():
-        made = plugins[element.type](props)
+        result = plugins[element.type](props)
     props.finish()
-    return made
+    return result
 
 
 def _homogeneous(props: Properties) -> Medium:
@@ -75,10 +77,10 @@ def _homogeneous(props: Properties) -> Medium:
         props.context.endless[id(props.element)] = medium
         return medium
     beside = [
-        None if one is None else grids.spread(read(one, props.context), room, one)
-        for one, read in ((albedo, grids.colours), (weight, grids.one_channel))
+        None if item is None else grids.spread(read(item, props.context), room, item)
+        for item, read in ((albedo, grids.colours), (weight, grids.one_channel))
     ]
-    box = next(one for one in beside if one is not None).to_world
+    box = next(item for item in beside if item is not None).to_world
     return _on_grid(medium, {"sigma_t": medium.sigma_t, "density": grids.ones(box)}, *beside)
 
 
@@ -104,12 +106,34 @@ def _even(props: Properties) -> Homogeneous:
     return Homogeneous(**within(Homogeneous, parameters, props))
 
 
+def body(element: Element, context: Context) -> tuple[Medium, Any, Any]:
+    """Read Mitsuba 0.6's <subsurface>: the medium of a body, its index and that around it.
+
+    Light walks in the body, where 0.6 takes a dipole for that (src/subsurface/dipole.cpp).
+    """
+    if element.type not in SUBSURFACE:
+        raise unknown(element, SUBSURFACE)
+    props = Properties(element, context)
+    props.ignore("irr_samples", "irr_indirect", "quality", "single_scattering")
+    coefficients = _old_coefficients(props) or {
+        "sigma_t": spectra.coefficient(props, "sigma_t", 1.0),
+        "albedo": spectra.reflectance(props, "albedo", 0.75),
+    }
+    phase = phases.HenyeyGreenstein(g=props.number("g", 0.0))
+    with element.locating():
+        medium = Homogeneous(**coefficients, scale=props.number("scale", 1.0), phase=phase)
+    indices = spectra.ior(props, "int_ior", "bk7"), spectra.ior(props, "ext_ior", "air")
+    props.finish()
+    context.read_as(element, f"subsurface {element.type!r}", "a body in which light walks")
+    return medium, *indices
+
+
 def _old_coefficients(props: Properties) -> dict[str, Any] | None:
     """Take Mitsuba 0.6's `sigma_a` and `sigma_s`, or a preset (src/medium/materials.h).
 
     None where the file gives `sigma_t` or `albedo`. The preset Skin1 is the default.
     """
-    if props.element.type != "homogeneous":
+    if props.element.type not in ("homogeneous", *SUBSURFACE):
         return None
     names = ("sigma_a", "sigma_s")
     if any(name in props.named for name in names):
@@ -142,8 +166,8 @@ def _weight(props: Properties) -> Element | None:
 
 
 def _own_blend(props: Properties) -> Element | None:
-    children = [props.context.resolve(one) for one in (*props.nested, *props.named.values())]
-    blends = [one for one in children if one.tag == "phase" and one.type == "blendphase"]
+    children = [props.context.resolve(item) for item in (*props.nested, *props.named.values())]
+    blends = [item for item in children if item.tag == "phase" and item.type == "blendphase"]
     return blends[0] if len(blends) == 1 else None
 
 
@@ -152,46 +176,48 @@ def _blend_on_grid(props: Properties) -> phases.Blend | None:
     element = _own_blend(props)
     if element is None:
         return None
-    own = Properties(element, props.context)
-    if grids.grid(own, "weight") is None:
+    inner = Properties(element, props.context)
+    if grids.grid(inner, "weight") is None:
         return None
-    first, second = _halves(own)
-    own.finish()
+    first, second = _halves(inner)
+    inner.finish()
     return phases.Blend(first=first, second=second)
 
 
 def _on_grid(
     medium: Homogeneous,
-    given: dict[str, Any],
+    values: dict[str, Any],
     tint: Volume | None,
     share: Volume | None,
     **more: Any,
 ) -> Medium:
     """A medium whose density is on a grid, and perhaps its albedo, or the share of its phases."""
-    beside = [one for one in (tint, share) if one is not None]
-    made = dict(given)
-    colours = made.get("color_grid")
+    beside = [item for item in (tint, share) if item is not None]
+    result = dict(values)
+    colours = result.get("color_grid")
     if beside:
-        found = grids.together(made["density"], *beside, *([] if colours is None else [colours]))
-        made["density"] = found[0]
+        matches = grids.together(
+            result["density"], *beside, *([] if colours is None else [colours])
+        )
+        result["density"] = matches[0]
         if colours is not None:
-            made["color_grid"] = found[-1]
-        tint = None if tint is None else found[1]
-        share = None if share is None else found[len(beside)]
+            result["color_grid"] = matches[-1]
+        tint = None if tint is None else matches[1]
+        share = None if share is None else matches[len(beside)]
     if tint is not None:
-        made |= {"albedo": 1.0, "albedo_grid": tint}
-    made = {
+        result |= {"albedo": 1.0, "albedo_grid": tint}
+    result = {
         "albedo": medium.albedo, "scale": medium.scale, "phase": medium.phase,
-        "emission": medium.emission, "name": medium.name, **made, **more,
+        "emission": medium.emission, "name": medium.name, **result, **more,
     }  # fmt: skip
     if share is None:
-        return Grid(**made)
+        return Grid(**result)
     blend: Any = medium.phase
     second = np.clip(share.values, 0.0, 1.0)
     parts = [
-        Grid(**{**made, "density": Volume(made["density"].values * part, share.to_world),
-                "phase": one, "name": ""})
-        for one, part in ((blend.first, 1.0 - second), (blend.second, second))
+        Grid(**{**result, "density": Volume(result["density"].values * part, share.to_world),
+                "phase": item, "name": ""})
+        for item, part in ((blend.first, 1.0 - second), (blend.second, second))
     ]  # fmt: skip
     return media.Mixture(parts=tuple(parts), name=medium.name)
 
@@ -202,7 +228,9 @@ def _tabulated(props: Properties) -> Phase:
     if child is None:
         raise props.element.error("needs its 'values', two numbers or more")
     try:
-        values = [float(one) for one in child.attributes.get("value", "").replace(",", " ").split()]
+        values = [
+            float(item) for item in child.attributes.get("value", "").replace(",", " ").split()
+        ]
     except ValueError:
         raise child.error("must be numbers, with commas between them") from None
     with child.locating():
@@ -224,7 +252,7 @@ def _mixed_phase(props: Properties) -> Phase:
     """Read Mitsuba 0.6's `mixturephase`: nested blends by `weights`, which are divided by their
     sum."""
     child = props.take("weights")
-    parts = [phase(one, props.context) for one in props.objects("phase")]
+    parts = [phase(item, props.context) for item in props.objects("phase")]
     weights = [] if child is None else numbers(child, "value")
     if not parts or len(weights) != len(parts) or min(weights) < 0.0 or not sum(weights) > 0.0:
         raise props.element.error("needs 'weights', a number above 0 for each <phase> in it")
@@ -236,7 +264,7 @@ def _mixed_phase(props: Properties) -> Phase:
 
 
 def _halves(props: Properties) -> list[Phase]:
-    parts = [phase(one, props.context) for one in props.objects("phase")]
+    parts = [phase(item, props.context) for item in props.objects("phase")]
     if len(parts) != 2:
         raise props.element.error(f"must hold two phase functions, not {len(parts)}")
     return parts
@@ -261,7 +289,7 @@ def _heterogeneous(props: Properties) -> Medium:
     albedo = grids.grid(props, "albedo")
     tint = None if albedo is None else grids.colours(albedo, context)
     share = None if weight is None else grids.one_channel(weight, context)
-    lit = next((one for one in more.values() if isinstance(one, Volume)), None)
+    lit = next((item for item in more.values() if isinstance(item, Volume)), None)
     if sigma_t is not None:
         factor, density, colours = grids.density(sigma_t, context)
     elif lit is not None and props.named.get("sigma_t") is None:
@@ -269,12 +297,12 @@ def _heterogeneous(props: Properties) -> Medium:
     else:
         density, colours = grids.ones(grids.even_box(props, "sigma_t")), None
     medium = _even(props)
-    given = {
+    values = {
         "sigma_t": medium.sigma_t if sigma_t is None else factor,
         "density": density,
         "color_grid": colours,
     }
-    return _on_grid(medium, given, tint, share, **more)
+    return _on_grid(medium, values, tint, share, **more)
 
 
 def _soot(props: Properties) -> media.Soot:
@@ -313,19 +341,19 @@ def _dyed(props: Properties) -> media.Dyed:
 
 def _mixture(props: Properties) -> media.Mixture:
     """Several media in one place, a plugin of our own."""
-    parts = [medium(one, props.context) for one in props.objects("medium")]
+    parts = [medium(item, props.context) for item in props.objects("medium")]
     name = props.element.attributes.get("id", "")
     return media.Mixture(parts=tuple(parts), to_world=props.placement(), name=name)
 
 
 def _plain(props: Properties) -> dict[str, Any]:
     """Take what each medium of our own has: the words, and defaults, of scene.json."""
-    given = {name: spectra.coefficient(props, name) for name in ("sigma_a", "sigma_s", "sigma_t")}
+    values = {name: spectra.coefficient(props, name) for name in ("sigma_a", "sigma_s", "sigma_t")}
     child = props.object("phase")
     if child is not None:
-        given["phase"] = phase(child, props.context)
+        values["phase"] = phase(child, props.context)
     return {
-        **given,
+        **values,
         "albedo": spectra.reflectance(props, "albedo", 1.0),
         "scale": props.number("scale", 1.0),
         "name": props.element.attributes.get("id", ""),
@@ -334,16 +362,16 @@ def _plain(props: Properties) -> dict[str, Any]:
 
 def _more(props: Properties) -> dict[str, Any]:
     """Take what is ours: `bits`, and light on grids."""
-    found: dict[str, Any] = {}
+    matches: dict[str, Any] = {}
     for name in ("emission_grid", "temperature"):
         if (volume := grids.grid(props, name)) is not None:
-            found[name] = grids.one_channel(volume, props.context)
-    if "temperature" in found:
-        found["brightness"] = props.number("brightness", 1.0)
-        found["normalised"] = props.flag("normalised", False)
+            matches[name] = grids.one_channel(volume, props.context)
+    if "temperature" in matches:
+        matches["brightness"] = props.number("brightness", 1.0)
+        matches["normalised"] = props.flag("normalised", False)
     if "bits" in props.named:
-        found["bits"] = props.integer("bits", 16)
-    return found
+        matches["bits"] = props.integer("bits", 16)
+    return matches
 
 
 MEDIA: dict[str, Callable[[Properties], Medium]] = {

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.choices import Missing
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
+from clpt.formats.blockers import note
 from clpt.formats.missing import GREY, grey_for
 from clpt.formats.mitsuba.xml import MAX_NESTING, Document, Element
 from clpt.scene.motion import Keys
@@ -31,7 +32,6 @@ OBJECTS = {
 UNSUPPORTED = {
     "measured", "measured_polarized", "sdfgrid", "ellipsoids", "ellipsoidsmesh",
     "timed_sunsky", "distant", "irradiancemeter", "radiancemeter", "batch", "specfilm",
-    "stokes",
 }  # fmt: skip
 LEFT_OUT = VALUES | OLD_VALUES | {"texture"}  # parameters that old files may have in vain
 MOST_NOTES, MOST_LINES = 16, 3  # notes of a warning, and lines of a note
@@ -167,17 +167,20 @@ class Properties:
 
     def _is_known(self, child: Element) -> bool:
         """Whether the version of the file has an element; else SceneError, told in old files."""
-        if child.tag in VALUES or child.tag in OBJECTS:
+        if child.tag in VALUES or child.tag in OBJECTS or child.array is not None:
             return True
         if self.context.old and (child.tag in OLD_VALUES or child.tag in OLD_OBJECTS):
             return True
         if not self.context.old:
-            raise child.error("is not supported")
+            error = child.error("is not supported")
+            if note(error):
+                return False
+            raise error
         self.context.leave_out(child, f"element <{child.tag}>")
         return False
 
     def _add(self, child: Element) -> None:
-        is_value = child.tag in VALUES or child.tag in OLD_VALUES
+        is_value = child.tag in (*VALUES, *OLD_VALUES) or child.array is not None
         if not child.name and is_value and not child.type:
             raise child.error("needs the attribute 'name'")
         if child.name in self.named:
@@ -199,14 +202,14 @@ class Properties:
         for name, child in list(self.named.items()):
             if child.tag == "ref" and self.context.resolve(child).tag == tag:
                 self.nested.append(self.named.pop(name))
-        matching, rest = [], []
+        matching, others = [], []
         for child in self.nested:
             target = self.context.resolve(child)
             if target.tag == tag:
                 matching.append(target)
             else:
-                rest.append(child)
-        self.nested = rest
+                others.append(child)
+        self.nested = others
         return matching
 
     def object(self, tag: str) -> Element | None:
@@ -275,7 +278,12 @@ class Properties:
         return self.context.document.find_file(child, child.attribute("value"))
 
     def image(self) -> Path | NDArray[np.float32]:
-        """Take the name of an image; grey where there is none and missing ones are grey."""
+        """Take the name of an image; grey where there is none and missing ones are grey.
+
+        A dictionary may have an array in its place, (h, w) or (h, w, c).
+        """
+        if (array := self.array("data", "bitmap")) is not None:
+            return np.asarray(array if array.ndim == 3 else array[..., None])
         child = self.named.get("filename")
         try:
             return self.file()
@@ -284,6 +292,17 @@ class Properties:
                 raise
             self.context.warn(self.element, grey_for(child.attributes.get("value")))
             return GREY
+
+    def array(self, *names: str) -> NDArray[Any] | None:
+        """Take the first array of these names, which only dictionaries have; None without."""
+        for name in names:
+            child = self.named.get(name)
+            if child is not None and child.array is not None:
+                self.take(name)
+                if child.array.ndim not in (2, 3, 4):
+                    raise child.error(f"cannot be an array of {child.array.ndim} axes")
+                return child.array
+        return None
 
     def vector(self, name: str, default: Sequence[float] | None) -> Any:
         """Take a point or a vector."""
@@ -356,7 +375,9 @@ class Properties:
             if self.context.old and self.context.resolve(child).tag in LEFT_OUT:
                 self.context.leave_out(child, f"{name!r} of {label}")
                 continue
-            raise UnusedParameterError(label, name, set(self.read), **child.location())
+            error = UnusedParameterError(label, name, set(self.read), **child.location())
+            if not note(error):
+                raise error
         for child in self.nested:
             self.context.resolve(child)
             raise child.error(f"cannot stand in {label}")

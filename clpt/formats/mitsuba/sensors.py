@@ -30,6 +30,7 @@ LENS_CHOICES = {
     "coating": tuple(lenses.COATINGS), "exposure": params(cameras.Lens)["exposure"].choices,
 }  # fmt: skip
 FILMS = ("hdrfilm", "clptfilm")
+FILTERS = ("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos")
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
 HOLDERS = ("adaptive", "irrcache", "multichannel")  # integrators of Mitsuba 0.6 around another
 NO_LIGHT = ("ao", "field", "motion")  # integrators of Mitsuba 0.6 whose values are no light
@@ -99,10 +100,12 @@ def batch(element: Element, context: Context) -> list[Sensor]:
         " `clpt render --camera all` writes each",
     )
     part = replace(film, width=width)
-    made = [sensor(one, context) for one in inner]
-    if any(not math.isclose(one.film.width / one.film.height, width / film.height) for one in made):
+    result = [sensor(item, context) for item in inner]
+    if any(
+        not math.isclose(item.film.width / item.film.height, width / film.height) for item in result
+    ):
         context.warn(element, "sensors whose own films have other sides see more or less")
-    return [replace(one, film=part, sampler=sampler, spp=spp, seed=seed) for one in made]
+    return [replace(item, film=part, sampler=sampler, spp=spp, seed=seed) for item in result]
 
 
 def default_film() -> Film:
@@ -144,20 +147,20 @@ def _lens(props: Properties, film: Film) -> cameras.Camera:
     placed = props.placement()
     if not np.allclose(np.linalg.norm(placed[:3, :3], axis=0), 1.0, atol=1e-3):
         raise props.element.error("to_world must not scale")
-    given: dict[str, Any] = {"to_world": placed}
+    values: dict[str, Any] = {"to_world": placed}
     if "filename" in props.named:
-        given["lens"] = lenses.read(props.file())
+        values["lens"] = lenses.read(props.file())
     elif "lens" in props.named:
-        given["lens"] = props.text("lens", "", lenses.names())
+        values["lens"] = props.text("lens", "", lenses.names())
     for name in LENS_NUMBERS:
         if name in props.named:
-            given[name] = props.number(name, 0.0)
+            values[name] = props.number(name, 0.0)
     for name, choices in LENS_CHOICES.items():
         if name in props.named:
-            given[name] = props.text(name, "", choices)
-    given["blades"] = props.integer("blades", 0)
-    given["losses"] = props.flag("losses", False)
-    return cameras.Lens(**given)
+            values[name] = props.text(name, "", choices)
+    values["blades"] = props.integer("blades", 0)
+    values["losses"] = props.flag("losses", False)
+    return cameras.Lens(**values)
 
 
 def _orthographic(props: Properties, _: Film) -> cameras.Camera:
@@ -251,23 +254,23 @@ def _film(element: Element, context: Context) -> Film:
 
 def _own_film(props: Properties) -> dict[str, Any]:
     """Return the parameters that only clpt's film has: see docs/mitsuba_plugins.md."""
-    given: dict[str, Any] = {"bands": props.integer("bands", 0)}
+    values: dict[str, Any] = {"bands": props.integer("bands", 0)}
     for name, choices in (("output_space", spaces.SPACES), ("mode", ("spectral", "rgb"))):
         if name in props.named:
-            given[name] = props.text(name, "", choices)
+            values[name] = props.text(name, "", choices)
     for name in ("lambda_min", "lambda_max"):
         if name in props.named:
-            given[name] = props.number(name, 0.0)
+            values[name] = props.number(name, 0.0)
     if "sensor_filename" in props.named:
-        given["sensor"] = read_sensor(props.file("sensor_filename"))
+        values["sensor"] = read_sensor(props.file("sensor_filename"))
     elif "sensor" in props.named:
-        given["sensor"] = props.text("sensor", "", tuple(OBSERVERS))
+        values["sensor"] = props.text("sensor", "", tuple(OBSERVERS))
     if (white := props.named.get("white_balance")) is not None:
         if white.tag == "string":
-            given["white_balance"] = props.text("white_balance", "")
+            values["white_balance"] = props.text("white_balance", "")
         else:
-            given["white_balance"] = props.number("white_balance", 0.0)
-    return given
+            values["white_balance"] = props.number("white_balance", 0.0)
+    return values
 
 
 def _filter(element: Element, context: Context) -> Filter:
@@ -444,6 +447,13 @@ def _no_light() -> Integrator:
     return integrators.Path(max_depth=1, light_paths=0)
 
 
+def _stokes(props: Properties) -> Integrator:
+    """Its picture is that of the nested integrator: light has no polarisation here."""
+    nested = props.object("integrator")
+    props.context.warn(props.element, "its vectors of polarisation are left out")
+    return _path(props) if nested is None else integrator(nested, props.context)
+
+
 def _moment(props: Properties) -> Integrator:
     nested = props.object("integrator")
     if nested is None:
@@ -461,6 +471,7 @@ INTEGRATORS: dict[str, Callable[[Properties], Integrator]] = {
     "aov": _aov,
     "depth": _depth,
     "moment": _moment,
+    "stokes": _stokes,
     "volpath": _volume_path,
     "volpathmis": _volume_path,
     "prb": _replayed(free_panes=False),

@@ -79,12 +79,12 @@ def read(path: Path, index: int) -> tuple[Mesh, bool, list[str]]:
     vertices = stream.array(n_vertices, 3, real)
     normals = stream.array(n_vertices, 3, real) if flags & NORMALS else None
     uvs = stream.array(n_vertices, 2, real) if flags & UVS else None
-    own = {"vertex_color": stream.array(n_vertices, 3, real)} if flags & COLOURS else {}
+    inner = {"vertex_color": stream.array(n_vertices, 3, real)} if flags & COLOURS else {}
     wide = "<u8" if n_vertices > 0xFFFFFFFF else "<u4"
     faces = stream.array(n_faces, 3, wide)
     warnings: list[str] = []
-    given = mesh.Arrays(vertices, faces, normals, uvs, own)
-    arrays = mesh.checked(path, name, given, warnings)
+    values = mesh.Arrays(vertices, faces, normals, uvs, inner)
+    arrays = mesh.checked(path, name, values, warnings)
     if not len(arrays["faces"]):
         raise SceneError("holds no triangles", file=path)
     return Mesh(name=name, **arrays), bool(flags & FLAT), warnings

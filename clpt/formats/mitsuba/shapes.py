@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,17 +14,18 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats import volumes
+from clpt.formats.blockers import attempt
 from clpt.formats.meshes import mesh, strands
 from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.creases import creased
 from clpt.formats.mitsuba.emitters import area
-from clpt.formats.mitsuba.media import side
+from clpt.formats.mitsuba.media import body, side
 from clpt.formats.mitsuba.properties import Context, NoArea, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.geometry.normals import smooth_normals
 from clpt.scene import shapes
-from clpt.scene.materials import Diffuse, Material, Null
+from clpt.scene.materials import Dielectric, Diffuse, Material, Null
 from clpt.scene.shapes import Group, Instance, Shape
 
 Parameters = dict[str, Any]
@@ -38,16 +40,16 @@ def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
 
     The shapes in a <shape type="merge"> are made as if they stood beside it.
     """
-    made: list[Shape] = []
+    result: list[Shape] = []
     for element in elements:
         if element.type == "shapegroup":
             _group(element, context)
         elif element.type == "merge":
-            made += shapes_of(_merged(element, context), context)
+            result += shapes_of(_merged(element, context), context)
         else:
             with suppress(NoArea):
-                made += _single(element, context)
-    return made
+                result += attempt(partial(_single, element, context), [])
+    return result
 
 
 def _single(element: Element, context: Context) -> list[Shape]:
@@ -84,6 +86,7 @@ def shape(element: Element, context: Context) -> Shape:
         "material": default if material is None else bsdf(material, context),
         "emission": None if emitter is None else area(emitter, context),
         **media,
+        **_body(props),
         "flip_normals": props.flag("flip_normals", False),
         "name": element.attributes.get("id", ""),
     }
@@ -93,13 +96,13 @@ def shape(element: Element, context: Context) -> Shape:
         # A mirror turns Mitsuba's spheres inside out, and no other shape.
         parameters["flip_normals"] = not parameters["flip_normals"]
     with element.locating():
-        made: Shape = cls(**parameters)
+        result: Shape = cls(**parameters)
         if stretch is not None:
-            group = Group((made,), made.name or made.kind)
-            made = Instance(group=group, to_world=stretch, name=made.name)
-        made = replace(made, motion=props.motion)
+            group = Group((result,), result.name or result.kind)
+            result = Instance(group=group, to_world=stretch, name=result.name)
+        result = replace(result, motion=props.motion)
     props.finish()
-    return made
+    return result
 
 
 def _instance(element: Element, context: Context) -> Shape:
@@ -110,11 +113,11 @@ def _instance(element: Element, context: Context) -> Shape:
     name = element.attributes.get("id", "")
     with element.locating():
         to_world = props.placement(thin=True)
-        made = Instance(
+        result = Instance(
             group=_group(group, context), to_world=to_world, motion=props.motion, name=name
         )
     props.finish()
-    return made
+    return result
 
 
 def _group(element: Element, context: Context) -> Group:
@@ -130,6 +133,15 @@ def _group(element: Element, context: Context) -> Group:
         return Group(tuple(shapes_of(inner, context)), element.attributes.get("id", ""))
 
     return context.once(element, make)
+
+
+def _body(props: Properties) -> Parameters:
+    """Take Mitsuba 0.6's <subsurface>: a smooth boundary, and the medium inside."""
+    element = props.object("subsurface")
+    if element is None:
+        return {}
+    medium, inside, outside = body(element, props.context)
+    return {"material": Dielectric(int_ior=inside, ext_ior=outside), "interior": medium}
 
 
 def _default_material(emitter: Element | None, in_medium: bool) -> Material:

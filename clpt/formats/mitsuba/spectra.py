@@ -14,6 +14,7 @@ import numpy as np
 
 from clpt import images, spectra
 from clpt.errors import UnknownKindError
+from clpt.formats.blockers import attempt
 from clpt.formats.colour import colour
 from clpt.formats.missing import GREY
 from clpt.formats.mitsuba.properties import (
@@ -24,6 +25,7 @@ from clpt.formats.mitsuba.properties import (
     triple,
     unknown,
 )
+from clpt.formats.mitsuba.spectrum_plugins import PLAIN
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene.roles import COEFFICIENT, EMISSION, FACTOR, INDEX, REFLECTANCE, Spectral
 from clpt.scene.textures import (
@@ -36,15 +38,11 @@ from clpt.scene.textures import (
     Texture,
 )
 from clpt.spectra import (
-    LED,
     RGB,
     Blackbody,
-    Cauchy,
     Constant,
-    Lines,
     RGBIlluminant,
     RGBUnbounded,
-    Sellmeier,
     Spectrum,
     Tabulated,
 )
@@ -127,16 +125,16 @@ def real(props: Properties, name: str, default: float) -> float | Texture:
         return default
     target = props.context.resolve(child)
     with target.locating():
-        made = _value(target, FACTOR, props, name)
-    if isinstance(made, Constant):
-        return made.value
-    if isinstance(made, RGBUnbounded):
-        return float(np.dot(LUMINANCE, (made.r, made.g, made.b)))
-    if not isinstance(made, (float, Texture)):
+        result = _value(target, FACTOR, props, name)
+    if isinstance(result, Constant):
+        return result.value
+    if isinstance(result, RGBUnbounded):
+        return float(np.dot(LUMINANCE, (result.r, result.g, result.b)))
+    if not isinstance(result, (float, Texture)):
         raise target.error("must be a number or a texture")
-    if isinstance(made, Checkerboard):  # Mitsuba swaps its colours where it reads numbers
-        return replace(made, color0=made.color1, color1=made.color0)
-    return made
+    if isinstance(result, Checkerboard):  # Mitsuba swaps its colours where it reads numbers
+        return replace(result, color0=result.color1, color1=result.color0)
+    return result
 
 
 def _take(props: Properties, name: str, role: Spectral, default: object) -> Any:
@@ -268,31 +266,19 @@ def _colour(child: Element, context: Context) -> list[float]:
     return encoded.tolist()
 
 
-def _uniform(props: Properties) -> Spectrum:
-    return Constant(props.number("value", 1.0))
-
-
-def _blackbody(props: Properties) -> Spectrum:
-    return Blackbody(
-        props.number("temperature", 5000.0),
-        props.number("scale", 1.0),
-        props.flag("normalised", False),
-    )
-
-
 def nested_textures(props: Properties) -> list[Element]:
     """Take the textures that stand in an object, whatever their names."""
     tags = {name: props.context.resolve(child).tag for name, child in props.named.items()}
     named = [props.take(name) for name, tag in tags.items() if tag == "texture"]
-    found = [props.context.resolve(child) for child in named if child is not None]
-    return found + props.objects("texture")
+    matches = [props.context.resolve(child) for child in named if child is not None]
+    return matches + props.objects("texture")
 
 
 def _d65(props: Properties) -> Any:
     """D65, times a colour or a texture."""
-    found = nested_textures(props)
-    if found:
-        return _scaled(texture(found[0], props), props.number("scale", 1.0))
+    matches = nested_textures(props)
+    if matches:
+        return _scaled(texture(matches[0], props), props.number("scale", 1.0))
     child = props.take("color")
     rgb = _colour(child, props.context) if child is not None else [1.0, 1.0, 1.0]
     scale = props.number("scale", 1.0)
@@ -325,66 +311,11 @@ def _raw_constant(props: Properties) -> Any:
     return RGBUnbounded(*triple(child, "value", 0.0).tolist())
 
 
-def _irregular(props: Properties) -> Spectrum:
-    return Tabulated(_list(props, "wavelengths"), _list(props, "values"))
-
-
-def _regular(props: Properties) -> Spectrum:
-    values = _list(props, "values")
-    low, high = props.number("wavelength_min", 360.0), props.number("wavelength_max", 830.0)
-    return Tabulated(np.linspace(low, high, len(values)), values)
-
-
-def _illuminant(props: Properties) -> Spectrum:
-    return spectra.illuminant(props.text("name", "D65"), props.number("scale", 1.0))
-
-
-def _lines(props: Properties) -> Spectrum:
-    return Lines(
-        _list(props, "wavelengths"),
-        _list(props, "powers"),
-        props.number("width", 1.0),
-        props.number("scale", 1.0),
-    )
-
-
-def _led(props: Properties) -> Spectrum:
-    return LED(props.number("peak", 530.0), props.number("width", 20.0), props.number("scale", 1.0))
-
-
-def _glass(props: Properties) -> Spectrum:
-    return spectra.glass(props.text("name", "bk7"))
-
-
-def _sellmeier(props: Properties) -> Spectrum:
-    return Sellmeier(tuple(_list(props, "b")), tuple(_list(props, "c")), props.number("a", 1.0))
-
-
-def _cauchy(props: Properties) -> Spectrum:
-    return Cauchy(props.number("a", 1.5), props.number("b", 0.0), props.number("c", 0.0))
-
-
-def _list(props: Properties, name: str) -> list[float]:
-    child = props.take(name)
-    if child is None:
-        raise props.element.error(f"needs the parameter {name!r}")
-    return numbers(child, "value")
-
-
 PLUGINS: dict[str, Callable[[Properties], Any]] = {
-    "uniform": _uniform,
-    "blackbody": _blackbody,
+    **PLAIN,
     "d65": _d65,
     "srgb": _srgb,
     "rawconstant": _raw_constant,
-    "irregular": _irregular,
-    "regular": _regular,
-    "illuminant": _illuminant,
-    "lines": _lines,
-    "led": _led,
-    "glass": _glass,
-    "sellmeier": _sellmeier,
-    "cauchy": _cauchy,
 }
 
 
@@ -392,16 +323,17 @@ def _plugin(child: Element, role: Spectral, outer: Properties) -> Any:
     if child.type not in PLUGINS:
         raise unknown(child, PLUGINS)
     props = Properties(child, outer.context)
-    made = PLUGINS[child.type](props)
+    result = PLUGINS[child.type](props)
     props.finish()
-    if role is REFLECTANCE and type(made) is RGBUnbounded:
-        return made.r, made.g, made.b
-    return made
+    if role is REFLECTANCE and type(result) is RGBUnbounded:
+        return result.r, result.g, result.b
+    return result
 
 
 def texture(element: Element, outer: Properties) -> Texture:
     """Make the texture that an element describes, once for all references."""
-    return outer.context.once(element, lambda _: _texture(element, outer))
+    grey: Texture = Bitmap(image=GREY)
+    return outer.context.once(element, lambda _: attempt(lambda: _texture(element, outer), grey))
 
 
 def _texture(element: Element, outer: Properties) -> Texture:
@@ -409,9 +341,9 @@ def _texture(element: Element, outer: Properties) -> Texture:
         raise unknown(element, TEXTURES)
     props = Properties(element, outer.context)
     with element.locating():
-        made = TEXTURES[element.type](props)
+        result = TEXTURES[element.type](props)
     props.finish()
-    return made
+    return result
 
 
 def _bitmap(props: Properties) -> Bitmap:
@@ -471,8 +403,8 @@ def _mesh_attribute(props: Properties) -> Texture:
     return _scaled(MeshAttribute(name=name), scale)
 
 
-def _scaled(made: Texture, scale: float) -> Texture:
-    return made if scale == 1.0 else Product(first=made, second=scale)
+def _scaled(result: Texture, scale: float) -> Texture:
+    return result if scale == 1.0 else Product(first=result, second=scale)
 
 
 def _to_uv(props: Properties) -> np.ndarray:

@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
+from numpy.typing import NDArray
+
 from clpt.errors import SceneError, nearest
 from clpt.files import budget, input_files
 from clpt.formats.located import Located
@@ -30,13 +32,14 @@ OLD_VERSION = re.compile(r"\s*[01]\.\d")
 
 @dataclass(eq=False)
 class Element(Located):
-    """One XML element: tag, attributes, children, and its location."""
+    """One XML element: tag, attributes, children, and its location; of a dictionary an array."""
 
     tag: str
     attributes: dict[str, str]
     file: Path
     line: int
     children: list[Element] = field(default_factory=list)
+    array: NDArray[Any] | None = None
 
     @property
     def type(self) -> str:
@@ -113,8 +116,8 @@ def parse(path: Path, variables: Mapping[str, object]) -> Document:
         advice = nearest(unused[0], known) if known else "; it has none"
         raise SceneError(f"has no variable {unused[0]!r}{advice}", file=path)
     chosen = expander.values[CAMERA] if CAMERA in set(variables) - expander.used else None
-    own = {name: value for name, value in expander.values.items() if name in expander.used}
-    return Document(root, expander.folders, chosen, own)
+    inner = {name: value for name, value in expander.values.items() if name in expander.used}
+    return Document(root, expander.folders, chosen, inner)
 
 
 def _find(element: Element, name: str, folders: list[Path]) -> Path:
@@ -123,21 +126,21 @@ def _find(element: Element, name: str, folders: list[Path]) -> Path:
 
 
 def _first(
-    element: Element, name: str, places: list[Path], what: str, is_one: Callable[[Path], bool]
+    element: Element, name: str, places: list[Path], label: str, is_one: Callable[[Path], bool]
 ) -> Path:
     """Return the first of the places joined with a name that is a file, or a folder."""
     for place in places:
         candidate = place / name
         try:
-            found = is_one(candidate)
+            matches = is_one(candidate)
         except (OSError, ValueError):
             break
-        if found and what == "file":
+        if matches and label == "file":
             with element.locating():
                 return input_files.named("mitsuba", element.file.parent, candidate)
-        if found:
+        if matches:
             return candidate
-    raise element.error(f"there is no {what} {name!r}")
+    raise element.error(f"there is no {label} {name!r}")
 
 
 def _read(path: Path) -> Element:

@@ -1,7 +1,7 @@
-"""Scenes in PBRT version 4's format.
+"""Scenes in the format of PBRT versions 2, 3 and 4.
 
-What is not supported is an error or a warning that names the file, the line and the directive.
-docs/pbrt.md says what is read and how.
+A feature that is not supported is an error or a warning that names the file, the line and the
+directive. docs/pbrt.md has the tables.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from clpt.choices import Missing
-from clpt.formats.pbrt import build_scene, camera_film, films, reader
+from clpt.formats.pbrt import build_scene, camera_film, films, old_materials, reader
 from clpt.formats.pbrt.build_scene import Progress
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.params import Parameters
@@ -29,18 +29,21 @@ def load(path: Path, progress: Progress | None = None, missing: Missing = "error
     shared = contents.shared
     shared.missing = missing
     shared.make_material = build_scene.make_material
-    shared.walks = all(one.kind in ("infinite", "portal") for one in contents.lights)
+    shared.walks = all(item.kind in ("infinite", "portal") for item in contents.lights)
     options = contents.options
     camera = options.get("Camera") or _default_camera(path, contents)
-    exposure = camera_film.exposure_time(camera.params)
-    film = films.film(options.get("Film"), options.get("PixelFilter"), exposure)
+    exposure = camera_film.exposure_time(camera.params, shared.old)
+    film = films.film(options.get("Film"), options.get("PixelFilter"), exposure, shared.old)
+    integrator = options.get("Integrator")
+    if shared.old:
+        shared.mirrors = old_materials.has_mirrors(contents)
     chosen = options.get("Sampler")
     sampler, spp, seed = films.sampler(chosen)
     scene = Scene(
         camera=camera_film.camera(camera, film, films.diagonal(options.get("Film"))),
         shapes=build_scene.shapes(contents, progress),
         lights=build_scene.lights(contents),
-        integrator=films.integrator(options.get("Integrator"), film),
+        integrator=films.integrator(integrator, film),
         sampler=sampler,
         film=film,
         spp=spp,
@@ -49,7 +52,7 @@ def load(path: Path, progress: Progress | None = None, missing: Missing = "error
         extra={"format": "pbrt", "sampler": chosen.kind if chosen else sampler.kind},
     )
     build_scene.check_unused_materials(contents)
-    build_scene.check_options([one for name, one in options.items() if name != "Accelerator"])
+    build_scene.check_options([item for name, item in options.items() if name != "Accelerator"])
     scene.warnings = build_scene.deduplicated(shared.warnings)
     return scene
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextvars
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -13,6 +15,7 @@ import numpy as np
 from clpt import transforms
 from clpt.errors import did_you_mean
 from clpt.files import budget
+from clpt.formats.blockers import attempt
 from clpt.formats.pbrt.curves import joined
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.layered import body
@@ -23,7 +26,7 @@ from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.shapes import Geometry, displaced, geometry, with_uvs
 from clpt.formats.pbrt.state import Definition, State
 from clpt.formats.pbrt.textures import textured
-from clpt.scene.lights import Light
+from clpt.scene.lights import Area, Light
 from clpt.scene.materials import Diffuse, Mask, Material, Null, TwoSided
 from clpt.scene.media import Medium
 from clpt.scene.params import Kind, fields_of
@@ -33,7 +36,7 @@ from clpt.scene.textures import MeshAttribute, Product, Texture
 
 Progress = Callable[[float, str], None]
 SHARES = "face_power"  # the attribute of a mesh whose parts shine unequally
-GREY = TwoSided(front=Diffuse(reflectance=0.5))
+GREY: Material = TwoSided(front=Diffuse(reflectance=0.5))
 
 
 def shapes(contents: Contents, progress: Progress | None) -> list[Shape]:
@@ -41,13 +44,13 @@ def shapes(contents: Contents, progress: Progress | None) -> list[Shape]:
     used = {use.kind for use in contents.uses}
     parts = [contents.shapes, *(part for name, part in contents.objects.items() if name in used)]
     definitions = [definition for part in parts for definition in part]
-    made = dict(zip(map(id, definitions), _make_all(definitions, progress), strict=True))
+    product = dict(zip(map(id, definitions), _make_all(definitions, progress), strict=True))
     groups = {
-        name: Group(shapes=tuple(joined(_of(definitions, made))), name=name)
+        name: Group(shapes=tuple(joined(_of(definitions, product))), name=name)
         for name, definitions in contents.objects.items()
         if name in used
     }
-    result = list(joined(_of(contents.shapes, made)))
+    result = list(joined(_of(contents.shapes, product)))
     for use in contents.uses:
         if use.kind not in groups:
             hint = did_you_mean(use.kind, contents.objects)
@@ -59,27 +62,34 @@ def shapes(contents: Contents, progress: Progress | None) -> list[Shape]:
     return result
 
 
-def _of(definitions: Sequence[Definition], made: dict[int, Shape | None]) -> Iterator[Shape]:
+def _of(definitions: Sequence[Definition], result: dict[int, Shape | None]) -> Iterator[Shape]:
     """Yield the shapes of definitions, but for those that are empty."""
-    return (shape for each in definitions if (shape := made[id(each)]) is not None)
+    return (shape for each in definitions if (shape := result[id(each)]) is not None)
 
 
 def _make_all(definitions: list[Definition], progress: Progress | None) -> list[Shape | None]:
     """Make the shapes of definitions: geometry in threads, materials one after the other."""
-    made: list[Shape | None] = []
+    result: list[Shape | None] = []
     workers = min(8, os.cpu_count() or 1)
     with ThreadPoolExecutor(workers) as pool:
         try:
-            geometries = pool.map(budget.carried(geometry), definitions)
+            context = contextvars.copy_context()
+            tried = budget.carried(partial(_geometry, context))
+            geometries = pool.map(tried, definitions)
             for definition, body in zip(definitions, geometries, strict=True):
-                made.append(_shape(definition, body))
+                result.append(attempt(partial(_shape, definition, body), None))
                 if progress is not None:
                     count = len(definitions)
-                    progress(len(made) / count, f"{len(made)} of {count} shapes")
+                    progress(len(result) / count, f"{len(result)} of {count} shapes")
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-    return made
+    return result
+
+
+def _geometry(context: contextvars.Context, definition: Definition) -> Geometry | None:
+    """Return the geometry of a shape, in a thread of its own that collects errors as its parent."""
+    return context.copy().run(attempt, lambda: geometry(definition), None)
 
 
 def _shape(definition: Definition, form: Geometry | None) -> Shape | None:
@@ -101,20 +111,19 @@ def _shape(definition: Definition, form: Geometry | None) -> Shape | None:
         emission = None
     if not isinstance(opacity, float) or opacity < 1.0:
         surface = Mask(material=surface, opacity=opacity)
-        if emission is not None:
-            state.warn(params, "'alpha' hides its surface, but not its light")
+        emission = _masked(emission, opacity)
     if _has_texture(surface) or _has_texture(emission):
         if form.kind is Curves:
             state.warn(params, "textures run around and along curves, not along and across")
         form = with_uvs(form)
     with params.locating():
-        made = form.made(
+        result = form.made(
             material=surface,
             emission=emission,
             interior=_body(params, state) or medium(state.inside, params, state),
             exterior=medium(state.outside, params, state),
         )
-        return _moving(made, state)
+        return _moving(result, state)
 
 
 def _moving(shape: Shape, state: State) -> Shape:
@@ -122,8 +131,21 @@ def _moving(shape: Shape, state: State) -> Shape:
     keys = state.motion()
     if keys is None:
         return shape
-    own = transforms.inverse(state.ctm) @ np.asarray(shape.to_world)
-    return replace(shape, to_world=own, motion=keys)
+    inner = transforms.inverse(state.ctm) @ np.asarray(shape.to_world)
+    return replace(shape, to_world=inner, motion=keys)
+
+
+def _masked(emission: Light | None, opacity: float | Texture) -> Light | None:
+    """Return the light of a shape with an alpha: what is not there does not shine.
+
+    By pbrt's rule an alpha of 0 all over hides a lamp and leaves it all its light.
+    """
+    if emission is None:
+        return None
+    light = cast(Area, emission)  # as there is no other
+    if isinstance(opacity, float) and opacity <= 0.0:
+        return replace(light, visible=False)
+    return replace(light, radiance=Product(first=light.radiance, second=opacity))
 
 
 def _material(source: Parameters, state: State) -> Material:
@@ -134,10 +156,10 @@ def _material(source: Parameters, state: State) -> Material:
     if isinstance(current, str):
         return state.named_material(current, source)
     kind, params, defined_in = current.kind, current.params, current.state
-    made: Material = state.shared.once(
+    result: Material = state.shared.once(
         current, params, lambda: make_material(kind, params, defined_in, "")
     )
-    return made
+    return result
 
 
 def _body(source: Parameters, state: State) -> Medium | None:
@@ -145,7 +167,7 @@ def _body(source: Parameters, state: State) -> Medium | None:
     `subsurface`."""
     current = state.material
     if isinstance(current, str):
-        current = state.shared.materials.get(current)
+        current = state.latest(state.shared.materials.get(current))
     if current is None or current.kind != "subsurface":
         return None
     params, defined_in = current.params, current.state
@@ -154,15 +176,15 @@ def _body(source: Parameters, state: State) -> Medium | None:
         with params.locating():
             return [body(params, defined_in)]
 
-    made: list[Medium | None] = state.shared.once(("body", id(current)), source, make)
-    return made[0]
+    result: list[Medium | None] = state.shared.once(("body", id(current)), source, make)
+    return result[0]
 
 
 def make_material(kind: str, params: Parameters, state: State, name: str) -> Material:
     """Make a material, and warn of parameters that it does not have."""
-    made = material(kind, params, state, name)
+    result = attempt(lambda: material(kind, params, state, name), GREY)
     _warn_of_unused(params, state)
-    return made
+    return result
 
 
 def _emission(state: State, form: Geometry) -> Light | None:
@@ -175,35 +197,40 @@ def _emission(state: State, form: Geometry) -> Light | None:
     area = float(form.areas().mean()) if powerful else 0.0
 
     def make() -> Light:
-        made = area_light(kind, params, defined_in, area)
+        result = area_light(kind, params, defined_in, area)
         _warn_of_unused(params, defined_in)
-        return made
+        return result
 
-    made: Any = state.shared.once((definition, area), params, make)  # an Area, as there is no other
+    result: Any = state.shared.once(
+        (definition, area), params, make
+    )  # an Area, as there is no other
     moved = "displacement" in form.parts
     if powerful and moved:
         state.warn(params, "the 'power' is that of the mean triangle before displacement")
     shares = form.shares() if powerful and not moved else None
     if shares is None:
-        return cast(Light, made)
+        return cast(Light, result)
     form.parts["attributes"] = {SHARES: shares[:, None]}
-    radiance = Product(first=made.radiance, second=MeshAttribute(name=SHARES))
-    return cast(Light, replace(made, radiance=radiance))
+    radiance = Product(first=result.radiance, second=MeshAttribute(name=SHARES))
+    return cast(Light, replace(result, radiance=radiance))
 
 
 def lights(contents: Contents) -> list[Light]:
     """Make all lights that are on no shape. Raises SceneError."""
-    made = []
+    lamps = []
     for each in contents.lights:
-        made.append(light(each.kind, each.params, each.state))
-        _warn_of_unused(each.params, each.state)
-    return made
+        lamp = attempt(partial(light, each.kind, each.params, each.state), None)
+        if lamp is not None:
+            lamps.append(lamp)
+            _warn_of_unused(each.params, each.state)
+    return lamps
 
 
 def check_unused_materials(contents: Contents) -> None:
     """Make the named materials that no shape has, for their errors and warnings."""
-    for name, definition in contents.shared.materials.items():
-        definition.state.named_material(name, definition.params)
+    for name, versions in contents.shared.materials.items():
+        for definition in versions:
+            definition.state.material_of(name, definition)
 
 
 def check_options(options: Sequence[Definition]) -> None:
@@ -219,13 +246,13 @@ def _warn_of_unused(params: Parameters, state: State) -> None:
         state.warn(parameter, f"is not known here and is left out{hint}")
 
 
-def _has_texture(thing: object) -> bool:
+def _has_texture(item: object) -> bool:
     """Whether a material or light, or one inside it, has a texture."""
-    if isinstance(thing, Texture):
+    if isinstance(item, Texture):
         return True
-    if not isinstance(thing, Kind):
+    if not isinstance(item, Kind):
         return False
-    return any(map(_has_texture, fields_of(thing).values()))
+    return any(map(_has_texture, fields_of(item).values()))
 
 
 def deduplicated(warnings: Sequence[str]) -> list[str]:

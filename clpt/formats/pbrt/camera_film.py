@@ -38,15 +38,16 @@ def camera(definition: Definition, film: Film, diagonal: float) -> cameras.Camer
         known = (*CAMERAS, "realistic")
         raise UnknownKindError("camera", definition.kind, known, **definition.params.location())
     params, state = definition.params, definition.state
-    exposure_time(params)
+    exposure_time(params, state.shared.old)
     with params.locating():
         if definition.kind == "realistic":
-            made = _realistic(params, state, film, diagonal)
+            result = _realistic(params, state, film, diagonal)
         else:
-            made = CAMERAS[definition.kind](params, state, film)
-        made = _moving(made, state)
-        shutter = Shutter(*_shutter(params))
-    return replace(made, medium=medium(state.outside, params, state), shutter=shutter)
+            result = CAMERAS[definition.kind](params, state, film)
+        result = _moving(result, state)
+        opens, closes = _shutter(params)
+        shutter = Shutter(opens, max(opens, closes))
+    return replace(result, medium=medium(state.outside, params, state), shutter=shutter)
 
 
 def _moving(camera: cameras.Camera, state: State) -> cameras.Camera:
@@ -54,14 +55,16 @@ def _moving(camera: cameras.Camera, state: State) -> cameras.Camera:
     if state.motion() is None or state.end is None:
         return camera
     keys = [_without_scale(transforms.inverse(matrix))[0] for matrix in (state.ctm, state.end)]
-    own = transforms.inverse(keys[0]) @ camera.to_world
-    return replace(camera, to_world=own, motion=Keys(state.shared.times, keys))
+    inner = transforms.inverse(keys[0]) @ camera.to_world
+    return replace(camera, to_world=inner, motion=Keys(state.shared.times, keys))
 
 
-def exposure_time(params: Parameters) -> float:
-    """Take the time [s] for which the shutter is open."""
+def exposure_time(params: Parameters, old: bool) -> float:
+    """Take the time [s] for which the shutter is open; 1 in old files, which do not count it."""
     opens, closes = _shutter(params)
     time = closes - opens
+    if old:
+        return 1.0
     if not time > 0.0:
         raise params.error("the shutter does not open: 'shutterclose' must be above 'shutteropen'")
     return float(time)
@@ -76,8 +79,8 @@ def _window(params: Parameters, film: Film) -> tuple[float, float, float, float]
     """Take the part of the plane at distance 1 (of a fov of 90) seen: its centre, width, height."""
     frame = params.above_zero("frameaspectratio", film.width / film.height)
     x, y = (frame, 1.0) if frame > 1.0 else (1.0, 1.0 / frame)
-    given = params.several("screenwindow", "float")
-    left, right, low, high = (-x, x, -y, y) if given is None else _four(params, given)
+    values = params.several("screenwindow", "float")
+    left, right, low, high = (-x, x, -y, y) if values is None else _four(params, values)
     if not (left < right and low < high):
         raise params.error("'screenwindow' must be left, right, bottom, top, in this order")
     return (left + right) / 2.0, (low + high) / 2.0, right - left, high - low
@@ -97,7 +100,7 @@ def _perspective(params: Parameters, state: State, film: Film) -> cameras.Camera
     across = width * math.tan(math.radians(fov) / 2.0)
     stretch = height / width * film.width / film.height
     to_world, size = _without_scale(transforms.inverse(state.ctm))
-    given: dict[str, Any] = {
+    values: dict[str, Any] = {
         "to_world": to_world @ TO_RIGHT @ np.diag([1.0, stretch, 1.0, 1.0]),
         "fov": math.degrees(2.0 * math.atan(across / 2.0)),
         "offset_x": x / width,
@@ -108,8 +111,8 @@ def _perspective(params: Parameters, state: State, film: Film) -> cameras.Camera
     radius = params.one("lensradius", "float", 0.0) * size
     distance = params.above_zero("focaldistance", 1e6) * size
     if radius <= 0.0:
-        return cameras.Perspective(**given)
-    return cameras.ThinLens(aperture_radius=radius, focus_distance=distance, **given)
+        return cameras.Perspective(**values)
+    return cameras.ThinLens(aperture_radius=radius, focus_distance=distance, **values)
 
 
 def _without_scale(matrix: transforms.Matrix) -> tuple[transforms.Matrix, float]:
@@ -135,7 +138,8 @@ def _orthographic(params: Parameters, state: State, film: Film) -> cameras.Camer
 
 def _spherical(params: Parameters, state: State, film: Film) -> cameras.Camera:
     mappings = ("equalarea", "equirectangular")
-    if params.choice("mapping", "equalarea", mappings) == "equalarea":
+    usual = mappings[1] if state.shared.old else mappings[0]
+    if params.choice("mapping", usual, mappings) == "equalarea":
         state.warn(params, "'equalarea' is not supported: the picture is equirectangular")
     _window(params, film)
     params.ignore("lensradius", "focaldistance")

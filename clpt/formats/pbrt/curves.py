@@ -69,8 +69,8 @@ def _ribbon(bezier: NDArray[Any], widths: NDArray[Any], normals: Any) -> Parts:
     """A strip across whose middle the curve runs, turned as the normals at the ends of pieces."""
     count = len(bezier) // 3
     if normals is None or len(normals) != count + 1:
-        found = 0 if normals is None else len(normals)
-        raise SceneError(f"a ribbon of {count} pieces needs {count + 1} normals 'N', not {found}")
+        matches = 0 if normals is None else len(normals)
+        raise SceneError(f"a ribbon of {count} pieces needs {count + 1} normals 'N', not {matches}")
     u = np.linspace(0.0, count, PIECES * count + 1)
     piece = np.minimum(u.astype(np.int64), count - 1)
     t = (u - piece)[:, None]
@@ -103,7 +103,7 @@ def areas(parts: Parts) -> NDArray[np.float64]:
     points, cubics = parts["points"].astype(np.float64), len(parts["points"]) // 3
     matrix = np.asarray(parts["to_world"])[:3, :3]
     t = np.linspace(0.0, 1.0, PIECES + 1)[:, None]
-    found = []
+    matches = []
     for i in range(cubics):
         span = [points[3 * i + k, :3] @ matrix.T for k in range(4)]
         while len(span) > 1:
@@ -111,25 +111,25 @@ def areas(parts: Parts) -> NDArray[np.float64]:
         length = np.linalg.norm(np.diff(span[0], axis=0), axis=1).sum()
         scale = abs(np.linalg.det(matrix)) ** (1.0 / 3.0)
         width = scale * (points[3 * i, 3] + points[3 * i + 3, 3])
-        found.append(length * width)
-    return np.array(found)
+        matches.append(length * width)
+    return np.array(matches)
 
 
 def _unit(v: NDArray[Any]) -> NDArray[Any]:
     return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-30)
 
 
-def joined(things: Iterable[Shape]) -> Iterator[Shape]:
+def joined(items: Iterable[Shape]) -> Iterator[Shape]:
     """The shapes, neighbouring curves that share all but their points as one."""
-    for key, run in groupby(things, _shared):
+    for key, run in groupby(items, _shared):
         several = list(run)
         if key is None or len(several) == 1:
             yield from several
         else:
-            curves = [one for one in several if isinstance(one, Curves)]
-            points = np.concatenate([one.points for one in curves])
+            curves = [item for item in several if isinstance(item, Curves)]
+            points = np.concatenate([item.points for item in curves])
             yield replace(
-                curves[0], points=points, lengths=tuple(n for one in curves for n in one.lengths)
+                curves[0], points=points, lengths=tuple(n for item in curves for n in item.lengths)
             )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from clpt.files import budget
 from clpt.formats.located import Located
+from clpt.formats.pbrt import old_words
 from clpt.formats.pbrt.lexer import Lexer
 from clpt.formats.pbrt.state import Definition, Shared, State
 
@@ -53,6 +54,11 @@ class Files(Located):
         if len(self.files) >= DEEPEST:
             raise self.lexer.error(f"{path.name} is included too deep: {DEEPEST} files in others")
         outer, lexer = getattr(self, "lexer", None), Lexer(path)
+        shared = self.contents.shared
+        if outer is None:
+            shared.old = old_words.is_old(lexer.data)
+        if shared.old:
+            lexer.take_old()
         self.files.append(real)
         self.lexer, before = lexer, self.state.file_folder
         self.state.file_folder = path.parent

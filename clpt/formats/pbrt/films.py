@@ -25,17 +25,22 @@ SAMPLERS = (
 )  # fmt: skip
 STORED = ("filename", "savefp16")  # how a file is stored is decided when it is written
 SIZE = (("xresolution", 1280), ("yresolution", 720))
+OLD_SIZE = (("xresolution", 640), ("yresolution", 480))  # pbrt-v3, src/core/film.cpp
 DAYLIGHT = 6500.0  # [K], what pbrt takes a measured sensor's white to be
 
 
-def film(definition: Definition | None, filter: Definition | None, exposure: float) -> Film:
-    """Make the film; `exposure` is how long the shutter is open [s]. Raises SceneError."""
-    made = _filter(filter)
+def film(
+    definition: Definition | None, filter: Definition | None, exposure: float, old: bool
+) -> Film:
+    """Make the film; `exposure` is how long the shutter is open [s]. Raises SceneError.
+
+    old: whether the file is of version 2 or 3, whose film has a `scale` instead.
+    """
+    chosen = _filter(filter, old)
+    size = OLD_SIZE if old else SIZE
     if definition is None:
-        return Film(width=1280, height=720, filter=made)
+        return Film(width=size[0][1], height=size[1][1], filter=chosen)
     params, state = definition.params, definition.state
-    if definition.kind == "image":
-        raise params.error("the film 'image' is PBRT version 3's; convert the file by --upgrade")
     if definition.kind not in FILMS:
         raise UnknownKindError("film", definition.kind, FILMS, **params.location())
     params.ignore(*STORED)
@@ -44,12 +49,12 @@ def film(definition: Definition | None, filter: Definition | None, exposure: flo
         "coordinatesystem", "string", "camera"
     ):
         state.warn(params, "the layers of the film 'gbuffer' are in the world, not the camera")
-    width, height = (params.one(name, "integer", n) for name, n in SIZE)
+    width, height = (params.one(name, "integer", n) for name, n in size)
     with params.locating():
         made_film = Film(
             width=width,
             height=height,
-            filter=made,
+            filter=chosen,
             crop=_crop(params, width, height),
             **_colour(params, state, exposure),
             **(_bands(params) if definition.kind == "spectral" else {}),
@@ -69,13 +74,15 @@ def _colour(params: Parameters, state: State, exposure: float) -> dict[str, Any]
     """Take the sensor: what becomes white, and the factor on the picture."""
     sensor = params.one("sensor", "string", "cie1931")
     balance = params.one("whitebalance", "float", 0.0)
-    given: dict[str, Any] = {"exposure": exposure * params.above_zero("iso", 100.0) / 100.0}
+    if state.shared.old:
+        exposure = params.above_zero("scale", 1.0)
+    values: dict[str, Any] = {"exposure": exposure * params.above_zero("iso", 100.0) / 100.0}
     if sensor != "cie1931":
         state.warn(params, f"the sensor {sensor!r} is not known: cie1931 is used")
         balance = balance or DAYLIGHT
     if balance > 0.0:
-        given["white_balance"] = balance
-    return {**given, "output_space": SPACES[state.colour_space]}
+        values["white_balance"] = balance
+    return {**values, "output_space": SPACES[state.colour_space]}
 
 
 def _bands(params: Parameters) -> dict[str, Any]:
@@ -107,9 +114,9 @@ def _crop(params: Parameters, width: int, height: int) -> tuple[int, int, int, i
     return int(x[0]), int(y[0]), int(x[1] - x[0]), int(y[1] - y[0])
 
 
-def _filter(definition: Definition | None) -> Filter:
+def _filter(definition: Definition | None, old: bool) -> Filter:
     if definition is None:
-        return integrators.Gaussian()
+        return integrators.Box() if old else integrators.Gaussian()
     if definition.kind not in FILTERS:
         raise UnknownKindError("filter", definition.kind, FILTERS, **definition.params.location())
     with definition.params.locating():
@@ -133,6 +140,9 @@ def _triangle(params: Parameters, state: State) -> Filter:
 
 
 def _gaussian(params: Parameters, state: State) -> Filter:
+    if state.shared.old:  # exp(-alpha d^2)
+        sigma = 1.0 / math.sqrt(2.0 * params.above_zero("alpha", 2.0))
+        return integrators.Gaussian(stddev=sigma, radius=_radius(params, state, 2.0))
     radius = _radius(params, state, 1.5)
     return integrators.Gaussian(stddev=params.above_zero("sigma", 0.5), radius=radius)
 
@@ -175,8 +185,8 @@ def sampler(definition: Definition | None) -> tuple[Sampler, int, int | None]:
     seed = params.one("seed", "integer", None)
     if not 0 < spp < 2**31:
         raise params.error(f"there must be at least one sample in a pixel, not {spp}")
-    made = integrators.Zsobol() if definition.kind == "zsobol" else integrators.Sobol()
-    return made, spp, None if seed is None else seed % 2**31
+    result = integrators.Zsobol() if definition.kind == "zsobol" else integrators.Sobol()
+    return result, spp, None if seed is None else seed % 2**31
 
 
 LIGHT_PATHS = ("path", "volpath", "simplepath", "simplevolpath", "randomwalk")
@@ -195,6 +205,8 @@ PHOTONS = (
 )
 IGNORED = ("regularize", "lightsampler", "rrthreshold", "samplelights", "samplebsdf")
 MOST_DEPTH = 2**31 - 2
+NO_LIGHT = ("ao", "function", "ambientocclusion")
+OLD_OTHERS = ("directsamples", "causticphotons", "indirectphotons", "nused", "finalgather")
 
 
 def integrator(definition: Definition | None, film: Film) -> Integrator:
@@ -205,10 +217,14 @@ def integrator(definition: Definition | None, film: Film) -> Integrator:
     if definition is None:
         return integrators.Path(max_depth=6, free_panes=False)
     params, state = definition.params, definition.state
-    if definition.kind in ("ao", "function"):
+    if definition.kind in NO_LIGHT:
         raise params.error("this integrator shows no light; use 'path'")
+    if state.shared.old and definition.kind in ("directlighting", "whitted"):
+        return _direct(params, state)
     known = (*LIGHT_PATHS, *OTHERS, "sppm")
-    if definition.kind not in known:
+    if state.shared.old and definition.kind not in known:
+        state.warn(params, "is read as path")
+    elif definition.kind not in known:
         raise UnknownKindError("integrator", definition.kind, known, **params.location())
     params.ignore(*IGNORED, *OTHERS.get(definition.kind, ()))
     depth = params.one("maxdepth", "integer", 5)
@@ -220,9 +236,21 @@ def integrator(definition: Definition | None, film: Film) -> Integrator:
         state.warn(params, CHOSEN)
         return integrators.Auto(max_depth=longest, free_panes=free)
     if definition.kind != "sppm":
+        params.ignore(*OLD_OTHERS if state.shared.old else ())
         return integrators.Path(max_depth=longest, free_panes=free)
     state.warn(params, PHOTONS)
     return integrators.Vcm(max_depth=longest, free_panes=free, **_photons(params, film))
+
+
+def _direct(params: Parameters, state: State) -> Integrator:
+    """Direct light, which versions 2 and 3 follow through mirrors and glass as well."""
+    depth = params.one("maxdepth", "integer", 5)
+    if not state.shared.mirrors:
+        return integrators.Direct()
+    state.warn(
+        params, "is read as path, since mirrors or glass are there: other surfaces light each other"
+    )
+    return integrators.Path(max_depth=min(max(depth, 0), MOST_DEPTH) + 1, free_panes=False)
 
 
 def _photons(params: Parameters, film: Film) -> dict[str, Any]:

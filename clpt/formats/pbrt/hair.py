@@ -31,13 +31,13 @@ def hair(params: Parameters, state: State) -> Material:
 
 def _absorption(params: Parameters, state: State, around: object) -> Any:
     """Take the absorption, the colour of many fibres, or the concentrations of pigments."""
-    given = textured(params, "sigma_a", FACTOR, state)
+    values = textured(params, "sigma_a", FACTOR, state)
     colour = textured(params, "reflectance", REFLECTANCE, state)
     names = [name for name in ("eumelanin", "pheomelanin") if name in params]
-    if (given is not None) + (colour is not None) + bool(names) > 1:
+    if (values is not None) + (colour is not None) + bool(names) > 1:
         raise SceneError("give one of 'sigma_a', 'reflectance' and pigments")
-    if given is not None:
-        return given
+    if values is not None:
+        return values
     if colour is not None:
         if not isinstance(around, float):
             raise SceneError("with 'reflectance', 'beta_n' must be a number")

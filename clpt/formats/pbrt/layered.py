@@ -32,8 +32,8 @@ from clpt.scene.values import IndexLike, Textured, TexturedNumber
 THICKNESS = 0.01  # of pbrt's coats, in mean free paths
 
 
-def both(made: Material) -> Material:
-    return materials.TwoSided(front=made)
+def both(result: Material) -> Material:
+    return materials.TwoSided(front=result)
 
 
 def coated_diffuse(params: Parameters, state: State) -> Material:
@@ -61,15 +61,15 @@ def coat(params: Parameters, state: State) -> float:
 
 
 def plastic(base: Textured, eta: IndexLike, alpha: TexturedNumber) -> Material:
-    given: dict[str, Any] = {
+    values: dict[str, Any] = {
         "diffuse_reflectance": base,
         "int_ior": eta,
         "ext_ior": 1.0,
         "nonlinear": True,
     }
     if smooth(alpha):
-        return both(materials.Plastic(**given))
-    return both(materials.RoughPlastic(alpha=rough(alpha), **given))
+        return both(materials.Plastic(**values))
+    return both(materials.RoughPlastic(alpha=rough(alpha), **values))
 
 
 def index_at_550(eta: Any) -> float:
@@ -86,10 +86,10 @@ def subsurface(params: Parameters, state: State) -> Material:
     eta = spectrum(params, "eta", INDEX, state, 1.33)
     alpha_u, alpha_v = alphas(params, state)
     if body(params, state) is not None:
-        given = {"int_ior": eta, "ext_ior": 1.0}
+        values = {"int_ior": eta, "ext_ior": 1.0}
         if smooth(alpha_u, alpha_v):
-            return materials.Dielectric(**given)
-        return materials.RoughDielectric(**stretched(alpha_u, alpha_v), **given)
+            return materials.Dielectric(**values)
+        return materials.RoughDielectric(**stretched(alpha_u, alpha_v), **values)
     scattering, absorption, reflectance, g = _given(params, state)
     if reflectance is None:
         base = _albedo(scattering, absorption, g)
@@ -113,7 +113,7 @@ def body(params: Parameters, state: State) -> Homogeneous | None:
         return None
     phase = HenyeyGreenstein(g=g) if g else Isotropic()
     if reflectance is None:
-        scattering, absorption = (_coefficient(one) for one in (scattering, absorption))
+        scattering, absorption = (_coefficient(item) for item in (scattering, absorption))
         return Homogeneous(sigma_a=absorption, sigma_s=scattering, scale=scale, phase=phase)
     eta = spectrum(params, "eta", INDEX, state, 1.33)
     inner = map_values(reflectance, coated_albedo.from_body_reflectance(index_at_550(eta)))

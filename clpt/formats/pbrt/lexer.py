@@ -20,6 +20,7 @@ from clpt.formats.pbrt.params import ALIASES, TYPES, Parameter
 
 WORD = re.compile(rb'(?:[ \t\r\n]+|#[^\n]*)*("[^"\n]*"|[\[\]]|[^ \t\r\n\[\]"#]+)?')
 OLD_TYPES = ("color", "xyz")
+COMMA = re.compile(rb'("[^"\n]*")|,')
 UPGRADE = "PBRT version 3's; convert the file by pbrt-v4's --upgrade"
 
 
@@ -34,6 +35,13 @@ class Lexer:
         self.at = 0  # after the blanks before the next word
         self._ahead: bytes | None = None
         self._counted, self._line = 0, 1
+        self.old = False
+
+    def take_old(self) -> None:
+        """Read words of versions 2 and 3, where commas between numbers are blanks."""
+        self.old = True
+        if b"," in self.data:
+            self.data = COMMA.sub(lambda match: match[1] or b" ", self.data)
 
     @property
     def line(self) -> int:
@@ -57,31 +65,31 @@ class Lexer:
             self._ahead = word or b""
         return self._ahead
 
-    def next(self, what: str) -> bytes:
+    def next(self, label: str) -> bytes:
         """Take the next word; `what` says what is missing at the end of the file."""
         word = self.peek()
         if not word:
-            raise self.error(f"the file ends where {what} should follow")
+            raise self.error(f"the file ends where {label} should follow")
         self.at, self._ahead = self.at + len(word), None
         return word
 
-    def string(self, what: str) -> str:
+    def string(self, label: str) -> str:
         """Take a string in quotes."""
-        word = self.next(what)
+        word = self.next(label)
         if not word.startswith(b'"'):
-            raise self.error(f"{what} must stand in quotes, not {_shown(word)}")
+            raise self.error(f"{label} must stand in quotes, not {_shown(word)}")
         return text.decode(word[1:-1])
 
-    def numbers(self, count: int, what: str) -> NDArray[np.float64]:
+    def numbers(self, count: int, label: str) -> NDArray[np.float64]:
         """Take `count` finite numbers, which may stand in brackets."""
         bracket = self.peek() == b"["
         values = self._bracketed() if bracket else [self.next("a number") for _ in range(count)]
         if not isinstance(values, np.ndarray):
             values = np.array([self._number(word) for word in values], np.float64)
         if len(values) != count:
-            raise self.error(f"{what} needs {count} numbers, not {len(values)}")
+            raise self.error(f"{label} needs {count} numbers, not {len(values)}")
         if not np.isfinite(values).all():
-            raise self.error(f"{what} needs finite numbers")
+            raise self.error(f"{label} needs finite numbers")
         return values
 
     def parameters(self, where: str) -> list[Parameter]:
@@ -98,6 +106,8 @@ class Lexer:
             shown = " ".join(declaration)[:60]
             raise self.error(f'{where}: "{shown}" is not a type and a name')
         kind, name = declaration
+        if kind in OLD_TYPES and self.old:
+            return Parameter(kind, name, self._values(), self.path, line, where)
         if kind in OLD_TYPES:
             raise self.error(f"{where}: the type {kind!r} is {UPGRADE}")
         if kind not in TYPES:

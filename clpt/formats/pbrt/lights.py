@@ -27,14 +27,20 @@ from clpt.scene.roles import EMISSION
 from clpt.scene.textures import Bitmap
 from clpt.spectra import RGBIlluminant, luminance, scaled
 
+# our directions of a map in latitude and longitude, in those of pbrt-v3
+LAT_LONG = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 WHITE = RGBIlluminant(1.0, 1.0, 1.0)
 SWAP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])  # y is up for a goniometer
 
 
-def light(kind: str, params: Parameters, state: State) -> Light:
-    """Make what a `LightSource` directive describes. Raises SceneError."""
+def light(kind: str, params: Parameters, state: State) -> Light | None:
+    """Make the light of a `LightSource` directive; None for an unknown kind that is left out.
+
+    Raises SceneError.
+    """
     if kind not in MAKERS:
-        raise UnknownKindError("light", kind, MAKERS, **params.location())
+        state.stand_in(UnknownKindError("light", kind, MAKERS, **params.location()), params)
+        return None
     with params.locating():
         return MAKERS[kind](params, state)
 
@@ -50,27 +56,47 @@ def area_light(kind: str, params: Parameters, state: State, area: float = 0.0) -
     with params.locating():
         two_sided = params.one("twosided", "bool", False)
         file = params.one("filename", "string", "")
-        given = spectrum(params, "L", EMISSION, state)
-        if file and given is not None:
+        values = _light_colour(params, "L", state)
+        if file and values is not None:
             raise SceneError("give either 'L' or 'filename', not both")
         image = _image(file, state) if file else None
         mean = 1.0 if image is None else float(luminance(image).mean(dtype=np.float64))
-        scale = _power_scale(params, (2.0 if two_sided else 1.0) * np.pi * area * mean)
+        scale = _power_scale(params, state, (2.0 if two_sided else 1.0) * np.pi * area * mean)
         if image is None:
-            return lights.Area(radiance=_bright(given, scale), two_sided=two_sided)
+            return lights.Area(radiance=_bright(values, scale), two_sided=two_sided)
         shown = Bitmap(image=image * np.float32(scale), raw=True, wrap="clamp")
         return lights.Area(radiance=shown, two_sided=two_sided)
 
 
-def _bright(given: Any, scale: float) -> Any:
+def _light_colour(params: Parameters, name: str, state: State) -> Any:
+    """Take a light's spectrum; in versions 2 and 3 times a `scale` that may be a colour."""
+    values = spectrum(params, name, EMISSION, state)
+    if not state.shared.old:
+        return values
+    factor = spectrum(params, "scale", EMISSION, state)
+    if factor is None:
+        return values
+    parts = [WHITE if part is None else part for part in (values, factor)]
+    if isinstance(factor, float):
+        return scaled(parts[0], factor)
+    first, second = (np.asarray(part.to_rgb("unbounded")) for part in parts)
+    return RGBIlluminant(*(first * second).tolist())
+
+
+def _old_scale(params: Parameters, state: State) -> float:
+    """Take a `scale` that is a number: in versions 2 and 3 the colour has it already."""
+    return 1.0 if state.shared.old else float(params.one("scale", "float", 1.0))
+
+
+def _bright(values: Any, scale: float) -> Any:
     if scale < 0.0:
         raise SceneError(f"a light cannot be negative: scale {scale:g}")
-    return scaled(WHITE if given is None else given, scale)
+    return scaled(WHITE if values is None else values, scale)
 
 
-def _power_scale(params: Parameters, per_unit: float) -> float:
-    """Take the "scale" and the "power" [W] of what gives out `per_unit`: a factor for both."""
-    scale, power = params.one("scale", "float", 1.0), params.one("power", "float", -1.0)
+def _power_scale(params: Parameters, state: State, per_unit: float) -> float:
+    """Take the "scale" and the "power" [W] of a light that gives out `per_unit`: their factor."""
+    scale, power = _old_scale(params, state), params.one("power", "float", -1.0)
     if power > 0.0:
         if not per_unit > 0.0:
             raise SceneError("what has no area or a dark image cannot have a 'power'")
@@ -79,7 +105,7 @@ def _power_scale(params: Parameters, per_unit: float) -> float:
 
 
 def _intensity(params: Parameters, state: State, per_unit: float) -> Any:
-    return _bright(spectrum(params, "I", EMISSION, state), _power_scale(params, per_unit))
+    return _bright(_light_colour(params, "I", state), _power_scale(params, state, per_unit))
 
 
 def _from_to(params: Parameters, state: State) -> tuple[np.ndarray, np.ndarray]:
@@ -105,6 +131,8 @@ def _spot(params: Parameters, state: State) -> Light:
     beam = cone - params.one("conedeltaangle", "float", 5.0)
     if not 0.0 <= beam <= cone <= 180.0:
         raise SceneError("'conedeltaangle' must lie between 0 and 'coneangle'")
+    if state.shared.old:
+        state.warn(params, "its edge is smooth, not the fourth power of version 3")
     full, edge = np.cos(np.radians([beam, cone]))
     start, direction = _from_to(params, state)
     return lights.Spot(
@@ -123,22 +151,24 @@ def _facing(start: np.ndarray, direction: np.ndarray) -> np.ndarray:
 
 def _distant(params: Parameters, state: State) -> Light:
     _, direction = _from_to(params, state)
-    scale, lux = params.one("scale", "float", 1.0), params.one("illuminance", "float", -1.0)
-    irradiance = _bright(
-        spectrum(params, "L", EMISSION, state), scale * lux if lux > 0.0 else scale
-    )
+    scale, lux = _old_scale(params, state), params.one("illuminance", "float", -1.0)
+    irradiance = _bright(_light_colour(params, "L", state), scale * lux if lux > 0.0 else scale)
     return lights.Directional(direction=tuple(direction.tolist()), irradiance=irradiance)
 
 
 def _infinite(params: Parameters, state: State) -> Light:
-    scale, lux = params.one("scale", "float", 1.0), params.one("illuminance", "float", -1.0)
-    given = spectrum(params, "L", EMISSION, state)
+    scale, lux = _old_scale(params, state), params.one("illuminance", "float", -1.0)
+    values = _light_colour(params, "L", state)
     file = params.one("filename", "string", "")
     if params.several("portal", "point3") is not None:
         state.warn(params, "'portal' only guides sampling in pbrt's way; all directions shine here")
     if not file:
-        return lights.Constant(radiance=_bright(given, scale * lux / np.pi if lux > 0.0 else scale))
-    if given is not None:
+        return lights.Constant(
+            radiance=_bright(values, scale * lux / np.pi if lux > 0.0 else scale)
+        )
+    if state.shared.old:
+        return _lat_long(_image(file, state), values, state)
+    if values is not None:
         raise SceneError("give either 'L' or 'filename', not both")
     image = _square(file, state)
     if lux > 0.0:
@@ -147,6 +177,23 @@ def _infinite(params: Parameters, state: State) -> Light:
         raise SceneError(f"a light cannot be negative: scale {scale:g}")
     around = octahedral.lat_long(image, transforms.inverse(state.ctm)[:3, :3])
     return lights.Envmap(image=around, scale=scale)
+
+
+def _lat_long(image: Floats32, colour: RGBIlluminant | None, state: State) -> Light:
+    """Return the light of a map in latitude and longitude: pbrt-v3, src/lights/infinite.cpp.
+
+    Its +z is up, and u grows from +x to +y. Rows of ours lie on the poles, its half a row off.
+    """
+    rgb = np.ones(3) if colour is None else np.asarray(colour.to_rgb("unbounded"))
+    height = max(len(image), 2)
+    at = np.clip(np.arange(height) / (height - 1) * len(image) - 0.5, 0.0, len(image) - 1.0)
+    above = np.minimum(at.astype(np.intp), max(len(image) - 2, 0))
+    part = (at - above)[:, None, None]
+    rows = (1.0 - part) * image[above] + part * image[np.minimum(above + 1, len(image) - 1)]
+    turned = np.eye(4)
+    turned[:3, :3] = state.ctm[:3, :3] @ LAT_LONG
+    turned[:3, :3] /= np.linalg.norm(turned[:3, :3], axis=0)
+    return lights.Envmap(image=(rows * rgb).astype(np.float32), to_world=turned)
 
 
 def _upward(image: np.ndarray) -> float:
@@ -166,7 +213,9 @@ def _goniometric(params: Parameters, state: State) -> Light:
     file = params.one("filename", "string", "")
     image: Floats32 = np.ones((2, 2, 1), np.float32)
     if file:
-        image = _square(file, state).mean(axis=2, keepdims=True)
+        image = (_image if state.shared.old else _square)(file, state).mean(axis=2, keepdims=True)
+    if state.shared.old and file:
+        return _old_goniometric(image, params, state)
     intensity = _intensity(params, state, 4.0 * np.pi * float(image.mean()))
     position = transforms.transform_points(state.ctm, np.zeros(3))
     around = octahedral.lat_long(
@@ -179,13 +228,23 @@ def _goniometric(params: Parameters, state: State) -> Light:
     )
 
 
+def _old_goniometric(image: Floats32, params: Parameters, state: State) -> Light:
+    """A map in latitude and longitude whose +y is up: pbrt-v3, src/lights/goniometric.h."""
+    placed = transforms.translate(transforms.transform_points(state.ctm, np.zeros(3)))
+    placed[:3, :3] = state.ctm[:3, :3] @ SWAP @ LAT_LONG
+    placed[:3, :3] /= np.linalg.norm(placed[:3, :3], axis=0)
+    intensity = _intensity(params, state, 4.0 * np.pi * float(image.mean()))
+    shown = Bitmap(image=np.ascontiguousarray(image), raw=True)
+    return lights.Goniometric(intensity=intensity, image=shown, to_world=placed)
+
+
 def _projection(params: Parameters, state: State) -> Light:
     """pbrt's intensity is the image's; ours is that over cos^3, so that a plane across shows it."""
     file = params.one("filename", "string", "")
     if not file:
         raise SceneError("needs the parameter 'filename'")
     image = _image(file, state)
-    fov = params.one("fov", "float", 90.0)
+    fov = params.one("fov", "float", 45.0 if state.shared.old else 90.0)
     if not 0.0 < fov < 180.0:
         raise SceneError(f"'fov' must lie between 0 and 180, not {fov:g}")
     aspect = image.shape[1] / image.shape[0]
@@ -204,7 +263,9 @@ def _projection(params: Parameters, state: State) -> Light:
         shown = shown[:, ::-1]
     return lights.Projector(
         image=Bitmap(image=np.ascontiguousarray(shown), raw=True, filter="nearest"),
-        irradiance=_bright(None, _power_scale(params, per_unit)),
+        irradiance=_intensity(params, state, per_unit)
+        if state.shared.old
+        else _bright(None, _power_scale(params, state, per_unit)),
         fov=float(np.degrees(2.0 * np.arctan(half[0]))),
         to_world=to_world,
     )

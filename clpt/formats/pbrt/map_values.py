@@ -36,8 +36,8 @@ def map_values(value: object, function: Callable[[Any], Any], *, bytes_stay: boo
         return Mix(first=float(function(0.0)), second=float(function(1.0)), amount=value)
     if isinstance(value, Texture):
         names = ENDS[type(value)]
-        given = fields_of(value)
-        ends = [map_values(given[name], function, bytes_stay=bytes_stay) for name in names]
+        values = fields_of(value)
+        ends = [map_values(values[name], function, bytes_stay=bytes_stay) for name in names]
         return replace(value, **dict(zip(names, ends, strict=True)))
     return float(function(value))
 
@@ -63,5 +63,5 @@ def _bitmap(bitmap: Bitmap, function: Callable[[Any], Any], bytes_stay: bool) ->
         levels = images.srgb_to_linear(np.arange(256, dtype=np.float32) / np.float32(255.0))
         codes = images.linear_to_srgb(function(levels).astype(np.float32))
         return replace(bitmap, image=np.round(255.0 * codes).astype(np.uint8)[values[..., :3]])
-    made = function(stored.decoded(linear=not bitmap.raw))
-    return replace(bitmap, image=made.astype(np.float32), raw=True)
+    result = function(stored.decoded(linear=not bitmap.raw))
+    return replace(bitmap, image=result.astype(np.float32), raw=True)

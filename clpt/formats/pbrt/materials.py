@@ -10,7 +10,7 @@ import numpy as np
 
 from clpt import measured
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats.pbrt import coated_albedo
+from clpt.formats.pbrt import coated_albedo, old_materials
 from clpt.formats.pbrt.hair import hair
 from clpt.formats.pbrt.layered import both, coat, coated_diffuse, index_at_550, subsurface
 from clpt.formats.pbrt.map_values import map_values
@@ -29,37 +29,35 @@ PLAIN: dict[str, Any] = {
     "flip_invalid": False,
     "shadowing": False,
 }  # pbrt uses a bent normal as it comes
-OLD = {
-    "matte": "diffuse", "plastic": "coateddiffuse", "metal": "conductor", "mirror": "conductor",
-    "glass": "dielectric", "uber": "coateddiffuse", "substrate": "coateddiffuse",
-    "translucent": "diffusetransmission", "kdsubsurface": "subsurface", "disney": "coateddiffuse",
-    "fourier": "measured",
-}  # fmt: skip
 
 
 def material(kind: str, params: Parameters, state: State, name: str = "") -> Material:
     """Make what a `Material` or `MakeNamedMaterial` directive describes. Raises SceneError."""
-    if kind in OLD:
-        raise params.error(
-            f"{kind!r} is a material of pbrt-v3; pbrt --upgrade converts it to {OLD[kind]!r}"
-        )
+    if state.shared.old and old_materials.is_known(kind):
+        with params.locating():
+            result = old_materials.material(kind, params, state)
+            return replace(_bumped(result, params, state), name=name)
+    if old_materials.is_known(kind) and kind not in MAKERS:
+        raise params.error(f"{kind!r} is a material of pbrt-v3, but the file is of version 4")
     if kind not in MAKERS:
-        raise UnknownKindError("material", kind, MAKERS, **params.location())
+        known = old_materials.MAKERS if state.shared.old else MAKERS
+        state.stand_in(UnknownKindError("material", kind, known, **params.location()), params)
+        return both(materials.Diffuse(name=name))
     with params.locating():
         return replace(_bumped(MAKERS[kind](params, state), params, state), name=name)
 
 
-def _bumped(made: Material, params: Parameters, state: State) -> Material:
+def _bumped(result: Material, params: Parameters, state: State) -> Material:
     """The material with the relief of its "displacement" or its "normalmap"."""
     height = textured(params, "displacement", REAL, state)
     file = params.one("normalmap", "string", "")
     if isinstance(height, Texture) and file:
         raise SceneError("give either 'displacement' or 'normalmap', not both")
     if isinstance(height, Texture):
-        return materials.BumpMap(material=made, height=height, **PLAIN)
+        return materials.BumpMap(material=result, height=height, **PLAIN)
     if file:
-        return materials.NormalMap(material=made, map=normals(file, state), **PLAIN)
-    return made
+        return materials.NormalMap(material=result, map=normals(file, state), **PLAIN)
+    return result
 
 
 def _diffuse(params: Parameters, state: State) -> Material:
@@ -148,24 +146,24 @@ def _mix(params: Parameters, state: State) -> Material:
         raise SceneError(f"'materials' must be two names of materials, not {len(names)}")
     first, second = (state.named_material(name, params) for name in names)
     weight = textured(params, "amount", REAL, state, 0.5)
-    made = materials.Blend(first=first, second=second, weight=weight)
-    kinds = list(materials.parts(made))
+    result = materials.Blend(first=first, second=second, weight=weight)
+    kinds = list(materials.parts(result))
     if any(part.transmits for part in kinds) and materials.TwoSided in map(type, kinds):
         state.warn(params, "beside what lets light through, the rest is black from behind")
-        return _one_sided(made)
-    return made
+        return _one_sided(result)
+    return result
 
 
-def _one_sided(made: Material) -> Material:
+def _one_sided(result: Material) -> Material:
     """The material with the fronts alone of what is given to both sides."""
-    if isinstance(made, materials.TwoSided):
-        return _one_sided(made.front)
+    if isinstance(result, materials.TwoSided):
+        return _one_sided(result.front)
     inner: dict[str, Any] = {
         name: _one_sided(part)
-        for name, part in fields_of(made).items()
+        for name, part in fields_of(result).items()
         if name in ("material", "first", "second") and isinstance(part, Material)
     }
-    return replace(made, **inner) if inner else made
+    return replace(result, **inner) if inner else result
 
 
 def _interface(params: Parameters, state: State) -> Material:

@@ -35,9 +35,9 @@ def medium(name: str, source: Parameters, state: State) -> Medium | None:
         hint = did_you_mean(name, state.shared.media)
         raise source.error(f"there is no medium {name!r}{hint}")
     key, params = ("medium", name), definition.params
-    made = state.shared.once(key, params, lambda: [_made(name, definition)])
-    one: Medium | None = made[0]
-    return one
+    result = state.shared.once(key, params, lambda: [_made(name, definition)])
+    item: Medium | None = result[0]
+    return item
 
 
 def _made(name: str, definition: Definition) -> Medium:
@@ -49,21 +49,21 @@ def _made(name: str, definition: Definition) -> Medium:
         g = params.one("g", "float", 0.0)
         phase = HenyeyGreenstein(g=g) if g else Isotropic()
         scale = params.one("scale", "float", 1.0)
-        own: dict[str, Any] = {"scale": scale, "phase": phase}
+        inner: dict[str, Any] = {"scale": scale, "phase": phase}
         if kind != "rgbgrid":
             absorbs, scatters = _coefficients(params, state, kind in GRIDS)
-            own |= {"sigma_a": absorbs, "sigma_s": scatters}
+            inner |= {"sigma_a": absorbs, "sigma_s": scatters}
         if kind == "rgbgrid":
-            made: Medium = Grid(**own, **_coloured(params, state), name=name)
+            result: Medium = Grid(**inner, **_coloured(params, state), name=name)
         elif kind == "homogeneous":
-            made = Homogeneous(**own, emission=_light(params, state), name=name)
+            result = Homogeneous(**inner, emission=_light(params, state), name=name)
         elif kind == "cloud":
-            made = Cloud(**own, **_cloud(params, state), name=name)
+            result = Cloud(**inner, **_cloud(params, state), name=name)
         else:
-            made = Grid(**own, **_grid(kind, params, state), name=name)
-    for given in params.unused():
-        state.warn(params, f"{given.name!r} is left out")
-    return made
+            result = Grid(**inner, **_grid(kind, params, state), name=name)
+    for values in params.unused():
+        state.warn(params, f"{values.name!r} is left out")
+    return result
 
 
 def _light(params: Parameters, state: State) -> Any:
@@ -117,11 +117,11 @@ def _grid(kind: str, params: Parameters, state: State) -> dict[str, Any]:
 def _coloured(params: Parameters, state: State) -> dict[str, Any]:
     """An `rgbgrid`: a density, its colours where these differ, and an albedo on the grid."""
     parts = [_listed(params, name, state, "rgb") for name in ("sigma_a", "sigma_s")]
-    found = next((part for part in parts if part is not None), None)
-    if found is None:
+    matches = next((part for part in parts if part is not None), None)
+    if matches is None:
         raise params.error("needs its 'sigma_a' or 'sigma_s'")
-    ones = np.pad(np.ones([n - 2 for n in found.values.shape[:3]] + [3], np.float32), _AROUND)
-    absorbs, scatters = (ones if part is None else part.values for part in parts)
+    items = np.pad(np.ones([n - 2 for n in matches.values.shape[:3]] + [3], np.float32), _AROUND)
+    absorbs, scatters = (items if part is None else part.values for part in parts)
     extinction = (absorbs + scatters).astype(float)
     sigma_t, density, colours = volumes.factored(extinction)
     if "Le" in params:
@@ -129,20 +129,20 @@ def _coloured(params: Parameters, state: State) -> dict[str, Any]:
     params.ignore("Le", "Lescale")
     albedo = scatters / np.maximum(extinction, 1e-30)
     return {
-        "density": Volume(density, found.to_world),
-        "color_grid": None if colours is None else Volume(colours, found.to_world),
+        "density": Volume(density, matches.to_world),
+        "color_grid": None if colours is None else Volume(colours, matches.to_world),
         "sigma_t": sigma_t,
-        "albedo_grid": Volume(np.clip(albedo, 0.0, 1.0).astype(np.float32), found.to_world),
+        "albedo_grid": Volume(np.clip(albedo, 0.0, 1.0).astype(np.float32), matches.to_world),
         "albedo_with_density": True,  # as pbrt interpolates sigma_s
     }
 
 
-def _kelvin(given: Volume, params: Parameters) -> Volume:
+def _kelvin(values: Volume, params: Parameters) -> Volume:
     """A temperature as PBRT scales it."""
     offset = params.one("temperaturecutoff", "float", 0.0)
     offset = params.one("temperatureoffset", "float", offset)
     scale = params.one("temperaturescale", "float", 1.0)
-    return Volume(np.maximum((given.values - offset) * scale, 0.0), given.to_world)
+    return Volume(np.maximum((values.values - offset) * scale, 0.0), values.to_world)
 
 
 def _moved(volume: Volume, state: State) -> Volume:
@@ -169,10 +169,10 @@ def _listed(params: Parameters, name: str, state: State, type_: str = "float") -
 
 def _coefficients(params: Parameters, state: State, grid: bool) -> tuple[Any, Any]:
     if grid:
-        one = Constant(1.0)
+        item = Constant(1.0)
         return (
-            spectrum(params, "sigma_a", COEFFICIENT, state, one),
-            spectrum(params, "sigma_s", COEFFICIENT, state, one),
+            spectrum(params, "sigma_a", COEFFICIENT, state, item),
+            spectrum(params, "sigma_s", COEFFICIENT, state, item),
         )
     preset = params.one("preset", "string", "")
     if preset and preset not in coated_albedo.MEDIA:

@@ -65,16 +65,16 @@ def lat_long(image: Floats32, from_world: ArrayLike, *, on_poles: bool = True) -
     off = 0.0 if on_poles else 0.5
     theta = (np.arange(height) + off) * np.pi / (height - 1 + 2 * off)
     low = np.minimum(image, np.float32(PEAK * image.mean(dtype=np.float64)))
-    made = np.empty((height, 2 * height, image.shape[2]), np.float32)
+    result = np.empty((height, 2 * height, image.shape[2]), np.float32)
     strata = 2 if height <= DENSE else 1
     step = max(CHUNK // (2 * height * strata**2), 1)
     for first in range(0, height, step):
-        made[first : first + step] = _gathered(low, matrix, theta, first, step, strata)
+        result[first : first + step] = _gathered(low, matrix, theta, first, step, strata)
     peaks = np.argwhere((image > low).any(axis=2))
     if len(peaks):
         light = image[tuple(peaks.T)] - low[tuple(peaks.T)]
-        _lay_down(made, light, peaks, len(image), matrix, theta)
-    return made
+        _lay_down(result, light, peaks, len(image), matrix, theta)
+    return result
 
 
 def _gathered(
@@ -92,8 +92,8 @@ def _gathered(
     p = ((np.arange(width)[:, None] + 0.5 + within) * (2.0 * np.pi / width)).ravel()
     t, p = np.clip(t, 0.0, np.pi)[:, None], p[None, :]
     axes = (np.sin(p) * np.sin(t), np.cos(t), -np.cos(p) * np.sin(t))
-    own = [sum(m * axis for m, axis in zip(row, axes, strict=True)) for row in from_world]
-    d = np.stack(own, axis=-1, dtype=np.float32)
+    inner = [sum(m * axis for m, axis in zip(row, axes, strict=True)) for row in from_world]
+    d = np.stack(inner, axis=-1, dtype=np.float32)
     at = np.minimum((to_square(d / np.linalg.norm(d, axis=-1, keepdims=True)) * size), size - 1)
     at = at[..., 1].astype(np.intp) * size + at[..., 0].astype(np.intp)
     texels = image.reshape(-1, channels)[at]
@@ -102,7 +102,7 @@ def _gathered(
 
 
 def _lay_down(
-    made: Floats32,
+    result: Floats32,
     light: Floats32,
     texels: NDArray[Any],
     size: int,
@@ -114,7 +114,7 @@ def _lay_down(
     Every point of a texel gives its power to the four pixels around it, whose share of the sphere
     is the integral of their tent: sin(theta) 2 (1 - cos D) / D in theta, D^2 / 6 at a pole.
     """
-    height, width, _ = made.shape
+    height, width, _ = result.shape
     within = (np.arange(PARTS) + 0.5) / PARTS
     rows, columns = texels[:, 0, None, None], texels[:, 1, None, None]
     points = np.broadcast_arrays(columns + within[None, None, :], rows + within[None, :, None])
@@ -133,4 +133,4 @@ def _lay_down(
             share = np.abs(1 - down - (row - top)) * np.abs(1 - right - (column - left))
             share /= area[top + down]
             at = (top + down, (left + right) % width)
-            np.add.at(made, at, (share[..., None] * power).astype(np.float32))
+            np.add.at(result, at, (share[..., None] * power).astype(np.float32))

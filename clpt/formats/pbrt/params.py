@@ -117,12 +117,7 @@ class Parameters(Located):
     def __post_init__(self) -> None:
         self._named = {parameter.name: parameter for parameter in self.defaults}
         self._asked: set[str] = set()
-        own: set[str] = set()
-        for parameter in self.given:
-            if parameter.name in own:
-                raise parameter.error("is given twice")
-            own.add(parameter.name)
-            self._named[parameter.name] = parameter
+        self._named |= {parameter.name: parameter for parameter in self.given}
 
     def location(self) -> dict[str, Any]:
         return {"file": self.file, "line": self.line, "where": self.label}

@@ -10,9 +10,10 @@ import numpy as np
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError, did_you_mean
 from clpt.files import text
+from clpt.formats.pbrt import old_words
 from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.lexer import UPGRADE
-from clpt.formats.pbrt.params import Parameters
+from clpt.formats.pbrt.params import Parameter, Parameters
 from clpt.formats.pbrt.state import TARGETS, Definition, State
 from clpt.formats.pbrt.transforms import TransformDirectives
 
@@ -34,15 +35,16 @@ class _Reader(TransformDirectives):
         super().__init__(path)
         self.stack: list[
             tuple[str, State, str]
-        ] = []  # what began, the state before it, and its location
+        ] = []  # the scope that began, the state before it, and its location
         self.in_world = False
         self.object: list[Definition] | None = None
+        self.keys: dict[str, str] = {}  # of objects that are defined again
 
     def run(self) -> Contents:
         self.go_through(self.path)
         if self.stack:
-            what, _, location = self.stack[-1]
-            raise SceneError(f"the {what}Begin at {location} has no end", file=self.path)
+            label, _, location = self.stack[-1]
+            raise SceneError(f"the {label}Begin at {location} has no end", file=self.path)
         if not self.in_world:
             raise SceneError("has no WorldBegin, so it holds no scene", file=self.path)
         return self.contents
@@ -50,11 +52,23 @@ class _Reader(TransformDirectives):
     def directive(self) -> None:
         """Take the next directive and do what it says."""
         self.name = text.decode(self.lexer.next("a directive"))
+        if self.contents.shared.old:
+            self._modernise()
         action = DIRECTIVES.get(self.name)
         if action is None:
             raise self._unknown()
         with self.locating():
             action(self)
+
+    def _modernise(self) -> None:
+        """Take a directive of version 2 or 3 for that of version 4."""
+        today = old_words.directive(self.name)
+        if not today:
+            with self.locating():
+                self._definition(f'{self.name} "{{}}"')
+            self.warn_once("is left out")
+            today = "WorldEnd"  # which does nothing
+        self.name = today
 
     def _unknown(self) -> SceneError:
         name = self.name
@@ -77,6 +91,11 @@ class _Reader(TransformDirectives):
         self.in_world, self.state.active = True, (True, True)
         self.state.ctm, self.state.end = np.eye(4), None
         self.contents.shared.systems["world"] = np.eye(4), None
+
+    def world_end(self) -> None:
+        """Versions 2 and 3 end a scene so."""
+        if not self.contents.shared.old:
+            raise self._unknown()
 
     def option(self) -> None:
         """Camera, Film and the like."""
@@ -110,19 +129,30 @@ class _Reader(TransformDirectives):
     def attribute_end(self) -> None:
         self._end("Attribute")
 
-    def _begin(self, what: str) -> None:
+    def transform_begin(self) -> None:
+        """As an AttributeBegin in version 4; in older ones it keeps transforms alone."""
+        self._begin("Transform" if self.contents.shared.old else "Attribute")
+
+    def transform_end(self) -> None:
+        self._end("Transform" if self.contents.shared.old else "Attribute")
+
+    def _begin(self, label: str) -> None:
         self.only(True)
         location = f"{self.lexer.path.name}:{self.lexer.line}"
-        self.stack.append((what, self.state, location))
+        self.stack.append((label, self.state, location))
         self.state = self.state.copy()
 
-    def _end(self, what: str) -> None:
+    def _end(self, label: str) -> None:
         if not self.stack:
-            raise SceneError(f"no {what}Begin stands before it")
+            raise SceneError(f"no {label}Begin stands before it")
         began, state, location = self.stack.pop()
-        if began != what:
+        if began != label:
             raise SceneError(f"the {began}Begin at {location} must end first")
         state.file_folder = self.state.file_folder
+        if label == "Transform":
+            kept = self.state.copy()
+            kept.ctm, kept.end, kept.active = state.ctm, state.end, state.active
+            state = kept
         self.state = state
 
     def object_begin(self) -> None:
@@ -130,9 +160,12 @@ class _Reader(TransformDirectives):
         if self.object is not None:
             raise SceneError("objects cannot stand in objects")
         if name in self.contents.objects:
-            raise SceneError(f"the object {name!r} is already defined")
+            if not self.contents.shared.old:
+                raise SceneError(f"the object {name!r} is already defined")
+            self.warn(f"the object {name!r} is defined again: it counts from here")
+            self.keys[name] = f"{name} (line {self.lexer.line})"
         self._begin("Object")
-        self.object = self.contents.objects[name] = []
+        self.object = self.contents.objects[self.keys.get(name, name)] = []
 
     def object_end(self) -> None:
         self._end("Object")
@@ -144,6 +177,7 @@ class _Reader(TransformDirectives):
             raise SceneError("cannot stand in an object")
         name = self.lexer.string("a name")
         params = Parameters(f'ObjectInstance "{name}"', self.lexer.path, self.lexer.line)
+        name = self.keys.get(name, name)
         self.contents.uses.append(Definition(name, params, self.state.copy()))
 
     def include(self) -> None:
@@ -171,14 +205,31 @@ class _Reader(TransformDirectives):
     def _definition(self, label: str, target: str = "", words: str = "a type") -> Definition:
         kind, line = self.lexer.string(words), self.lexer.line
         label = label.replace("{}", kind)
-        given = self.lexer.parameters(label)
+        values = self.lexer.parameters(label)
+        if len({parameter.name for parameter in values}) < len(values):
+            values = self._last(values)
+        shared = self.contents.shared
+        if shared.old:
+            with self.locating():
+                kind, values = old_words.definition(self.name, kind, values)
         defaults = self.state.defaults.get(target, ())
-        params = Parameters(label, self.lexer.path, line, given, defaults)
+        params = Parameters(label, self.lexer.path, line, values, defaults)
+        shared.count += 1
+        self.state.number = shared.count
         state = self.state.copy()
-        for parameter in given:
+        for parameter in values:
             if parameter.name == "filename" and parameter.is_text:
                 self.contents.shared.files.update(dict.fromkeys(parameter.texts(), state))
         return Definition(kind, params, state)
+
+    def _last(self, values: list[Parameter]) -> list[Parameter]:
+        """Return the last of parameters of one name, as pbrt does (src/pbrt/paramdict.cpp)."""
+        last: dict[str, Parameter] = {}
+        for parameter in values:
+            if parameter.name in last:
+                self.warn(f"{parameter.name!r} is given twice: the later value counts")
+            last[parameter.name] = parameter
+        return list(last.values())
 
     def attribute(self) -> None:
         definition = self._definition('Attribute "{}"')
@@ -224,12 +275,17 @@ class _Reader(TransformDirectives):
         self.only(True)
         definition = self._definition('MakeNamedMaterial "{}"', "material", "a name")
         name, materials = definition.kind, self.contents.shared.materials
-        if name in materials:
-            raise definition.params.error("is already defined")
+        self._check_new(name in materials, definition)
         kind = definition.params.one("type", "string", None)
         if kind is None:
             raise definition.params.error("needs the parameter 'string type'")
-        materials[name] = Definition(kind, definition.params, definition.state)
+        version = Definition(kind, definition.params, definition.state)
+        materials.setdefault(name, []).append(version)
+
+    def _check_new(self, exists: bool, definition: Definition) -> None:
+        """Raise SceneError for a name that is defined again; versions 2 and 3 allow that."""
+        if exists and not self.contents.shared.old:
+            raise definition.params.error("is already defined")
 
     def named_material(self) -> None:
         self.only(True)
@@ -239,15 +295,16 @@ class _Reader(TransformDirectives):
         self.only(True)
         name = self.lexer.string("a name")
         values = self.lexer.string("float or spectrum")
+        if values == "color" and self.contents.shared.old:
+            values = "spectrum"
         if values == "color":
             raise SceneError(f"a texture of the type color is {UPGRADE}")
         if values not in ("float", "spectrum"):
             raise SceneError(f"a texture has values float or spectrum, not {values[:40]!r}")
         definition = self._definition(f'Texture "{name}" "{{}}"', "texture")
         textures = self.contents.shared.textures
-        if (values, name) in textures:
-            raise definition.params.error("is already defined")
-        textures[values, name] = definition
+        self._check_new((values, name) in textures, definition)
+        textures.setdefault((values, name), []).append(definition)
 
     def make_named_medium(self) -> None:
         definition = self._definition('MakeNamedMedium "{}"', "medium", "a name")
@@ -289,10 +346,11 @@ DIRECTIVES: dict[str, Callable[[_Reader], None]] = {
     "Shape": _Reader.shape,
     "Texture": _Reader.texture,
     "Transform": _Reader.transform,
-    "TransformBegin": _Reader.attribute_begin,  # as pbrt-v4 treats what it calls deprecated
-    "TransformEnd": _Reader.attribute_end,
+    "TransformBegin": _Reader.transform_begin,
+    "TransformEnd": _Reader.transform_end,
     "TransformTimes": _Reader.transform_times,
     "Translate": _Reader.translate,
     "WorldBegin": _Reader.world_begin,
+    "WorldEnd": _Reader.world_end,
     **dict.fromkeys(OPTIONS, _Reader.option),
 }

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError
@@ -28,7 +28,7 @@ from clpt.scene.shapes import Shape
 from clpt.scene.textures import Bitmap
 
 Parts = dict[str, Any]
-QUADRICS = ("cylinder", "disk", "sphere")
+QUADRICS = ("cylinder", "disk", "sphere", "cone", "hyperboloid", "paraboloid")
 OLD = ("cone", "hyperboloid", "paraboloid", "heightfield", "nurbs")
 ALIKE = 1e-3  # relative difference of areas that is none
 MOST_SPLITS = 10  # of a curve, each in two
@@ -85,21 +85,23 @@ class Geometry:
 def geometry(definition: Definition) -> Geometry | None:
     """Read what a Shape directive describes; None where it is empty. Raises SceneError."""
     params, kind, state = definition.params, definition.kind, definition.state
-    if kind in OLD:
-        raise params.error(f"the shape {kind!r} is PBRT version 3's; use a mesh")
-    if kind not in SHAPES:
-        raise UnknownKindError("shape", kind, SHAPES, **params.location())
+    known = SHAPES if not state.shared.old else SHAPES | OLD_SHAPES
+    if kind in OLD and kind not in known:
+        raise params.error(f"the shape {kind!r} is not supported; use a mesh")
+    if kind not in known:
+        state.stand_in(UnknownKindError("shape", kind, known, **params.location()), params)
+        return None
     with params.locating():
         if transforms.is_singular(state.ctm):
             raise SceneError("its transform flattens space")
-        made = SHAPES[kind](params, state)
-        if made is not None:
+        result = known[kind](params, state)
+        if result is not None:
             turned = kind in QUADRICS and transforms.flips_handedness(state.ctm)
-            made.parts.setdefault("to_world", state.ctm)
-            made.parts["name"] = f"{params.file.name}:{params.line}"
+            result.parts.setdefault("to_world", state.ctm)
+            result.parts["name"] = f"{params.file.name}:{params.line}"
             reverse = state.reverse and kind != "curve"  # a tube is seen from outside
-            made.parts["flip_normals"] = reverse != turned
-    return made
+            result.parts["flip_normals"] = reverse != turned
+    return result
 
 
 def _triangles(params: Parameters, state: State) -> Geometry | None:
@@ -145,12 +147,12 @@ def _mesh(
     return Geometry(shapes.Mesh, arrays, warnings)
 
 
-def _with_pieces(made: Geometry | None, pieces: Any = None, split: int = 1) -> Geometry | None:
+def _with_pieces(result: Geometry | None, pieces: Any = None, split: int = 1) -> Geometry | None:
     """The mesh with the numbers of pbrt's shapes (m,), by default a triangle each."""
-    if made is None:
+    if result is None:
         return None
-    numbers = np.arange(len(made.parts["faces"])) if pieces is None else pieces
-    return replace(made, pieces=numbers, split=split)
+    numbers = np.arange(len(result.parts["faces"])) if pieces is None else pieces
+    return replace(result, pieces=numbers, split=split)
 
 
 def _toward_normals(arrays: Parts) -> NDArray[np.uint32]:
@@ -165,25 +167,25 @@ def _toward_normals(arrays: Parts) -> NDArray[np.uint32]:
     return np.where(turned[:, None], faces[:, ::-1], faces)
 
 
-def with_uvs(made: Geometry) -> Geometry:
+def with_uvs(result: Geometry) -> Geometry:
     """The geometry with pbrt's uv where it has others or none, for textures."""
-    parts = dict(made.parts)
-    if made.kind is shapes.Disk:
+    parts = dict(result.parts)
+    if result.kind is shapes.Disk:
         return Geometry(
-            shapes.Mesh, parts | surfaces.disk_mesh(1.0, 0.0, 0.0, 360.0), made.warnings
+            shapes.Mesh, parts | surfaces.disk_mesh(1.0, 0.0, 0.0, 360.0), result.warnings
         )
-    if made.kind is shapes.Cylinder:
+    if result.kind is shapes.Cylinder:
         ends = parts.pop("p0")[2], parts.pop("p1")[2]
         tube = surfaces.cylinder_mesh(parts.pop("radius"), *ends, 360.0)
-        return Geometry(shapes.Mesh, parts | tube, made.warnings)
-    if made.kind is not shapes.Mesh or parts["uvs"] is not None:
-        return made
+        return Geometry(shapes.Mesh, parts | tube, result.warnings)
+    if result.kind is not shapes.Mesh or parts["uvs"] is not None:
+        return result
     faces = parts["faces"]
     for name in ("vertices", "normals"):
         parts[name] = None if parts[name] is None else parts[name][faces.reshape(-1)]
     parts["uvs"] = np.tile(CORNERS, (len(faces), 1)).astype(np.float32)
     parts["faces"] = np.arange(3 * len(faces), dtype=np.uint32).reshape(-1, 3)
-    return Geometry(shapes.Mesh, parts, made.warnings)
+    return Geometry(shapes.Mesh, parts, result.warnings)
 
 
 def _ply(params: Parameters, state: State) -> Geometry | None:
@@ -191,28 +193,28 @@ def _ply(params: Parameters, state: State) -> Geometry | None:
     path = state.existing_file(name)
     try:
         arrays = ply.read(path)
-        made = _mesh(arrays.vertices, arrays.faces, arrays.normals, arrays.uvs, arrays.warnings)
-        made = _with_pieces(made, arrays.polygons)
+        result = _mesh(arrays.vertices, arrays.faces, arrays.normals, arrays.uvs, arrays.warnings)
+        result = _with_pieces(result, arrays.polygons)
         params.ignore("displacement", "edgelength", "uvscale")  # see displaced
-        return made
+        return result
     except SceneError as error:
         raise SceneError(f"{path.name}: {error.message}") from None
 
 
-def displaced(made: Geometry, params: Parameters, state: State) -> Geometry:
+def displaced(result: Geometry, params: Parameters, state: State) -> Geometry:
     """Return a `plymesh`, displaced by an image if it has a texture for that."""
     edge, scale = params.above_zero("edgelength", 1.0), params.above_zero("uvscale", 1.0)
     if "displacement" not in params:
-        return made
+        return result
     heights = textured(params, "displacement", REAL, state, 0.0)
     uv = isinstance(heights, Bitmap) and heights.mapping == "uv"
-    if not uv or made.parts["uvs"] is None:
+    if not uv or result.parts["uvs"] is None:
         reason = "it is no image by uv" if not uv else "the mesh has no uv"
-        made.warnings.append(f"'displacement' is left out, as {reason}")
-        return made
+        result.warnings.append(f"'displacement' is left out, as {reason}")
+        return result
     heights = replace(heights, to_uv=np.asarray(heights.to_uv) @ np.diag([scale, scale, 1.0]))
-    made.parts |= {"displacement": heights, "displacement_edge": edge}
-    return made
+    result.parts |= {"displacement": heights, "displacement_edge": edge}
+    return result
 
 
 def _loop(params: Parameters, state: State) -> Geometry | None:
@@ -249,8 +251,8 @@ def _patches(params: Parameters, state: State) -> Geometry | None:
     twist = points[corners[:, 0]] - points[corners[:, 1]] - points[corners[:, 2]]
     plain = bool((np.abs(twist + points[corners[:, 3]]) <= tolerance).all())
     u, v, faces = surfaces.grid(*([1, 1] if plain else [PATCH, PATCH]))
-    made = _mesh(*_over_patches(u, v, faces, corners, (points, normals, uvs), plain))
-    return _with_pieces(made, np.repeat(np.arange(len(corners)), len(faces)))
+    result = _mesh(*_over_patches(u, v, faces, corners, (points, normals, uvs), plain))
+    return _with_pieces(result, np.repeat(np.arange(len(corners)), len(faces)))
 
 
 def _over_patches(
@@ -266,8 +268,8 @@ def _over_patches(
         along = np.stack([v - 1, 1 - v, -v, v], axis=1) @ points[corners]
         across = np.stack([u - 1, -u, 1 - u, u], axis=1) @ points[corners]
         normals = np.cross(along, across).reshape(-1, 3)
-    own = np.stack([u, v], axis=1)
-    over = np.tile(own, (len(corners), 1)) if uvs is None else weights @ uvs[corners]
+    inner = np.stack([u, v], axis=1)
+    over = np.tile(inner, (len(corners), 1)) if uvs is None else weights @ uvs[corners]
     starts = len(u) * np.arange(len(corners))[:, None, None]
     return laid.reshape(-1, 3), (faces + starts).reshape(-1, 3), normals, over.reshape(-1, 2)
 
@@ -293,8 +295,8 @@ def _disk(params: Parameters, state: State) -> Geometry | None:
     radius, turn = params.above_zero("radius", 1.0), surfaces.phi_max(params)
     height, inner = params.one("height", "float", 0.0), params.one("innerradius", "float", 0.0)
     if inner == 0.0 and turn == 360.0:
-        own = transforms.translate([0.0, 0.0, height]) @ transforms.scale([radius, radius, 1.0])
-        return Geometry(shapes.Disk, {"to_world": state.ctm @ own})
+        local = transforms.translate([0.0, 0.0, height]) @ transforms.scale([radius, radius, 1.0])
+        return Geometry(shapes.Disk, {"to_world": state.ctm @ local})
     if not 0.0 <= inner < radius:
         raise SceneError(f"'innerradius' must be below the radius, not {inner:g}")
     return Geometry(shapes.Mesh, surfaces.disk_mesh(radius, inner, height, turn))
@@ -315,15 +317,53 @@ def _curve(params: Parameters, state: State) -> Geometry | None:
     kind, parts = curves.curve(params)
     split = 2 ** min(max(params.one("splitdepth", "integer", 3), 0), MOST_SPLITS)
     if kind is None:
-        made = _mesh(parts["points"], parts["faces"], parts["normals"], parts["uvs"])
+        result = _mesh(parts["points"], parts["faces"], parts["normals"], parts["uvs"])
         cubics = np.arange(len(parts["faces"])) // (2 * curves.PIECES)
-        return _with_pieces(made, cubics, split)
+        return _with_pieces(result, cubics, split)
     current = state.material
-    material = state.shared.materials.get(current) if isinstance(current, str) else current
+    if isinstance(current, str):
+        current = state.latest(state.shared.materials.get(current))
     flat = params.one("type", "string", "flat") == "flat"
-    if not flat or (material is not None and material.kind == "hair"):  # there is no difference
+    if not flat or (current is not None and current.kind == "hair"):  # there is no difference
         return Geometry(kind, parts, split=split)
     return Geometry(kind, parts, ["a flat curve is shaded as a round one"], split=split)
+
+
+def _cone(params: Parameters, state: State) -> Geometry | None:
+    radius, height = params.above_zero("radius", 1.0), params.above_zero("height", 1.0)
+    return _revolved(params, [[radius, 0.0, 0.0], [0.0, 0.0, height]])
+
+
+def _paraboloid(params: Parameters, state: State) -> Geometry | None:
+    radius = params.above_zero("radius", 1.0)
+    low, high = sorted((params.one("zmin", "float", 0.0), params.one("zmax", "float", 1.0)))
+    if not 0.0 <= low < high:
+        raise SceneError("'zmin' and 'zmax' must differ, and not be negative")
+    z = np.linspace(low, high, surfaces.ALONG + 1)
+    r = radius * np.sqrt(z / high)
+    return _revolved(params, np.stack([r, np.zeros_like(r), z], axis=1))
+
+
+def _hyperboloid(params: Parameters, state: State) -> Geometry | None:
+    ends = [params.one("p1", "point3", (0.0,) * 3), params.one("p2", "point3", (1.0,) * 3)]
+    parts = np.linspace(0.0, 1.0, surfaces.ALONG + 1)[:, None]
+    return _revolved(params, (1.0 - parts) * ends[0] + parts * ends[1])
+
+
+def _revolved(params: Parameters, profile: ArrayLike) -> Geometry | None:
+    turn = surfaces.phi_max(params)
+    return Geometry(shapes.Mesh, surfaces.revolved_mesh(np.asarray(profile, np.float64), turn))
+
+
+def _heightfield(params: Parameters, state: State) -> Geometry | None:
+    """A grid of heights over the unit square: pbrt-v3, src/shapes/heightfield.cpp."""
+    columns, rows = (params.one(name, "integer", 0) for name in ("nu", "nv"))
+    heights = params.several("Pz", "float")
+    if min(columns, rows) < 2 or heights is None or len(heights) != columns * rows:
+        raise SceneError("needs 'nu' and 'nv' of at least 2, and nu times nv numbers 'Pz'")
+    u, v, faces = surfaces.grid(columns - 1, rows - 1)
+    points = np.stack([u, v, heights], axis=1)
+    return _with_pieces(_mesh(points, faces, None, np.stack([u, v], axis=1)))
 
 
 SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
@@ -335,4 +375,10 @@ SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
     "plymesh": _ply,
     "sphere": _sphere,
     "trianglemesh": _triangles,
+}
+OLD_SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
+    "cone": _cone,
+    "heightfield": _heightfield,
+    "hyperboloid": _hyperboloid,
+    "paraboloid": _paraboloid,
 }

@@ -30,6 +30,7 @@ from clpt.spectra import (
 SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
 ACES = "aces2065-1"
 AP0 = ((0.7347, 0.2653), (0.0, 1.0), (0.0001, -0.077))  # SMPTE ST 2065-1
+WIEN = 2.8977721e6  # wavelength [nm] of a black body's maximum, times its temperature [K]
 CUT = 1e-3  # by how much a colour may be changed without a warning
 SPECTRUM_TYPES = ("rgb", "spectrum", "blackbody")
 GLASSES = {  # what pbrt's tables hold, which is not always what their name says
@@ -52,26 +53,37 @@ def spectrum(
     role: TEXTURE for what a texture is made of. An emission gets luminance 1, or that of its
     colour. Raises SceneError with the location.
     """
-    given = params.find(name, "float", *SPECTRUM_TYPES)
-    if given is None:
+    values = params.find(name, "float", *SPECTRUM_TYPES)
+    if values is None:
         return default
-    with given.locating():
-        return value_of(given, role, state)
+    with values.locating():
+        return value_of(values, role, state)
 
 
-def value_of(given: Parameter, role: Spectral, state: State) -> Any:
+def value_of(values: Parameter, role: Spectral, state: State) -> Any:
     """Return the value in a role of a parameter whose type is "float" or among SPECTRUM_TYPES."""
-    if given.type == "float":
-        return given.numbers(1)[0]
-    if given.type == "rgb":
-        return _rgb(given, role, state)
-    if given.type == "blackbody":
-        made: Spectrum = Blackbody(given.numbers(1)[0], normalised=True)
-    elif given.is_text:
-        made = _named(given.text(), role, state)
+    if values.type == "float":
+        return values.numbers(1)[0]
+    if values.type == "rgb":
+        return _rgb(values, role, state)
+    if values.type == "blackbody" and state.shared.old:
+        return _peaked(values)
+    if values.type == "blackbody":
+        result: Spectrum = Blackbody(values.numbers(1)[0], normalised=True)
+    elif values.is_text:
+        result = _named(values.text(), role, state)
     else:
-        made = _pairs(given.numbers(), role)
-    return _of_luminance_one(made) if role is EMISSION else made
+        result = _pairs(values.numbers(), role)
+    return _of_luminance_one(result) if role is EMISSION and not state.shared.old else result
+
+
+def _peaked(entries: Parameter) -> Spectrum:
+    """Return a black body whose maximum is the second number: pbrt-v3, src/core/paramset.cpp."""
+    values = entries.numbers()
+    if len(values) not in (1, 2) or not values[0] > 0.0:
+        raise SceneError("a black body is a temperature [K] above 0 and a scale")
+    peak = Blackbody(values[0]).sample(np.array([WIEN / values[0]]))[0]
+    return Blackbody(values[0], (values[1] if len(values) == 2 else 1.0) / float(peak))
 
 
 def to_rec709(rgb: object, space: str, *, light: bool) -> Any:
@@ -88,18 +100,21 @@ def to_rec709(rgb: object, space: str, *, light: bool) -> Any:
     return np.asarray(rgb, np.float64) @ matrix.T if space != "srgb" else np.asarray(rgb)
 
 
-def _rgb(given: Parameter, role: Spectral, state: State) -> Any:
-    rgb = given.numbers(3)
+def _rgb(values: Parameter, role: Spectral, state: State) -> Any:
+    rgb = values.numbers(3)
     if min(rgb) < 0.0:
         raise SceneError("a colour cannot be negative")
+    if role is REFLECTANCE and max(rgb) > 1.0 and state.shared.old:
+        state.warn(values, "exceeds 1 and is cut off")
+        rgb = [min(value, 1.0) for value in rgb]
     if role is REFLECTANCE and max(rgb) > 1.0:
         raise SceneError("a colour that is reflected cannot exceed 1")
     ours = to_rec709(rgb, state.colour_space, light=role is EMISSION)
     clipped = np.clip(ours, 0.0, 1.0 if role is REFLECTANCE else None)
     if np.abs(clipped - ours).max() > CUT:
-        state.warn(given, "this colour lies outside Rec. 709, and what exceeds that is cut off")
-    made = tuple(clipped.tolist())
-    return colour(role, made)
+        state.warn(values, "this colour lies outside Rec. 709, and what exceeds that is cut off")
+    result = tuple(clipped.tolist())
+    return colour(role, result)
 
 
 def _pairs(values: list[float], role: Spectral) -> Tabulated:
@@ -126,15 +141,15 @@ def _named(text: str, role: Spectral, state: State) -> Spectrum:
 @cache
 def named(name: str) -> Spectrum | None:
     """One of pbrt's named spectra, such as metal-Cu-eta, glass-BK7 or stdillum-D65; else None."""
-    start, _, rest = name.partition("-")
+    start, _, others = name.partition("-")
     if start == "metal":
-        metal, _, part = rest.rpartition("-")
+        metal, _, part = others.rpartition("-")
         if metal in spectra.metals() and part in ("eta", "k"):
             return spectra.metal(metal)[0 if part == "eta" else 1]
     if name in GLASSES:
         return spectra.glass(GLASSES[name])
-    if start == "stdillum" and rest in spectra.illuminants():
-        return spectra.illuminant(rest)
+    if start == "stdillum" and others in spectra.illuminants():
+        return spectra.illuminant(others)
     return _aces_d60() if name == "illum-acesD60" else None
 
 
@@ -153,8 +168,8 @@ def _aces_d60() -> Spectrum:
     return Tabulated(cie.GRID, shares @ lamps)
 
 
-def _of_luminance_one(made: Spectrum) -> Spectrum:
-    luminance = float(cie.spectrum_to_xyz(made.sample(cie.GRID))[1])
+def _of_luminance_one(result: Spectrum) -> Spectrum:
+    luminance = float(cie.spectrum_to_xyz(result.sample(cie.GRID))[1])
     if not luminance > 0.0:
         raise SceneError("this spectrum is dark, so pbrt cannot scale it to luminance 1")
-    return scaled(made, 1.0 / luminance)
+    return scaled(result, 1.0 / luminance)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field
@@ -24,7 +25,7 @@ TARGETS = ("shape", "light", "material", "medium", "texture")
 
 @dataclass(eq=False)
 class Definition:
-    """A thing of the file: its type, its parameters and the state that it was defined in.
+    """A definition of the file: its type, its parameters and its graphics state.
 
     Textures stay definitions, since what a texture is made into depends on the parameter it serves.
     """
@@ -40,8 +41,8 @@ class Shared:
 
     folder: Path
     warnings: list[str] = field(default_factory=list)
-    textures: dict[tuple[str, str], Definition] = field(default_factory=dict)
-    materials: dict[str, Definition] = field(default_factory=dict)
+    textures: dict[tuple[str, str], list[Definition]] = field(default_factory=dict)
+    materials: dict[str, list[Definition]] = field(default_factory=dict)
     media: dict[str, Definition] = field(default_factory=dict)
     systems: dict[str, tuple[transforms.Matrix, transforms.Matrix | None]] = field(
         default_factory=dict
@@ -52,6 +53,9 @@ class Shared:
     make_material: Callable[..., Material] | None = None
     missing: Missing = "error"
     walks: bool = False  # light walks at random in bodies: no light is too small to be met
+    old: bool = False  # the files are of version 2 or 3
+    count: int = 0  # definitions so far
+    mirrors: bool = False  # an old file has smooth metal or glass
 
     def once(self, key: object, source: Parameters | Parameter, make: Callable[[], Any]) -> Any:
         """Return make(), called once for each key. Raises SceneError where it needs itself."""
@@ -68,7 +72,8 @@ class State:
     """The graphics state at a point of a file; AttributeBegin keeps a `copy`.
 
     ctm: object to world. colour_space: "srgb", "rec2020", "aces2065-1" or "dci-p3".
-    material: that of shapes to come, or its name; None for pbrt's grey.
+    material: that of shapes to come, or its name; None for pbrt's grey. number: how many
+    definitions stand before this state.
     """
 
     shared: Shared
@@ -83,6 +88,14 @@ class State:
     inside: str = ""
     outside: str = ""
     defaults: dict[str, tuple[Parameter, ...]] = field(default_factory=dict)
+    number: int = 0
+
+    def latest(self, versions: list[Definition] | None) -> Definition | None:
+        """Return the last definition of a name before this state, else its first, else None."""
+        if not versions:
+            return None
+        at = bisect_left(versions, self.number, key=lambda item: item.state.number)
+        return versions[max(at - 1, 0)]
 
     def motion(self) -> Keys | None:
         """Return the keys of what the transforms move, None: it is still. Raises SceneError."""
@@ -98,6 +111,12 @@ class State:
         """Warn of what the picture will lack, with the file and line."""
         where = source.location()["where"]
         self.shared.warnings.append(f"{source.file.name}:{source.line}: {where}: {text}")
+
+    def stand_in(self, error: SceneError, params: Parameters) -> None:
+        """Warn of an unknown kind that is left out, or grey; raise where that is not allowed."""
+        if self.shared.missing == "error":
+            raise error
+        self.warn(params, f"{error.message}; grey stands for it, or it is left out")
 
     def tell(self, text: str) -> None:
         """Warn of what a file beside the scene has that is left out, once."""
@@ -138,7 +157,7 @@ class State:
 
     def texture(self, values: str, name: str, source: Parameters | Parameter) -> Definition:
         """Return the definition of a texture of "float" or "spectrum" values. Raises SceneError."""
-        definition = self.shared.textures.get((values, name))
+        definition = self.latest(self.shared.textures.get((values, name)))
         if definition is None:
             names = [known for kind, known in self.shared.textures if kind == values]
             raise source.error(f"there is no {values} texture {name!r}{did_you_mean(name, names)}")
@@ -146,12 +165,18 @@ class State:
 
     def named_material(self, name: str, source: Parameters | Parameter) -> Material:
         """Return the material of a name, made once. Raises SceneError."""
-        definition, make = self.shared.materials.get(name), self.shared.make_material
-        if definition is None or make is None:
+        definition = self.latest(self.shared.materials.get(name))
+        if definition is None:
             hint = did_you_mean(name, self.shared.materials)
             raise source.error(f"there is no material {name!r}{hint}")
+        return self.material_of(name, definition)
+
+    def material_of(self, name: str, definition: Definition) -> Material:
+        """Return the material of a definition, made once. Raises SceneError."""
         kind, params, state = definition.kind, definition.params, definition.state
-        made: Material = self.shared.once(
-            ("material", name), params, lambda: make(kind, params, state, name)
+        make = self.shared.make_material
+        assert make is not None
+        material: Material = self.shared.once(
+            ("material", definition), params, lambda: make(kind, params, state, name)
         )
-        return made
+        return material

@@ -25,10 +25,10 @@ UPWARD = transforms.scale([1.0, 1.0, -1.0])  # ours counts a sphere's v from abo
 
 def phi_max(params: Parameters) -> float:
     """Take the part of a turn [degrees] that there is."""
-    given = float(params.one("phimax", "float", 360.0))
-    if not 0.0 < given <= 360.0:
-        raise SceneError(f"'phimax' must lie between 0 and 360, not {given:g}")
-    return given
+    values = float(params.one("phimax", "float", 360.0))
+    if not 0.0 < values <= 360.0:
+        raise SceneError(f"'phimax' must lie between 0 and 360, not {values:g}")
+    return values
 
 
 def is_even(matrix: transforms.Matrix, axes: int) -> bool:
@@ -67,6 +67,37 @@ def cylinder_mesh(radius: float, low: float, high: float, turn: float) -> Parts:
     points = radius * normals
     points[:, 2] = low + (high - low) * v
     return _parts(points, faces, normals, u, v)
+
+
+def revolved_mesh(profile: NDArray[np.float64], turn: float) -> Parts:
+    """The surface that a line of points (n, 3) sweeps over `turn` [degrees] around the z axis.
+
+    v runs along the line. The front is where u cross v points, as pbrt's quadrics have it.
+    """
+    u, v, faces = _grid(turn, len(profile) - 1)
+    row = np.round(v * (len(profile) - 1)).astype(np.intp)
+    phi = np.radians(turn) * u
+    steps = np.gradient(profile, axis=0)
+    middles = profile + np.where(np.hypot(*profile.T[:2]) > 0.0, 0.0, 0.5)[:, None] * _inward(steps)
+    points, along = _turned(profile[row], phi), _turned(steps[row], phi)
+    around = np.cross([0.0, 0.0, 1.0], _turned(middles[row], phi))
+    normals = np.cross(around, along)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    return _parts(points, faces, normals, u, v)
+
+
+def _inward(steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return steps of a line away from its first end, toward it at its last."""
+    signs = np.ones(len(steps))
+    signs[len(steps) // 2 :] = -1.0
+    return signs[:, None] * steps
+
+
+def _turned(points: NDArray[np.float64], phi: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turn points (n, 3) around the z axis by angles (n,) [radians]."""
+    cos, sin = np.cos(phi), np.sin(phi)
+    x, y, z = points.T
+    return np.stack([x * cos - y * sin, x * sin + y * cos, z], axis=1)
 
 
 def _grid(turn: float, rows: int) -> tuple[Any, Any, NDArray[np.uint32]]:

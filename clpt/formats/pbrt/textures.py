@@ -38,7 +38,9 @@ from clpt.scene.textures import (
 )
 from clpt.spectra import Spectrum
 
+Values = Any  # a number, a colour or a texture
 IDENTITY_UV = np.eye(3)
+SRGB = "sRGB"
 WRAPS = {"repeat": "repeat", "black": "zero", "clamp": "clamp", "octahedralsphere": "clamp"}
 FLOATS = (".exr", ".hdr", ".pfm")  # whose numbers are no colours where a float is asked for
 FILTERS = {"point": "nearest", "bilinear": "bilinear", "trilinear": "trilinear", "ewa": "trilinear"}
@@ -52,15 +54,15 @@ def textured(
     A texture is made once for all parameters that name it. Raises SceneError with the location.
     """
     form = "float" if role is REAL else "spectrum"
-    given = params.find(name, "texture", "float", *(SPECTRUM_TYPES if form == "spectrum" else ()))
-    if given is None:
+    values = params.find(name, "texture", "float", *(SPECTRUM_TYPES if form == "spectrum" else ()))
+    if values is None:
         return default
-    if given.type != "texture":
+    if values.type != "texture":
         used = role if isinstance(role, Spectral) else TEXTURE  # a number is one in any
-        with given.locating():
-            return value_of(given, used, state)
-    definition = state.texture(form, given.text(), given)
-    return state.shared.once(definition, given, lambda: _texture(form, definition))
+        with values.locating():
+            return value_of(values, used, state)
+    definition = state.texture(form, values.text(), values)
+    return state.shared.once(definition, values, lambda: _texture(form, definition))
 
 
 def _texture(form: str, definition: Definition) -> Any:
@@ -68,10 +70,10 @@ def _texture(form: str, definition: Definition) -> Any:
     if kind not in MAKERS:
         raise UnknownKindError("texture", kind, MAKERS, **params.location())
     with params.locating():
-        made = MAKERS[kind](form, params, state)
+        result = MAKERS[kind](form, params, state)
     for extra in params.unused():
         state.warn(extra, "is not known here and is left out")
-    return made
+    return result
 
 
 def normals(file: str, state: State) -> Bitmap:
@@ -91,11 +93,26 @@ def _constant(form: str, params: Parameters, state: State) -> Any:
 
 
 def _scale(form: str, params: Parameters, state: State) -> Any:
+    if state.shared.old:
+        names = ("tex1", "tex2")
+        first, second = (_argument(form, params, name, state, 1.0) for name in names)
+        return _product(first, second)
     first = _argument(form, params, "tex", state, 1.0)
     second = textured(params, "scale", REAL, state, 1.0)
     if not isinstance(first, Texture) and not isinstance(second, Texture):
         return map_values(first, lambda v: v * second)
     return first if second == 1.0 else Product(first=first, second=second)
+
+
+def _product(first: Values, second: Values) -> Values:
+    """Return the product of two values or textures, as in versions 2 and 3."""
+    if isinstance(first, Texture) or isinstance(second, Texture):
+        return Product(first=first, second=second)
+    if not isinstance(first, Spectrum) and not isinstance(second, Spectrum):
+        product = np.multiply(first, second)
+        return tuple(product.tolist()) if product.ndim else float(product)
+    pair = (v.to_rgb("unbounded") if isinstance(v, Spectrum) else v for v in (first, second))
+    return tuple(np.broadcast_to(np.multiply(*pair), 3).tolist())
 
 
 def _mix(form: str, params: Parameters, state: State) -> Any:
@@ -156,26 +173,40 @@ def _imagemap(form: str, params: Parameters, state: State) -> Any:
     if wrap == "octahedralsphere":
         state.warn(params, "wrap 'octahedralsphere' is taken as 'clamp'")
     params.one("maxanisotropy", "float", 8.0)
-    made = Bitmap(
+    params.ignore(*(("trilinear",) if state.shared.old else ()))
+    usual = "trilinear" if state.shared.old else "bilinear"
+    result = Bitmap(
         image=GREY if file is None else file,
-        filter=FILTERS[params.choice("filter", "bilinear", FILTERS)],
+        filter=FILTERS[params.choice("filter", usual, FILTERS)],
         wrap=WRAPS[wrap],
-        channel="r" if form == "float" else "luminance",
+        channel="r" if form == "float" and not state.shared.old else "luminance",
         raw=form == "float" and file is not None and file.suffix.lower() in FLOATS,
         **_mapping(params, state),
     )
-    bilinear = params.choice("filter", "bilinear", FILTERS) in ("bilinear", "trilinear")
-    encoding = params.one("encoding", "string", "sRGB")
-    if (
-        file is not None and file.suffix.lower() == ".png"
-    ):  # pbrt ignores the encoding of other files
-        made = _decoded(made, encoding)
+    bilinear = params.choice("filter", usual, FILTERS) in ("bilinear", "trilinear")
+    encoding = _old_encoding(params) if state.shared.old else params.one("encoding", "string", SRGB)
+    suffixes = (".png", ".tga") if state.shared.old else (".png",)
+    if file is not None and file.suffix.lower() in suffixes:  # pbrt ignores it in other files
+        result = _decoded(result, encoding)
+    if state.shared.old:
+        bilinear = False  # its number is the luminance
     if file is not None and form == "float" and bilinear:
-        made = _number(made, state)
+        result = _number(result, state)
     scale, invert = params.one("scale", "float", 1.0), params.one("invert", "bool", False)
     if file is None or (scale == 1.0 and not invert):
-        return made
-    return map_values(made, lambda v: np.maximum(1.0 - scale * v if invert else scale * v, 0.0))
+        return result
+    return map_values(result, lambda v: np.maximum(1.0 - scale * v if invert else scale * v, 0.0))
+
+
+def _old_encoding(params: Parameters) -> str:
+    """Take the `gamma` of version 3, a truth, or of version 2, an exponent."""
+    parameter = params.find("gamma", "bool", "float")
+    if parameter is None:
+        return SRGB
+    if parameter.type == "float":
+        gamma = parameter.numbers(1)[0]
+        return "linear" if gamma == 1.0 else f"gamma {gamma:g}"
+    return SRGB if parameter.truth() else "linear"
 
 
 def _number(bitmap: Bitmap, state: State) -> Bitmap:
@@ -207,7 +238,7 @@ def _number(bitmap: Bitmap, state: State) -> Bitmap:
 
 
 def _decoded(bitmap: Bitmap, encoding: str) -> Bitmap:
-    if encoding == "sRGB":
+    if encoding == SRGB:
         return bitmap
     bitmap = replace(bitmap, raw=True)
     if encoding == "linear":

@@ -1,4 +1,4 @@
-"""Motion from one picture to the next: a scene and the one before it become keys of one scene."""
+"""Motion between two pictures: a former scene and the present scene become keys of a scene."""
 
 from __future__ import annotations
 
@@ -20,13 +20,12 @@ POINTS = ((Mesh, "vertices"), (Curves, "points"), (Spheres, "centers"))
 
 
 def between(former: Scene, scene: Scene) -> tuple[Scene, list[str]]:
-    """Return a scene whose things move from where they were to where they are, and warnings.
+    """Return a scene that moves from `former` to `scene` while its shutter is open, and warnings.
 
-    The shutter of its camera says when: at `open` all is as in `former`, at `close` as in `scene`.
-    Shapes and lights belong together by their places in the lists. What has a motion of its own
-    keeps that.
+    Shapes and lights are matched by their indices. A shape, a light or a camera with a `motion`
+    keeps it.
 
-    Raises SceneError without a shutter, and for another number of shapes or lights.
+    Raises SceneError if there is no shutter, and for another number of shapes or lights.
     """
     shutter = scene.camera.shutter
     if not isinstance(shutter, Shutter) or not shutter.close > shutter.open:
@@ -42,31 +41,31 @@ def between(former: Scene, scene: Scene) -> tuple[Scene, list[str]]:
             )
             raise SceneError(message, where=name)
     way = _Way((shutter.open, shutter.close))
-    things = [way.shape(a, b) for a, b in zip(former.shapes, scene.shapes, strict=True)]
+    moving = [way.shape(a, b) for a, b in zip(former.shapes, scene.shapes, strict=True)]
     lamps = [way.moved(a, b, "light") for a, b in zip(former.lights, scene.lights, strict=True)]
     camera = way.moved(former.camera, scene.camera, "camera")
-    return replace(scene, shapes=things, lights=lamps, camera=camera), way.warnings
+    return replace(scene, shapes=moving, lights=lamps, camera=camera), way.warnings
 
 
 class _Way:
-    """The motion from one scene to the next, between two times [s]."""
+    """The motion from a scene to the next, between two times [s]."""
 
     def __init__(self, times: tuple[float, float]):
         self.times, self.warnings = times, list[str]()
         self.groups: dict[tuple[int, int], Group] = {}
 
     def shape(self, old: Shape, new: Shape) -> Shape:
-        """A shape that moves, and whose points do."""
+        """Return a shape with keys of its transform and of its points."""
         if old is new:
             return new
-        made = self.moved(old, new, shapes.where(new))
+        keyed = self.moved(old, new, shapes.where(new))
         if isinstance(new, Instance) and isinstance(old, Instance):
             group = self.group(old.group, new.group)
-            return made if group is new.group else replace(made, group=group)
-        return self.deformed(old, made)
+            return keyed if group is new.group else replace(keyed, group=group)
+        return self.deformed(old, keyed)
 
     def group(self, old: Group, new: Group) -> Group:
-        """A group whose shapes' points move."""
+        """Return a group with keys of its shapes' points."""
         if old is new or len(old.shapes) != len(new.shapes):
             return new
         key = id(old), id(new)
@@ -77,14 +76,14 @@ class _Way:
         return self.groups[key]
 
     def deformed(self, old: Shape, new: Shape) -> Shape:
-        """A shape with keys of its points, if these are others than before."""
+        """Return a shape with keys of its points, if they differ from the former points."""
         kind, name = next((x for x in POINTS if isinstance(new, x[0])), (None, ""))
         if kind is None or not isinstance(old, kind) or new.deformation is not None:
             return new
         was, now = fields_of(old), fields_of(new)
         if was[name] is now[name] and was.get("radii") is now.get("radii"):
             return new
-        first, last = (_points(one, name) for one in (old, new))
+        first, last = (_points(shape, name) for shape in (old, new))
         if np.array_equal(first, last):
             return new
         shines = new.emission is not None and isinstance(new, Spheres)
@@ -92,17 +91,17 @@ class _Way:
             why = "emits light" if shines else f"had {len(first)} of them"
             self.warnings.append(f"{shapes.where(new)}: its {name} do not move, as it {why}")
             return new
-        normals = [one.normals for one in (old, new)]
-        given = all(n is not None and not isinstance(n, str) for n in normals)
-        turned = np.stack([np.asarray(on_host(n)) for n in normals]) if given else None
-        keys: dict[str, Any] = {"deformation": Deformation(self.times, [first, last], turned)}
+        pair = [shape.normals for shape in (old, new)]
+        in_arrays = all(n is not None and not isinstance(n, str) for n in pair)
+        normals = np.stack([np.asarray(on_host(n)) for n in pair]) if in_arrays else None
+        keys: dict[str, Any] = {"deformation": Deformation(self.times, [first, last], normals)}
         return replace(new, **keys)
 
     def moved(self, old: Any, new: Any, name: str) -> Any:
-        """A thing with keys of its transform, if it is elsewhere than before."""
+        """Return a shape, light or camera with keys of its transform, if that changed."""
         if old is new or type(old) is not type(new) or new.motion is not None:
             return new
-        was, now = (placement(_read(one)) for one in (old, new))
+        was, now = (placement(_read(value)) for value in (old, new))
         if was is None or now is None or np.array_equal(was, now):
             return new
         try:
@@ -113,7 +112,7 @@ class _Way:
 
 
 def _points(shape: Shape, name: str) -> NDArray[np.float32]:
-    """The points of a shape on the host, of spheres with the radii (n, 4)."""
+    """Return the points of a shape on the host; for spheres with the radii (n, 4)."""
     points = np.asarray(on_host(fields_of(shape)[name]), np.float32)
     if not isinstance(shape, Spheres) or points.ndim != 2 or points.shape[1] != 3:
         return points
@@ -121,7 +120,7 @@ def _points(shape: Shape, name: str) -> NDArray[np.float32]:
     return np.column_stack([points, np.broadcast_to(radii, len(points))])
 
 
-def _read(thing: Any) -> Any:
-    """A thing whose transform is on the host."""
-    matrix = fields_of(thing).get("to_world")
-    return thing if matrix is None else replace(thing, to_world=on_host(matrix))
+def _read(value: Any) -> Any:
+    """Return a shape, light or camera with its transform on the host."""
+    matrix = fields_of(value).get("to_world")
+    return value if matrix is None else replace(value, to_world=on_host(matrix))

@@ -1,7 +1,7 @@
 """Shapes that move on the device: kernels write their tables and refit the trees over them.
 
-The vertices, normals, rows and boxes of shapes that move are written by kernels, from arrays that
-may be on the device. Nothing is lowered or built, and the host waits for nothing.
+Kernels write the vertices, normals, rows and boxes of moving shapes, from arrays on the host or the
+device. Nothing is lowered or built, and the host waits for nothing.
 """
 
 from __future__ import annotations
@@ -20,9 +20,13 @@ from clpt.arrays import Points, on_device
 from clpt.geometry import analytic, shapes, strands, triangles
 from clpt.geometry.tessellate import keeps_its_kind
 from clpt.records import SHAPE, SHAPE_BITS
-from clpt.render.edit.cannot_move import CannotMove
-from clpt.render.edit.moving_instances import Boxes, Location, MovingInstances
-from clpt.render.edit.moving_spheres import MovingSpheres
+from clpt.render.edit.moving_parts import (
+    Boxes,
+    CannotMove,
+    Location,
+    MovingInstances,
+    MovingSpheres,
+)
 from clpt.render.edit.scene_edit import Replacements
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
@@ -32,19 +36,19 @@ from clpt.scene.shapes import Curves, Instance, Mesh, Shape, Spheres
 _ROOT = "stage/place_vertices.cl"
 _NORMALS = SHAPE_BITS["normals"]
 _MOVABLE = {"to_world", "vertices", "normals", "centers"}  # fields that may change
-REBUILD_EVERY = 16  # moves of analytic shapes, each of which goes its own way
+REBUILD_EVERY = 16  # moves of analytic shapes, which move independently
 
 Action = Callable[[], None]
 
 
 @dataclass(eq=False)
 class _Ranges:
-    """The ranges of the tables that one shape has.
+    """The ranges of a shape in the tables.
 
     row: its row of `shapes`; vertices, faces: first and number; mirrored: whether its transform
-    flips its faces; whole: whether no triangle was left out; own: its transform within its group.
-    The first move that needs a buffer makes it. matrix: its transform; local: its vertices
-    and normals before the transform, and the array of vertices that they are of; around: the
+    flips its faces; whole: whether all its triangles have an area; in_group: its transform within
+    its group. The first move that needs a buffer allocates it. matrix: its transform; local: its
+    array of vertices, and buffers of vertices and normals before the transform; around: the
     triangles around each vertex, for `smooth_normals` of place_vertices.cl.
     """
 
@@ -54,7 +58,7 @@ class _Ranges:
     faces: tuple[int, int]
     mirrored: bool = False
     whole: bool = True
-    own: transforms.Matrix = field(default_factory=lambda: transforms.IDENTITY)
+    in_group: transforms.Matrix = field(default_factory=lambda: transforms.IDENTITY)
     matrix: cl.Buffer | None = None
     local: tuple[Any, dict[str, cl.Buffer]] | None = None
     around: dict[str, cl.Buffer] | None = None
@@ -63,9 +67,9 @@ class _Ranges:
 class Moving:
     """The shapes of a scene on a device, and the kernels that move them.
 
-    target: the scene on the device; scene: as it was lowered. A copy of the vertices and normals of
-    each shape that moved without new vertices stays on the device, and for each smooth mesh whose
-    vertices moved 4 bytes a vertex and 12 a triangle.
+    target: the scene on the device; scene: as it was lowered. These stay on the device: a copy of
+    the vertices and normals of each shape that moved without new vertices; for each smooth mesh
+    whose vertices moved, 4 bytes a vertex and 12 a triangle.
     """
 
     def __init__(self, target: DeviceScene, scene: Scene):
@@ -82,23 +86,22 @@ class Moving:
         for ranges in self._all_ranges():
             number = int(ranges.row["number"])
             if ranges.row["kind"] == 0 and ranges.faces[0] >= world:
-                continue  # of a group: its instances move, not it
+                continue  # a shape of a group: only its instances move
             shape = scene.shapes[number]
             if isinstance(shape, Instance):
                 outer = shapes.placement(shape)
-                ranges.own = transforms.inverse(outer) @ shapes.placement(ranges.shape)
+                ranges.in_group = transforms.inverse(outer) @ shapes.placement(ranges.shape)
             self.ranges.setdefault(number, []).append(ranges)
 
     def plan(self, scene: Scene, replaced: Replacements) -> Callable[[], None] | str:
-        """Return what enqueues that shapes have other transforms or vertices, and trees follow.
+        """Return a function that enqueues new transforms and vertices of shapes, and refits trees.
 
-        scene: as it is; replaced: the shapes that move, and what they become. Returns a text where
-        the scene must be lowered again: why.
+        scene: the present scene; replaced: the shapes that move, and their replacements. Returns
+        the reason as a text if the scene must be lowered again.
 
         Triangles, instances, spheres, disks, cylinders and curves can move. A shape must keep its
-        number of vertices, its orientation and its kind, and must not emit light. A mesh of which a
-        triangle without area was left out keeps its vertices. Where light is traced from lights
-        nothing moves.
+        number of vertices, its orientation and its kind, and must not emit light. A mesh that has
+        triangles without area must keep its vertices. If paths start at lights, nothing can move.
 
         Raises SceneError for a transform that is singular, and arrays of the wrong shape or type.
         """
@@ -117,7 +120,7 @@ class Moving:
     def _plan(self, scene: Scene, replaced: Replacements) -> list[Action]:
         """Return the actions that enqueue a move. Raises CannotMove."""
         features = self.target.lowered.features
-        if any(one.transport.light_paths for one in features.passes):
+        if any(kernels.transport.light_paths for kernels in features.passes):
             raise CannotMove("light is traced from lights, whose choice follows from the shapes")
         if any(shape.motion is not None for shape in scene.shapes):
             raise CannotMove("shapes move while the shutter is open")
@@ -141,9 +144,9 @@ class Moving:
                 matrix = self._locate(new.to_world, (4, 4), f"the transform of {_name(new)}")
             for ranges in self.ranges.get(number, ()):
                 actions += self._plan_shape(ranges, old, new, matrix)
-            own = self._instances.numbers.get(number, ())
-            instances += [(k, new) for k in own]
-            matrices += [matrix for _ in own]
+            indices = self._instances.numbers.get(number, ())
+            instances += [(k, new) for k in indices]
+            matrices += [matrix for _ in indices]
         if instances:
             act = self._instances.plan(instances, matrices)
             boxes = self.target.lowered.instances.boxes
@@ -151,7 +154,7 @@ class Moving:
         return actions
 
     def _all_ranges(self) -> list[_Ranges]:
-        """The ranges of every shape, in the order of their rows."""
+        """Return the ranges of all shapes, in the order of their rows."""
         lowered = self.target.lowered
         backwards, ends = [], (len(lowered.vertices), len(lowered.faces))
         for row, shape, vertex, face in reversed(lowered.owners):
@@ -179,22 +182,22 @@ class Moving:
         if ranges.shape.tangents is not None:
             raise CannotMove(f"{name} has tangents of its own, which lie in the world")
         count = ranges.vertices[1]
-        given, before = fields_of(new), fields_of(old)
+        fields, before = fields_of(new), fields_of(old)
         for field_name in ("vertices", "normals"):
-            values = given.get(field_name)
+            values = fields.get(field_name)
             if on_device(values):
                 self._locate(values, (count, 3), f"the {field_name} of {name}")
         matrix, points = transforms.IDENTITY, None
         if device_matrix is None:
-            matrix = shapes.placement(new) @ ranges.own
+            matrix = shapes.placement(new) @ ranges.in_group
             if transforms.flips_handedness(matrix) != ranges.mirrored:
                 raise CannotMove(f"the transform of {name} mirrors it")
         elif isinstance(new, Instance):
             raise CannotMove(f"{name} is copied, not shared, and its transform is on the device")
-        if given.get("vertices") is not before.get("vertices"):
+        if fields.get("vertices") is not before.get("vertices"):
             if not ranges.whole:
                 raise CannotMove(f"{name} has triangles without an area")
-            if not on_device(given["vertices"]):
+            if not on_device(fields["vertices"]):
                 points = triangles.points(new)
                 if len(points) != count:
                     raise CannotMove(f"{name} has {len(points)} vertices, and had {count}")
@@ -203,7 +206,7 @@ class Moving:
     def _plan_analytic(self, ranges: _Ranges, new: Shape) -> list[Action]:
         """Return the actions that move an analytic shape. Raises CannotMove if its kind changes."""
         shape = ranges.shape if isinstance(new, Instance) else new
-        matrix = shapes.placement(new) @ ranges.own
+        matrix = shapes.placement(new) @ ranges.in_group
         in_world = dataclasses.replace(shape, to_world=matrix)
         if not keeps_its_kind(in_world):
             raise CannotMove(f"the transform of {_name(new)} makes triangles of it")
@@ -257,7 +260,7 @@ class Moving:
         return act
 
     def _boxes_of(self, tree: str, lowered: NDArray[np.float32]) -> Boxes:
-        """Return the boxes that a tree is over, which will be fitted to them."""
+        """Return the boxes of a tree, which `_fit_trees` will refit."""
         if tree not in self._boxes:
             host = lowered.copy()
             self._boxes[tree] = host, self.target.buffers.upload("boxes of what moves", host)
@@ -308,7 +311,7 @@ class Moving:
     def _run(
         self, table: str, ranges: _Ranges, source: Location, matrix: Location, **more: float
     ) -> None:
-        """Enqueue that a shape's vertices or normals are those of a source, transformed."""
+        """Enqueue the kernel that transforms a source into a shape's vertices or normals."""
         first, count = ranges.vertices
         self.building.run_each(
             _ROOT, f"place_{table}", count, first=first, source=source[0], source_begin=source[1],
@@ -316,33 +319,33 @@ class Moving:
         )  # fmt: skip
 
     def _upload_matrix(self, ranges: _Ranges, matrix: transforms.Matrix) -> Location:
-        """Enqueue that a shape's transform is on the device; return where."""
+        """Enqueue the upload of a shape's transform; return its place."""
         if ranges.matrix is None:
             ranges.matrix = self.target.buffers.allocate("a shape's transform", 64)
         self.target.stream.write(ranges.matrix, matrix.astype(np.float32))
         return ranges.matrix, 0
 
     def _local(self, ranges: _Ranges, name: str) -> Location:
-        """Return where vertices or normals of a shape are on the device, before its transform."""
+        """Return the place on the device of a shape's vertices or normals before its transform."""
         shape = ranges.shape
-        given = fields_of(shape)
-        values = given.get(name)
+        fields = fields_of(shape)
+        values = fields.get(name)
         if on_device(values):
             self.target.stream.after(getattr(values, "events", ()))
             return self._locate(values, (ranges.vertices[1], 3), name)
-        vertices = given.get("vertices")
+        vertices = fields.get("vertices")
         if ranges.local is None or ranges.local[0] is not vertices:
             ranges.local = vertices, {}
         buffers = ranges.local[1]
         if name not in buffers:
             points, _, normals, _ = triangles.local(shape)
             array: Any = points if name == "vertices" else normals
-            what = f"{name} of a shape that moves"
-            buffers[name] = self.target.buffers.upload(what, array, np.float32)
+            label = f"{name} of a shape that moves"
+            buffers[name] = self.target.buffers.upload(label, array, np.float32)
         return buffers[name], 0
 
-    def _locate(self, values: Any, shape: tuple[int, ...], what: str) -> Location:
-        """Return where a float32 array on the device begins. Raises CannotMove for another form."""
+    def _locate(self, values: Any, shape: tuple[int, ...], label: str) -> Location:
+        """Return the place of a float32 array on the device. Raises CannotMove if it has others."""
         if isinstance(values, cl.Buffer):
             fits, location = values.size == 4 * np.prod(shape), (values, 0)
         else:
@@ -350,11 +353,11 @@ class Moving:
             fits &= values.flags.c_contiguous
             location = values.base_data, values.offset // 4
         if not fits or location[0].context != self.target.device.context:
-            raise CannotMove(f"{what} are no {shape} float32 in a row, in the renderer's context")
+            raise CannotMove(f"{label} are no {shape} float32 in a row, in the renderer's context")
         return location
 
     def _smooth(self, ranges: _Ranges) -> None:
-        """Enqueue that a shape's normals follow from its triangles."""
+        """Enqueue the kernel that computes a shape's normals from its triangles."""
         target, (first, count) = self.target, ranges.vertices
         if ranges.around is None:
             begin, faces = ranges.faces
@@ -372,7 +375,7 @@ class Moving:
         )
 
     def _fit_trees(self) -> None:
-        """Enqueue that trees follow what has moved."""
+        """Enqueue refits of the trees over shapes that moved."""
         target, trees = self.target, self.target.trees
         if "triangles" in self._moved:
             vertices, faces = target.tables["vertices"], target.tables["faces"]
@@ -388,7 +391,7 @@ class Moving:
 
 
 def _check_fields(old: Shape, new: object) -> None:
-    """Raise CannotMove if more than what moves differs between two shapes."""
+    """Raise CannotMove if fields differ between two shapes that no move can change."""
     if not isinstance(new, Shape) or type(old) is not type(new):
         raise CannotMove(f"{_name(old)} becomes something else")
     before = fields_of(old)
@@ -398,10 +401,10 @@ def _check_fields(old: Shape, new: object) -> None:
 
 
 def _holds_light(shape: Shape) -> bool:
-    """Whether a medium that emits is inside of a shape, or of those that an instance places."""
-    own = shape.members if isinstance(shape, Instance) else (shape,)
-    return any(one.interior is not None and one.interior.light is not None for one in own)
+    """Return whether a shape, or a shape that it places, holds a medium that emits."""
+    media = (member.interior for member in shape.members)
+    return any(medium is not None and medium.light is not None for medium in media)
 
 
-def _name(thing: object) -> str:
-    return shapes.where(thing) if isinstance(thing, Shape) else f"a {type(thing).__name__}"
+def _name(value: object) -> str:
+    return shapes.where(value) if isinstance(value, Shape) else f"a {type(value).__name__}"

@@ -1,4 +1,4 @@
-"""Edits of parameters, the camera's and those of materials: a few words are written."""
+"""Edits of the parameters of the camera and of materials, as writes of a few words."""
 
 from __future__ import annotations
 
@@ -9,26 +9,25 @@ from typing import Any
 import numpy as np
 
 from clpt.geometry.instancing import distinct
-from clpt.render.camera.encode import lower_camera
-from clpt.render.camera.find import dispersive_glasses
+from clpt.render.camera.encode import encode_camera
 from clpt.render.edit.rebuild import ranges
 from clpt.render.edit.scene_edit import Replacements
 from clpt.render.lights.aims import is_sharp
-from clpt.render.materials import gloss
 from clpt.render.materials.check import check_material
+from clpt.render.materials.encode import gloss_word
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
-from clpt.scene.cameras import Camera, Lens
+from clpt.scene.cameras import Camera
 from clpt.scene.materials import CLEAR, COMPOSITES, Material
 from clpt.scene.params import fields_of
 
 
 def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], None] | str:
-    """Return what enqueues the words in which a scene differs from the one on the device.
+    """Return a function that enqueues the words by which a scene differs from a former scene.
 
-    They may differ in the camera, which must be of the same kind, and in values of materials; else
-    this returns why more than that differs. What is returned may be called again where an error
-    has ended it. Raises SceneError as `lower` does.
+    The scenes may differ in the camera, of the same kind, and in values of materials. Else the
+    result is a text that says what differs. After an error the function may be called again.
+    Raises SceneError as `lower` does.
     """
     lowered = on_device.lowered
     pairs = [] if scene.shapes is former.shapes else _pairs(former, scene)
@@ -42,11 +41,12 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
         return "bodies that overlap know each other's indices"
     camera = None
     if scene.camera is not former.camera:
-        if dispersive_glasses(scene.camera) != dispersive_glasses(former.camera):
+        if scene.camera.dispersive_glasses != former.camera.dispersive_glasses:
             return "the camera's lens is of another glass"
         film, rows_ = scene.film, lowered.glass_rows
-        kind, camera = lower_camera(scene.camera, film.width, film.height, rows_)
-        if kind != lowered.features.camera.kind or len(camera) != len(lowered.tables["camera"]):
+        camera = encode_camera(scene.camera, film.width, film.height, rows_)
+        kind = lowered.features.camera.kind
+        if scene.camera.kind != kind or len(camera) != len(lowered.tables["camera"]):
             return "the camera is of another kind"
         if _reflects(scene.camera) != _reflects(former.camera):
             return "the camera's lens reflects, or no more"
@@ -58,18 +58,17 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
             return f"parameters of a {new.kind} come from elsewhere, such as a texture or a table"
         rows += changed
         if before := lowered.features.lights.gloss:
-            word = np.array([gloss.word(new)], np.uint32)
+            word = np.array([gloss_word(new)], np.uint32)
             rows += [(row - before, word) for row, _ in changed]
     return lambda: _write(on_device, camera, rows)
 
 
 def _reflects(camera: Camera) -> tuple[bool, bool]:
-    """Return whether a camera's lens reflects in its kernels, and whether it has ghosts."""
-    return (camera.reflects, camera.ghosts > 0.0) if isinstance(camera, Lens) else (False, False)
+    return camera.reflects, camera.has_ghosts
 
 
 def _write(on_device: DeviceScene, camera: Any, rows: list[tuple[int, Any]]) -> None:
-    """Enqueue the words of a camera, if there is one, and of rows of materials."""
+    """Enqueue the words of a camera, unless it is None, and of rows of materials."""
     lowered, stream = on_device.lowered, on_device.stream
     tables = dict(lowered.tables)
     if camera is not None:
@@ -78,16 +77,16 @@ def _write(on_device: DeviceScene, camera: Any, rows: list[tuple[int, Any]]) -> 
     if rows:
         table = tables["materials"] = tables["materials"].copy()
         for first, new in rows:
-            own = table[first : first + len(new)]
-            for begin, end in ranges(own, new):
+            row = table[first : first + len(new)]
+            for begin, end in ranges(row, new):
                 buffer = on_device.tables["materials"]
                 stream.write(buffer, new[begin:end], 4 * (first + begin))
-            own[:] = new
+            row[:] = new
     on_device.lowered = dataclasses.replace(lowered, tables=tables)
 
 
 def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
-    """The leaf materials that replace others, None where more than values differs."""
+    """Return pairs of old and new leaf materials; None if more than values differs."""
     pairs: Replacements = {}
     for old, new in zip(distinct(former.shapes), distinct(scene.shapes), strict=True):
         if not _pair(old.material, new.material, pairs):
@@ -97,7 +96,7 @@ def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
 
 
 def _pair(old: Material, new: Material, pairs: Replacements) -> bool:
-    """Note which material replaces which; return whether they may differ in values only."""
+    """Note that a material replaces another; return whether only values may differ."""
     if id(old) in pairs:
         return pairs[id(old)][1] is new
     pairs[id(old)] = old, new
@@ -106,8 +105,8 @@ def _pair(old: Material, new: Material, pairs: Replacements) -> bool:
     if type(old) is not type(new):
         return False
     if not isinstance(old, COMPOSITES):
-        absorb = [one.absorption != CLEAR for one in (old, new)]
-        traits = [(one.transmits, one.uses_tangents) for one in (old, new)]
+        absorb = [material.absorption != CLEAR for material in (old, new)]
+        traits = [(material.transmits, material.uses_tangents) for material in (old, new)]
         return absorb[0] == absorb[1] and traits[0] == traits[1]
     others = fields_of(new)
     for name, a in fields_of(old).items():

@@ -1,4 +1,4 @@
-"""Another lowering of a scene that is on a device: only what differs is written or built."""
+"""Another lowering of a scene on a device: only differences are written or built."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from clpt.render.wavefront.wavefront import Wavefront
 
 log = logging.getLogger(__name__)
 
-GAP = 256  # words that are written though they are the same, rather than by two commands
-MOST_WRITES = 64  # beyond which the whole range between the first and the last is one write
+GAP = 256  # equal words between differences, up to which a single write covers both
+MOST_WRITES = 64  # if more are needed, a single write covers the whole range
 OF_FILM = (
     "width", "height", "margin", "crop_x", "crop_y", "film_width", "film_height", "bands", "alpha",
 )  # fmt: skip
@@ -53,15 +53,15 @@ class _Staged:
 
 
 def prepare(wavefront: Wavefront, lowered: Lowered, refit: bool = False) -> Callable[[], None]:
-    """Return what lets a wavefront render another lowering from now on.
+    """Return a function after which a wavefront renders another lowering.
 
-    It may be called again where an error has ended it. refit: refit the tree over triangles that
-    only moved, which is faster to do, and slower to trace where they went far. Programs are built
-    if the features differ, trees if triangles or boxes do; of tables the words that differ are
-    written. The picture is then that of a new renderer.
+    After an error the function may be called again. refit: refit the tree over triangles that only
+    moved; this is faster than a new tree, but rays are slower if triangles moved far. Programs are
+    built if the features differ, trees if triangles or boxes differ; words of tables are written
+    where they differ. The picture equals that of a new renderer.
 
-    The paths are of the same kinds, see `has_other_paths`. Raises SceneError as `refusal` says,
-    KernelBuildError, MemoryBudgetError; nothing has changed then.
+    Both lowerings must have the same kinds of paths, see `has_other_paths`. Raises SceneError as in
+    `refusal`, KernelBuildError, MemoryBudgetError; the wavefront is then unchanged.
     """
     scene, paths = wavefront.scene, wavefront.paths
     refused = refusal(scene.lowered, lowered)
@@ -89,7 +89,7 @@ def prepare(wavefront: Wavefront, lowered: Lowered, refit: bool = False) -> Call
 
 
 def refusal(former: Lowered, new: Lowered) -> SceneError | None:
-    """Return why a renderer of one lowering cannot go on with another; None if it can."""
+    """Return why a renderer cannot change from a lowering to another; None if it can."""
     old, now = former.settings, new.settings
     if any(old[name] != now[name] for name in OF_FILM):
         message = "its size, bands, alpha and the reach of its filter stay; make a new Renderer"
@@ -129,7 +129,7 @@ def _changes(wavefront: Wavefront, lowered: Lowered, refit: bool) -> _Changes:
 
 
 def _stage(wavefront: Wavefront, lowered: Lowered, changes: _Changes) -> _Staged:
-    """Build kernels, buffers and trees that are new; what is on the device stays as it is."""
+    """Build new kernels, buffers and trees beside the present scene, which stays unchanged."""
     scene, paths, queue = wavefront.scene, wavefront.paths, wavefront.paths.queue
     if changes.kernels:
         before = scene.device.builds.programs
@@ -150,7 +150,7 @@ def _stage(wavefront: Wavefront, lowered: Lowered, changes: _Changes) -> _Staged
 
 
 def _new_tables(scene: DeviceScene, lowered: Lowered, changes: _Changes) -> dict[str, cl.Buffer]:
-    """Buffers of tables of another size, and of those that begin or cease to be the caller's."""
+    """Return buffers for tables with a new size or a new owner, clpt or the caller."""
     former, tables = scene.lowered, {}
     for name in UPLOADED:
         old, new = former.table(name), lowered.table(name)
@@ -165,7 +165,7 @@ def _new_tables(scene: DeviceScene, lowered: Lowered, changes: _Changes) -> dict
 
 
 def _replaced(wavefront: Wavefront, staged: _Staged) -> list[cl.Buffer]:
-    """The buffers of clpt that will not be used any more."""
+    """Return the buffers of clpt that the staged buffers replace."""
     scene, queue = wavefront.scene, wavefront.paths.queue
     of_caller = scene.lowered.zero_copy
     buffers = [scene.tables[name] for name in staged.tables if name not in of_caller]
@@ -177,7 +177,7 @@ def _replaced(wavefront: Wavefront, staged: _Staged) -> list[cl.Buffer]:
 
 
 def _write_tables(scene: DeviceScene, lowered: Lowered, new: dict[str, cl.Buffer]) -> None:
-    """Enqueue that the words of tables become those of a lowering, but in buffers that are new."""
+    """Enqueue the words by which tables differ from a lowering, except in new buffers."""
     for name in UPLOADED:
         if name in new or name in lowered.zero_copy:
             continue
@@ -196,7 +196,7 @@ def _room(lowered: Lowered) -> list[tuple[int, tuple[int, ...]]]:
 
 
 def _refit(scene: DeviceScene, changes: _Changes) -> None:
-    """Refit the tree over triangles to their vertices, if it is not a new one."""
+    """Refit the tree over triangles to their vertices, unless it is new."""
     if changes.refit:
         building = bvh.Building(scene.device, stream=scene.stream)
         triangles = scene.trees.triangles
@@ -206,7 +206,7 @@ def _refit(scene: DeviceScene, changes: _Changes) -> None:
 
 
 def ranges(old: NDArray[Any], new: NDArray[Any]) -> list[tuple[int, int]]:
-    """Return the parts, begin and end, that hold all words in which two tables differ."""
+    """Return ranges, begin and end, that cover all words by which two tables differ."""
     differ = np.flatnonzero(old != new)
     if not len(differ):
         return []

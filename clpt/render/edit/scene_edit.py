@@ -22,26 +22,25 @@ from clpt.scene.shapes import SMOOTH, Group, Instance, Shape
 
 ShapeKey: TypeAlias = Shape | str | int
 MaterialKey: TypeAlias = Material | ShapeKey
-# By the id of a shape or material: it, and what replaces it.
+# A shape or material, and its replacement, by the id of the former.
 Replacements: TypeAlias = dict[int, tuple[Any, Any]]
 
 
 class Successors:
-    """Present shapes and materials, by those that a renderer had at first.
+    """The present shapes and materials, by the first shapes and materials of a renderer.
 
-    Shapes are plain data: an edit replaces one by another object. Who holds the first can go on to
-    use it as a key.
+    Shapes are plain data: an edit replaces a shape by a new object. Callers may still use the first
+    object as a key.
     """
 
     def __init__(self) -> None:
         self._present: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
 
-    def of(self, thing: object) -> Any:
-        """Return what has replaced a shape or material; itself, if nothing has."""
-        return self._present.get(thing, thing)
+    def of(self, first: object) -> Any:
+        """Return the replacement of a shape or material; itself if it was not replaced."""
+        return self._present.get(first, first)
 
     def note(self, replacements: Replacements) -> None:
-        """Note that things were replaced."""
         for first, present in list(self._present.items()):
             if id(present) in replacements:
                 self._present[first] = replacements[id(present)][1]
@@ -55,10 +54,10 @@ def edit_scene(
     transforms: Mapping[ShapeKey, Any] | None = None,
     vertices: Mapping[ShapeKey, Any] | None = None,
 ) -> tuple[Scene, Replacements]:
-    """Return a scene with other materials, transforms and vertices, and what was replaced.
+    """Return a scene with other materials, transforms and vertices, and the replacements.
 
-    The keys are those of clpt.Renderer.update. Raises SceneError for a key that names nothing in
-    the scene, or more than one shape, and for what a shape does not have.
+    Keys are as in clpt.Renderer.update. Raises SceneError for a key that no shape has or that
+    several have, and for parameters that a shape does not have.
     """
     edit = _Edit(scene, successors)
     for key, material in (materials or {}).items():
@@ -89,7 +88,7 @@ def edit_scene(
 
 
 def match_replacements(former: Scene, scene: Scene) -> Replacements:
-    """Return which shapes have replaced one that is gone, at the same index of as long a list."""
+    """Return the shapes that replaced removed shapes at equal indices of lists of equal length."""
     if len(former.shapes) != len(scene.shapes):
         return {}
     present = {id(shape) for shape in scene.shapes}
@@ -98,22 +97,22 @@ def match_replacements(former: Scene, scene: Scene) -> Replacements:
 
 
 def resolve_device_arrays(scene: Scene, queue: cl.CommandQueue) -> Scene:
-    """Return a scene that can be lowered, whose buffers in device memory are arrays of the queue.
+    """Return a scene for lowering, in which arrays of the queue replace buffers on the device.
 
     Raises SceneError for memory of another context, or a buffer of the wrong size.
     """
     edit = _Edit(scene, Successors())
-    for shape in (one for one in edit.shapes.values() if isinstance(one, Shape)):
+    for shape in (s for s in edit.shapes.values() if isinstance(s, Shape)):
         for name, values in readable(shape, queue, shapes.where(shape)).items():
             edit.change(shape, name, values)
     return edit.edited_scene() if edit.changes else scene
 
 
 class _Edit:
-    """The state of one `edit_scene`.
+    """The state of a call of `edit_scene`.
 
-    changes: the new values of fields, by the id of a shape; edited: by the id of a shape, group or
-    material: it, and what stands for it afterwards.
+    changes: new values of fields by the id of a shape; edited: a shape, group or material and its
+    replacement, by the id of the former.
     """
 
     def __init__(self, scene: Scene, successors: Successors):
@@ -124,7 +123,7 @@ class _Edit:
         self._parts: dict[int, Material] | None = None
 
     def shape(self, key: ShapeKey, where: str) -> Shape:
-        """The shape that a key means."""
+        """Return the shape of a key. Raises SceneError."""
         if isinstance(key, Shape):
             shape = key if id(key) in self.shapes else self.successors.of(key)
             if id(shape) in self.shapes:
@@ -144,7 +143,7 @@ class _Edit:
         return self.scene.shapes[key]
 
     def material(self, key: Material) -> Material:
-        """The material of the scene that a key means."""
+        """Return the scene's material of a key. Raises SceneError."""
         if self._parts is None:
             owned = (shape.material for shape in self.shapes.values())
             self._parts = {id(part): part for material in owned for part in parts(material)}
@@ -154,41 +153,38 @@ class _Edit:
         raise SceneError(f"the {key.kind} is not in the scene", where="materials")
 
     def change(self, shape: Shape, name: str, value: object) -> None:
-        """Let a field of a shape have another value."""
         self.changes.setdefault(id(shape), {})[name] = value
 
     def replace(self, old: object, new: object) -> None:
-        """Replace an object by another, wherever it stands."""
         self.edited[id(old)] = old, new
 
     def edited_scene(self) -> Scene:
-        """The scene afterwards."""
         edited = [self._edited(shape) for shape in self.scene.shapes]
         return dataclasses.replace(self.scene, shapes=edited)
 
     def replacements(self) -> Replacements:
-        """Return pairs of the objects that were replaced, old and new, once the scene is edited."""
+        """Return pairs of old and new objects; call it after `edited_scene`."""
         return {key: (old, new) for key, (old, new) in self.edited.items() if old is not new}
 
-    def _edited(self, thing: Any) -> Any:
-        """Return a shape, group or material as the edit leaves it; itself if nothing changes."""
-        if id(thing) not in self.edited:
-            fields = self._fields(thing)
-            fields = {n: value for n, value in fields.items() if value is not getattr(thing, n)}
-            self.replace(thing, dataclasses.replace(thing, **fields) if fields else thing)
-        return self.edited[id(thing)][1]
+    def _edited(self, part: Any) -> Any:
+        """Return an edited shape, group or material; itself if nothing changes."""
+        if id(part) not in self.edited:
+            fields = self._fields(part)
+            fields = {n: value for n, value in fields.items() if value is not getattr(part, n)}
+            self.replace(part, dataclasses.replace(part, **fields) if fields else part)
+        return self.edited[id(part)][1]
 
-    def _fields(self, thing: Any) -> dict[str, Any]:
-        """Return the fields of a thing that may change, as they are after the edit."""
-        if isinstance(thing, Material):
-            return {name: self._edited(part) for name, part in inner(thing)}
-        if isinstance(thing, Group):
-            members = tuple(self._edited(shape) for shape in thing.shapes)
-            same = all(a is b for a, b in zip(members, thing.shapes, strict=True))
-            return {"shapes": thing.shapes if same else members}
-        fields = self.changes.get(id(thing), {})
-        if isinstance(thing, Instance):
-            return {**fields, "group": self._edited(thing.group)}
-        if isinstance(thing.material, Material) and "material" not in fields:
-            return {**fields, "material": self._edited(thing.material)}
+    def _fields(self, part: Any) -> dict[str, Any]:
+        """Return the fields of a shape, group or material that the edit may change."""
+        if isinstance(part, Material):
+            return {name: self._edited(value) for name, value in inner(part)}
+        if isinstance(part, Group):
+            members = tuple(self._edited(shape) for shape in part.shapes)
+            same = all(a is b for a, b in zip(members, part.shapes, strict=True))
+            return {"shapes": part.shapes if same else members}
+        fields = self.changes.get(id(part), {})
+        if isinstance(part, Instance):
+            return {**fields, "group": self._edited(part.group)}
+        if isinstance(part.material, Material) and "material" not in fields:
+            return {**fields, "material": self._edited(part.material)}
         return fields

@@ -1,19 +1,18 @@
-"""Rules of films: what they ask of the mode, the camera, the integrator and the filter."""
+"""Rules of films: size, mode, filter and layers."""
 
 from __future__ import annotations
 
 from clpt.errors import SceneError
 from clpt.render.film import colour, filters
 from clpt.scene import Scene
-from clpt.scene.integrators import HAVE_LAYERS, Box, Vcm
+from clpt.scene.integrators import HAVE_LAYERS, Vcm
 from clpt.scene.layers import LAYERS
 
-WITH_AXIS = ("perspective", "thin_lens", "orthographic")
 LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/film/film.cl
 
 
 def check_film(scene: Scene) -> None:
-    """Raise SceneError for a film that is too large, or asks for what the scene cannot give."""
+    """Raise SceneError for a film that is too large, or that the scene cannot fill."""
     film = scene.film
     if film.mode == "rgb":
         asks = {"sensor": film.sensor != "cie1931", "bands": film.bands != 0}
@@ -23,7 +22,7 @@ def check_film(scene: Scene) -> None:
     if width * height > LARGEST:
         raise SceneError(f"{width}x{height} are more than {LARGEST >> 20} Mi pixels", where="film")
     colour.output_matrix(film, film.mode)
-    if not isinstance(film.filter, Box):
+    if not film.filter.is_constant:
         filters.integrals(film.filter)
     _check_layers(scene)
 
@@ -35,7 +34,7 @@ def _check_layers(scene: Scene) -> None:
         names = ", ".join(cls.kind for cls in HAVE_LAYERS)
         message = f"only the integrators {names} have layers, not {how.kind}"
         raise SceneError(message, where="film.layers")
-    if scene.camera.kind not in WITH_AXIS:
+    if not scene.camera.has_axis:
         for name, instead in (("z", ": ask for depth"), ("motion", "")):
             if name in film.layers:
                 message = f"the camera {scene.camera.kind} has no axis for {name}{instead}"

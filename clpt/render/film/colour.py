@@ -1,4 +1,4 @@
-"""The way from a film's sums to the colours of its picture: one matrix, a Setting."""
+"""The matrix from a film's sums to the colours of its picture, and the scale of its sums."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from clpt.spectra.sensors import observer
 
 LARGEST = 120  # exponent of 2 of a scale, which is float32
 LARGEST_SCALE = 60  # exponent of 2 of an exposure that sums follow
-# Exponents of 2 between which ordinary light lies in the sums of kernels/core/fixed.cl
+# Exponents of 2 of the dimmest and brightest light that sums of kernels/core/fixed.cl hold well
 DIMMEST, BRIGHTEST = -20, 32
 
 
 def sensor(film: Film) -> Sensor:
-    """The sensor of a film."""
+    """Return the sensor of a film."""
     return observer(film.sensor) if isinstance(film.sensor, str) else film.sensor
 
 
 def output_matrix(film: Film, mode: str) -> NDArray[np.float64]:
-    """The matrix (3, 3) from responses of the film's sensor, or linear Rec. 709 in RGB mode.
+    """Return the matrix (3, 3) from the film's sums to its output space, times its exposure.
 
-    It leads over XYZ to the film's output space; in between the white balance adapts (Bradford).
-    The film's exposure is in it.
+    Sums are responses of the film's sensor, or linear Rec. 709 in RGB mode. They become XYZ, which
+    the white balance adapts (Bradford).
     """
     first = sensor(film).to_xyz if mode == "spectral" else spectra.REC709_TO_XYZ
     balance = np.eye(3)
@@ -42,24 +42,24 @@ def film_scale(film: Film, level: float) -> float:
     """Return the number, a power of two, that a value of 1 adds to a film's sums.
 
     level: of the scene's light [W m^-2 sr^-1 nm^-1], see `light_level`. The scale is the power of
-    two next to the film's exposure: what is seen well is near 1. Where the light is too dim or too
-    bright to be summed so, the scale brings it to the nearest end of what is ordinary.
+    two next to the film's exposure: then well exposed light is near 1. If that light would lie
+    below DIMMEST or above BRIGHTEST, the scale moves it to that bound.
     """
-    own = 0
+    exposure = 0
     if 0.0 < film.exposure < math.inf:
-        own = min(max(round(math.log2(film.exposure)), -LARGEST_SCALE), LARGEST_SCALE)
+        exposure = min(max(round(math.log2(film.exposure)), -LARGEST_SCALE), LARGEST_SCALE)
     if not 0.0 < level < math.inf:
-        return 2.0**own
-    light = math.frexp(level)[1] + own
-    exponent = own + min(max(light, DIMMEST), BRIGHTEST) - light
+        return 2.0**exposure
+    light = math.frexp(level)[1] + exposure
+    exponent = exposure + min(max(light, DIMMEST), BRIGHTEST) - light
     return 2.0 ** min(max(exponent, -LARGEST), LARGEST)
 
 
 def white(film: Film) -> NDArray[np.float64]:
-    """XYZ (3,) of what the film's white balance makes white.
+    """Return XYZ (3,) of the light that the film's white balance makes white.
 
-    An illuminant is as the film's sensor sees it; temperatures and (x, y) are of the 1931 observer.
-    Raises SceneError for what no scaling of cone responses makes white.
+    The film's sensor sees an illuminant; the 1931 observer sees temperatures and (x, y). Raises
+    SceneError for light that no scaling of cone responses makes white.
     """
     chosen = film.white_balance
     if isinstance(chosen, str):

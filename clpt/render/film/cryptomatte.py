@@ -1,7 +1,7 @@
-"""Cryptomatte: which objects or materials a pixel shows, and how much of it each covers.
+"""Cryptomatte: the objects or materials that a pixel shows, and the coverage of each.
 
-After the specification, version 1.2 (Friedman and Jones, Psyop): names are hashed to float32, and
-channels hold pairs of a hash and a coverage, by falling coverage. A header has the names.
+Specification 1.2 (Friedman and Jones, Psyop): names are hashed to float32; channels hold pairs of a
+hash and a coverage, by falling coverage. The header has the names.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from clpt.arrays import Image, Words
 
 RANKS = 6  # pairs of a pixel in a file
-COUNT_BITS = 7  # of a word of a list, kernels/film/layers.cl
-LETTERS = ("red", "green", "blue", "alpha")  # of two pairs in a file
-SHORT_LETTERS = ("r", "g", "b", "a")  # the same in Blender
+COUNT_BITS = 7  # lowest bits of a matte's word, see kernels/film/layers.cl
+LETTERS = ("red", "green", "blue", "alpha")  # channels of two pairs in a file
+SHORT_LETTERS = ("r", "g", "b", "a")  # their names in Blender
 
 
 def murmur3_32(text: str) -> int:
@@ -46,26 +46,28 @@ def name_bits(name: str) -> int:
 
 
 def pairs_of(slots: Words, samples: Words, names: Sequence[str]) -> Image:
-    """Return what a pixel shows as RANKS pairs of hash and coverage, (h, w, 2 RANKS) float32.
+    """Return RANKS pairs of hash and coverage of each pixel, (h, w, 2 RANKS) float32.
 
-    slots: (slots, h, w), words of a film; samples: (h, w) how many were taken; names: by number.
+    slots: (slots, h, w), words of a matte; samples: (h, w), their numbers; names: by number.
     """
     codes = np.array([0, *map(name_bits, names)], np.uint32)
     hashes, counts = codes[slots >> COUNT_BITS], (slots & (1 << COUNT_BITS) - 1).astype(np.int64)
     hashes, counts = _joined(hashes, counts)
     order = np.argsort(-counts, axis=0, kind="stable")[:RANKS]
     hashes, counts = np.take_along_axis(hashes, order, 0), np.take_along_axis(counts, order, 0)
-    found = counts > 0
+    present = counts > 0
     pairs = np.zeros((*slots.shape[1:], RANKS, 2), np.float32)
-    pairs[..., 0] = np.moveaxis(np.where(found, hashes, 0).astype(np.uint32).view(np.float32), 0, 2)
-    pairs[..., 1] = np.moveaxis(np.where(found, counts / np.maximum(samples, 1), 0.0), 0, 2)
+    pairs[..., 0] = np.moveaxis(
+        np.where(present, hashes, 0).astype(np.uint32).view(np.float32), 0, 2
+    )
+    pairs[..., 1] = np.moveaxis(np.where(present, counts / np.maximum(samples, 1), 0.0), 0, 2)
     return pairs.reshape(*slots.shape[1:], 2 * RANKS)
 
 
 def _joined(
     hashes: NDArray[np.uint32], counts: NDArray[np.int64]
 ) -> tuple[NDArray[np.uint32], NDArray[np.int64]]:
-    """Hashes and counts (slots, h, w) where a hash that stands in several slots is counted once."""
+    """Return hashes and counts (slots, h, w) with the counts of equal hashes added up."""
     order = np.argsort(hashes, axis=0, kind="stable")
     hashes, counts = np.take_along_axis(hashes, order, 0), np.take_along_axis(counts, order, 0)
     for i in range(len(hashes) - 1):
@@ -76,12 +78,12 @@ def _joined(
 
 
 def channels_of(prefix: str, pairs: Image, letters: Sequence[str] = LETTERS) -> dict[str, Image]:
-    """Return the channels of pairs as a file has them, such as CryptoObject00.red."""
+    """Return pairs (h, w, 2 n) as channels of a file, such as CryptoObject00.red."""
     return {f"{prefix}{i // 4:02d}.{letters[i % 4]}": pairs[..., i] for i in range(pairs.shape[2])}
 
 
 def attributes_of(prefix: str, names: Sequence[str]) -> dict[str, str]:
-    """Return the header of a file that has these channels: what the hashes stand for."""
+    """Return the attributes of a file with such channels: the names behind the hashes."""
     key = f"cryptomatte/{murmur3_32(prefix):08x}"[: len("cryptomatte/") + 7]
     manifest = {name: f"{name_bits(name):08x}" for name in dict.fromkeys(names)}
     return {

@@ -1,4 +1,4 @@
-"""The pictures of a film, made of its words on the host."""
+"""The pictures of a film, computed from its words on the host."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from clpt.arrays import Image, Words
 from clpt.errors import SceneError
 from clpt.render.film.layers import layers_of
-from clpt.render.film.picture_form import PictureForm
-from clpt.render.film.pictures import Still
+from clpt.render.film.pictures import PictureForm, Still
 from clpt.render.film.state import (
     FILM_WORDS,
     SAMPLES_WORD,
@@ -26,26 +25,26 @@ from clpt.render.records import SUM_WORDS
 
 
 class Developed(Still):
-    """The pictures of a film: what every picture of clpt is made by.
+    """The pictures of a film, which every picture of clpt comes from.
 
-    Equal words give equal pictures on every machine: each step is one of IEEE 754 in float32, and
-    their order stands here. `Renderer.film`, which kernels/stage/accumulate.cl makes on the device
-    for those who look on, takes the same steps; a device may divide and contract otherwise.
+    Equal words give equal pictures on every machine: each step is an operation of IEEE 754 in
+    float32, in a fixed order. kernels/stage/accumulate.cl computes `Renderer.film` on the device by
+    the same steps; a device may divide and contract differently.
     """
 
     def __init__(self, film: FilmState, form: PictureForm):
-        self._film, self._form = film, form
+        self._film, self.form = film, form
 
     def image(self) -> Image:
         """The picture: colours, with alpha where the film has it, or the film's bands."""
-        if self._form.bands:
-            return self._mean_bands() * np.float32(self._form.exposure)
+        if self.form.bands:
+            return self._mean_bands() * np.float32(self.form.exposure)
         return self.picture()
 
     def picture(self) -> Image:
         """The picture in three colours, with alpha where the film has it, also with bands."""
         colours = self.colours()
-        return np.dstack([colours, self._alpha()]) if self._form.alpha else colours
+        return np.dstack([colours, self._alpha()]) if self.form.alpha else colours
 
     def colours(self) -> Image:
         """The picture in three colours, (h, w, 3) float32, also of a film with bands."""
@@ -53,12 +52,13 @@ class Developed(Still):
 
     def layers(self) -> dict[str, Image]:
         """The layers by name, (h, w, 1 to 12) float32."""
-        return layers_of(self._film.arrays, self, self._variance)
+        variance = self._variance() if "variance" in self.form.layers else None
+        return layers_of(self._film.arrays, self, variance)
 
     def halves(self) -> tuple[Image, Image]:
-        """The pictures of the even and of the odd samples. Raises SceneError without."""
+        """The pictures of even samples and of odd samples. Raises SceneError without them."""
         words = self._film.words
-        if self._form.octaves:
+        if self.form.octaves:
             words = add_films(*np.split(words, 2))
         if len(words) != 2:
             raise SceneError(
@@ -70,24 +70,24 @@ class Developed(Still):
     def _variance(self) -> Image:
         """Return an estimate of the variance of each pixel's mean, (h, w, 3) float32.
 
-        If a pixel's samples are of weight a in one part of the film and b in the other, the squared
-        difference of both means times a b / (a + b)^2 is the variance of the mean of all, without
-        bias where samples are independent. Even and odd octaves tell a little more of points that
-        are spread evenly: `Sampler.octaves` times that. Where a part is empty the value itself
-        stands in the place of the difference.
+        Let a pixel's samples have the weight a in one part of the film and b in the other. The
+        squared difference of both means times a b / (a + b)^2 estimates the variance of the mean of
+        all samples, without bias if they are independent. For points that are spread evenly, even
+        and odd octaves differ more: the estimate is divided by `Sampler.octaves`. If a part is
+        empty, the squared value replaces the estimate.
         """
         parts = [self._sum(part) for part in np.split(self._film.words, 2)]
         divisors = [self._divisor(words) for words in parts]
         shares = divisors[0] * divisors[1] * _inverse(sum(divisors, start=np.float32(0.0))) ** 2
-        first, second = (self._to_output(self._seen(words)) for words in parts)
-        apart = np.where(shares > 0, shares / np.float32(self._form.octaves or 1.0), 1.0)
-        found = apart[..., None] * (first - second) ** 2
-        if self._form.weighed:
+        first, second = (self._to_output(self._camera_mean(words)) for words in parts)
+        apart = np.where(shares > 0, shares / np.float32(self.form.octaves or 1.0), 1.0)
+        variance = apart[..., None] * (first - second) ** 2
+        if self.form.weighed:
             counts = [self._light_paths(words) for words in parts]
             share = counts[0] * counts[1] / max(sum(counts), 1e-30) ** 2
-            first, second = (self._to_output(self._brought(words)) for words in parts)
-            found += np.float32(share or 1.0) * (first - second) ** 2
-        return found.astype(np.float32)
+            first, second = (self._to_output(self._light_path_mean(words)) for words in parts)
+            variance += np.float32(share or 1.0) * (first - second) ** 2
+        return variance.astype(np.float32)
 
     def samples_per_pixel(self) -> Image:
         """Return how many samples each pixel has, (h, w) float32."""
@@ -103,67 +103,66 @@ class Developed(Still):
         return self._sum(self._film.words)
 
     def _sum(self, films: Words) -> Words:
-        """The words (10 to 26, h, w) of all samples of some parts of the film."""
         total, *others = films
         for part in others:
             total = add_films(total, part)
         return np.asarray(total)
 
     def _colours(self, words: Words) -> Image:
-        values = self._seen(words)
-        return self._to_output(values + self._brought(words) if self._form.weighed else values)
+        values = self._camera_mean(words)
+        return self._to_output(
+            values + self._light_path_mean(words) if self.form.weighed else values
+        )
 
-    def _seen(self, words: Words) -> Image:
-        """The means of samples in the film's three channels, (3, h, w)."""
+    def _camera_mean(self, words: Words) -> Image:
+        """Return the means of the camera's samples in the film's three channels, (3, h, w)."""
         return _sums(words, 0) * _inverse(self._divisor(words))
 
-    def _brought(self, words: Words) -> Image:
-        """Return what weighed light paths bring beside them."""
-        return _sums(words, light_group(len(words))) * self._light_mean(words)
+    def _light_path_mean(self, words: Words) -> Image:
+        """Return the light that weighted light paths add to these means, (3, h, w)."""
+        return _sums(words, light_group(len(words))) * self._inverse_light_paths(words)
 
     def _to_output(self, values: Image) -> Image:
         first, second, third = values
-        rows = np.array(self._form.to_output, np.float32)
+        rows = np.array(self.form.to_output, np.float32)
         return np.stack([a * first + b * second + c * third for a, b, c in rows], axis=2)
 
     def _alpha(self) -> Image:
-        words, first = self._words, FILM_WORDS + SUM_WORDS * self._form.weights
-        return numbers(words[first : first + SUM_WORDS]) * self._mean(words)
+        words, first = self._words, FILM_WORDS + SUM_WORDS * self.form.weights
+        return numbers(words[first : first + SUM_WORDS]) * self._inverse_divisor(words)
 
     def _mean_bands(self) -> Image:
         sums, *others = self._film.bands
         for half in others:
             sums = add_sums(sums, half)
-        values, count = numbers(np.moveaxis(sums, 1, 0)), self._form.bands
+        values, count = numbers(np.moveaxis(sums, 1, 0)), self.form.bands
         words, scale = self._words, np.float32(self._film.scale)
-        total = values[:count] * (self._mean(words) / scale)
-        if self._form.weighed:
-            total += values[count:] * (self._light_mean(words) / scale)
+        total = values[:count] * (self._inverse_divisor(words) / scale)
+        if self.form.weighed:
+            total += values[count:] * (self._inverse_light_paths(words) / scale)
         return np.ascontiguousarray(np.moveaxis(total, 0, 2))
 
     def _samples(self, words: Words) -> Image:
-        if not self._form.light_paths:
+        if not self.form.light_paths:
             return words[SAMPLES_WORD].astype(np.float32)
         return np.full(words.shape[1:], self._light_paths(words), np.float32)
 
-    def _mean(self, words: Words) -> Image:
-        """Return one over the divisor of each pixel's sums, 0 where that is 0."""
+    def _inverse_divisor(self, words: Words) -> Image:
         return _inverse(self._divisor(words))
 
     def _divisor(self, words: Words) -> Image:
-        """Return the number of samples of each pixel, or their weight."""
-        if self._form.weights:
+        """Return the number of samples of each pixel, or the sum of their filter weights."""
+        if self.form.weights:
             return numbers(words[FILM_WORDS:][:SUM_WORDS])
         return self._samples(words)
 
-    def _light_mean(self, words: Words) -> Image:
-        """Return one over the number of light paths; 0 in pixels without samples of the camera."""
+    def _inverse_light_paths(self, words: Words) -> Image:
+        """Return 1 over the light paths per pixel; 0 in pixels without samples of the camera."""
         inverse = _inverse(np.full((), self._light_paths(words), np.float32))
         return np.where(words[SAMPLES_WORD] > 0, inverse, np.float32(0.0))
 
     def _light_paths(self, words: Words) -> float:
-        """Return how many light paths there were for each pixel."""
-        first = light_group(len(words)) if self._form.weighed else 0
+        first = light_group(len(words)) if self.form.weighed else 0
         count = words[first + SAMPLES_WORD]
         return float(count.sum(dtype=np.uint64)) / count.size
 
@@ -174,5 +173,6 @@ def _sums(words: Words, first: int) -> Image:
     return numbers(np.moveaxis(sums, 1, 0))
 
 
-def _inverse(by: NDArray[Any]) -> Image:
-    return np.divide(np.float32(1.0), by, out=np.zeros_like(by), where=by > 0)
+def _inverse(divisor: NDArray[Any]) -> Image:
+    zeros = np.zeros_like(divisor)
+    return np.divide(np.float32(1.0), divisor, out=zeros, where=divisor > 0)

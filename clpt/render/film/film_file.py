@@ -1,31 +1,34 @@
-"""Films as files, `NAME.film` and `NAME.resume.exr`: one format, exact, sealed by a checksum.
+"""Films as files, `NAME.film` and `NAME.resume.exr`, with a checksum as their seal.
 
-A file is an OpenEXR image of several parts. The first is the picture so far, which any viewer
-opens; its attribute `clpt` says in JSON what the film is of. The others hold words as channels of
-type UINT: those of the film, one channel for each, and the state of adaptive sampling. Behind the
-image stands a seal of fixed length: SEAL, the number of bytes before it, and their SHA-256. It is
-checked before anything else is read.
+A file is an OpenEXR image of several parts. The first part is the picture so far, which any viewer
+opens; its attribute `clpt` holds the film's origin, form and sessions in JSON. The other parts hold
+words as channels of type UINT: the film's words, a channel each, and the state of adaptive
+sampling. A seal of fixed length ends the file: SEAL, the number of bytes before it, and their
+SHA-256. The reader checks it first.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import hashlib
+import itertools
 import json
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn
 
 import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from clpt.choices import MOST_SAMPLES
 from clpt.errors import SceneError
 from clpt.files import input_files, output_files
 from clpt.images import exr_files
-from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.pictures import PictureForm
 from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.film.state import FilmState
 from clpt.render.records.layer_names import LayerNames
@@ -33,25 +36,24 @@ from clpt.scene.fingerprint import Fingerprint
 from clpt.spectra.spaces import chromaticities
 
 _Parts = Mapping[str, Mapping[str, NDArray[np.uint32]]]  # channels by name, of parts by name
-_T = TypeVar("_T")
 
-FORMAT = 2  # format 1 had a row of films, always one, and its counts in a list
+FORMAT = 2  # format 1 had lists of length 1 of films and of counts
 ATTRIBUTE = "clpt"
 SUFFIXES = (".film", ".exr")
 SEAL = b"clpt film"
 SEAL_BYTES = len(SEAL) + 8 + 32
 EXR_MAGIC = b"\x76\x2f\x31\x01"
-PIECE = 1 << 20  # bytes that are read at once
-ROW = 1024  # words of a row, of arrays that are no pictures
+PIECE = 1 << 20  # bytes of a read
+ROW = 1024  # words of a row of an array that is no picture
 HALF_MAX = 65504.0
 LOST = "it was not written to its end, or was damaged later"
 ADVICE = "use a copy, or render it again"
 
 
 def write(path: str | Path, saved: SavedFilm) -> None:
-    """Write a film, in the place of the file that is there.
+    """Write a film; replace an existing file.
 
-    Raises OSError: the former file is then as it was.
+    Raises OSError; the existing file is then unchanged.
     """
     with output_files.replacing(path) as partial:
         parts = [_picture(saved), *_words(saved), *_arrays(saved)]
@@ -65,42 +67,49 @@ def write(path: str | Path, saved: SavedFilm) -> None:
 
 
 def read(path: str | Path) -> SavedFilm:
-    """Read a film; what `write` was given comes back to the bit.
+    """Read a film, equal to the bit to the film that was written.
 
-    Raises SceneError for a file that is not there, is no film, is damaged, or comes from a later
+    Raises SceneError for a file that does not exist, is no film, is damaged, or comes from a later
     version of clpt.
     """
-    return _read(Path(path), _restored)
+    path = Path(path)
+    with _as_scene_errors(path):
+        return _restored(*_stored(path))
 
 
 def read_header(path: str | Path) -> dict[str, Any]:
-    """Return what a film file says of itself, without its words. Raises as `read` does."""
-    return _read(Path(path), lambda header, parts: header, header_only=True)
+    """Return the JSON of a film file, without its words. Raises as `read` does."""
+    path = Path(path)
+    with _as_scene_errors(path):
+        return _stored(path, header_only=True)[0]
 
 
-def _read(path: Path, made: Callable[[dict[str, Any], _Parts], _T], **options: bool) -> _T:
-    """Return what `made` makes of the header and the parts of a file whose seal is whole.
-
-    Raises SceneError for a file that is damaged, or no film.
-    """
+def _stored(path: Path, **options: bool) -> tuple[dict[str, Any], _Parts]:
+    """Check the seal of a file; return its JSON, and its parts but for the picture."""
     _check_seal(path)
+    with exr_files.opened(path, **options) as stored:
+        header = _header(path, stored[0].header.get(ATTRIBUTE))
+        parts = {
+            part.name(): {name: channel.pixels for name, channel in part.channels.items()}
+            for part in stored[1:]
+        }
+    return header, parts
+
+
+@contextmanager
+def _as_scene_errors(path: Path) -> Iterator[None]:
+    """Raise SceneError for any error within: of a file with a seal that clpt did not write."""
     try:
-        with exr_files.opened(path, **options) as stored:
-            header = _header(path, stored[0].header.get(ATTRIBUTE))
-            parts = {
-                part.name(): {name: channel.pixels for name, channel in part.channels.items()}
-                for part in stored[1:]
-            }
-        return made(header, parts)
+        yield
     except SceneError:
         raise
-    except Exception as error:  # of a sealed file that clpt does not write
+    except Exception as error:
         message = str(error).splitlines()[0] if str(error) else ""
         _fail(path, f"no readable film: {type(error).__name__}: {message}")
 
 
 def _check_seal(path: Path) -> None:
-    """Raise SceneError for a file that is not, to the bit, what was written."""
+    """Raise SceneError for a file that differs from the written file in any bit."""
     try:
         with input_files.opened(path) as file:
             size = file.seek(0, os.SEEK_END)
@@ -109,8 +118,8 @@ def _check_seal(path: Path) -> None:
             file.seek(max(size - SEAL_BYTES, 0))
             seal = file.read()
             if not seal.startswith(SEAL) or len(seal) != SEAL_BYTES:
-                what = f"a picture without a film, or {LOST}" if is_exr else "not a film of clpt"
-                _fail(path, f"{what}: {ADVICE}")
+                problem = f"a picture without a film, or {LOST}" if is_exr else "not a film of clpt"
+                _fail(path, f"{problem}: {ADVICE}")
             length, digest = seal[len(SEAL) :][:8], seal[-32:]
             if int.from_bytes(length, "little") != size - SEAL_BYTES:
                 _fail(path, f"its length is wrong: {LOST}: {ADVICE}")
@@ -121,7 +130,7 @@ def _check_seal(path: Path) -> None:
 
 
 def _hashed(file: Any, size: int) -> bytes:
-    """The SHA-256 of the first bytes of a file."""
+    """Return the SHA-256 of the first `size` bytes of a file; leave the file at its end."""
     hashed = hashlib.sha256()
     file.seek(0)
     while size > 0 and (piece := file.read(min(PIECE, size))):
@@ -136,7 +145,7 @@ def _fail(path: Path, message: str) -> NoReturn:
 
 
 def _header(path: Path, text: object) -> dict[str, Any]:
-    """The content of the attribute. Raises SceneError."""
+    """Return the attribute's JSON in the present format. Raises SceneError."""
     if not isinstance(text, str):
         _fail(path, "not a film of clpt: its header does not say what it is of")
     header = json.loads(text)
@@ -149,13 +158,21 @@ def _header(path: Path, text: object) -> dict[str, Any]:
     if header["format"] == 1:
         del header["shapes"]["words"][0]
         (header["counts"],) = header["counts"]
+    _check_ranges(path, header["taken"])
     return dict(header)
 
 
+def _check_ranges(path: Path, taken: list[list[int]]) -> None:
+    """Raise SceneError for ranges of samples that no render takes."""
+    ends = [-1, *(number for one in taken for number in one), MOST_SAMPLES + 1]
+    if not all(a < b for a, b in itertools.pairwise(ends)):
+        message = "no film of clpt: its ranges of samples must ascend, be apart, and lie within "
+        _fail(path, f"{message}0 to {MOST_SAMPLES}, not {taken}")
+
+
 def _picture(saved: SavedFilm) -> Any:
-    """The picture so far, with the header: what viewers show."""
-    form, made = saved.form, saved._developed()
-    pixels = made.picture()
+    """Return the first part: the picture so far, and the film's JSON."""
+    form, pixels = saved.form, saved.developed().picture()
     letters = "RGBA"[: pixels.shape[2]]
     stored = np.clip(np.nan_to_num(pixels), -HALF_MAX, HALF_MAX).astype(np.float16)
     channels = {n: np.ascontiguousarray(stored[..., i]) for i, n in enumerate(letters)}
@@ -172,7 +189,7 @@ def _header_of(saved: SavedFilm) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "clpt": saved.origin.clpt,
-        "taken": [list(one) for one in state.taken],
+        "taken": [list(samples) for samples in state.taken],
         "scale": state.scale,
         "shapes": {name: array.shape for name, array in state.arrays.items()},
         "scene": dict(saved.origin.scene.values),
@@ -180,20 +197,20 @@ def _header_of(saved: SavedFilm) -> dict[str, Any]:
         "kernels": saved.origin.kernels,
         "form": dataclasses.asdict(saved.form),
         "counts": dict(saved.counts),
-        "sessions": [dataclasses.asdict(one) for one in saved.sessions],
+        "sessions": [dataclasses.asdict(session) for session in saved.sessions],
         "adaptive": {n: [a.dtype.str, a.shape] for n, a in saved.adaptive.items()},
     }
 
 
 def _header_of_part(saved: SavedFilm, compression: object) -> dict[str, Any]:
-    """Return the header that every part has: parts of one file have one display window."""
+    """Return the header of every part: all parts of a file share a display window."""
     height, width = saved.film.words.shape[-2:]
     window = np.zeros(2, np.int32), np.array([width - 1, height - 1], np.int32)
     return {"compression": compression, "type": OpenEXR.scanlineimage, "displayWindow": window}
 
 
 def _words(saved: SavedFilm) -> Iterator[Any]:
-    """The film's words, one channel each: the parts "words", and others where there are some."""
+    """Yield the parts of the film's arrays that are not empty; each plane is a channel."""
     for name, planes in saved.film.arrays.items():
         planes = planes.reshape(-1, *planes.shape[-2:])
         if len(planes):
@@ -201,7 +218,7 @@ def _words(saved: SavedFilm) -> Iterator[Any]:
 
 
 def _arrays(saved: SavedFilm) -> Iterator[Any]:
-    """Arrays that are no pictures: a part each, whose rows have ROW words."""
+    """Yield a part for each array of adaptive sampling; its rows have ROW words."""
     for name, array in saved.adaptive.items():
         words = np.ascontiguousarray(array).reshape(-1).view(np.uint32)
         rows = np.zeros((max(-(-len(words) // ROW), 1), ROW), np.uint32)
@@ -216,7 +233,6 @@ def _part(saved: SavedFilm, name: str, channels: Mapping[str, NDArray[np.uint32]
 
 
 def _restored(header: dict[str, Any], parts: _Parts) -> SavedFilm:
-    """The film that a header and the words of parts say."""
 
     def words(name: str) -> NDArray[np.uint32]:
         shape = tuple(header["shapes"][name])
@@ -246,6 +262,6 @@ def _restored(header: dict[str, Any], parts: _Parts) -> SavedFilm:
         ),
         form=PictureForm(**{**form, **rows, **names}),
         counts=header["counts"],
-        sessions=tuple(Session(**one) for one in header["sessions"]),
+        sessions=tuple(Session(**session) for session in header["sessions"]),
         adaptive={n: array(n, *about) for n, about in header["adaptive"].items()},
     )

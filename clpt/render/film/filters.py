@@ -1,105 +1,75 @@
-"""Pixel filters: their values, integrals and reach, in pixels."""
+"""Pixel filters as tables for kernels, which sample filters and evaluate them."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from clpt.arrays import Floats
 from clpt.errors import SceneError
-from clpt.scene.integrators import (
-    BlackmanHarris,
-    Box,
-    Filter,
-    Gaussian,
-    Lanczos,
-    Mitchell,
-    Tent,
-)
+from clpt.render.records.tables import TableStore
+from clpt.scene.integrators import Filter
 
-CUT = 4.0  # standard deviations at which a Gaussian ends that has no radius
-STEPS = 1 << 16  # in which a filter is integrated
-LEAST = 1e-6  # of the integral of its absolute values: what a filter's integral must exceed
+CELLS = 1024  # of equal probability, on one side
+PROFILE = 256  # steps of a filter's values
+STEPS = 1 << 16  # of the numerical integral of a filter
+LEAST = 1e-6  # share of the integral of |f| that the integral of f must exceed
 
 
-def reach(chosen: Filter) -> int:
-    """Return how many pixels beside its own a sample may serve, along an axis to one side."""
-    return max(math.ceil(radius(chosen) - 0.5), 0)
+def encode_filter(pixel_filter: Filter, store: TableStore, splatting: bool) -> None:
+    """Put a filter's table into `distributions`, where kernels expect it to be the first.
 
-
-def taps(chosen: Filter) -> int:
-    """Return how many pixels of an axis have a point in their filters at most."""
-    return math.ceil(2.0 * radius(chosen))
-
-
-def radius(chosen: Filter) -> float:
-    """Return the half width of a filter [pixels]."""
-    if isinstance(chosen, Gaussian) and chosen.radius == 0.0:
-        return CUT * chosen.stddev
-    return float(chosen.radius)  # type: ignore[attr-defined]
-
-
-def value(chosen: Filter, distance: ArrayLike) -> Floats:
-    """Return a filter at distances from its centre along one axis [pixels], not normalised.
-
-    The definitions are Mitsuba 3's, so that the same names give the same images.
+    splatting: whether a sample serves all pixels whose filters hold it. The table then has the
+    filter's values, else cells to sample. Raises SceneError if `distributions` is not empty, and as
+    `sampling_table` does.
     """
-    x = np.abs(np.asarray(distance, np.float64))
-    inside = x <= radius(chosen)
-    return np.where(inside, FUNCTIONS[type(chosen)](chosen, np.where(inside, x, 0.0)), 0.0)
+    table = profile_table(pixel_filter) if splatting else sampling_table(pixel_filter)
+    if store.append_floats("distributions", table) != 0:
+        raise SceneError("the pixel filter has to be encoded first")
 
 
-def integrals(chosen: Filter) -> tuple[Floats, Floats, Floats]:
+def encode_profile(pixel_filter: Filter, store: TableStore, splatting: bool) -> int:
+    """Return the first word of a filter's values in `distributions`, which light paths need.
+
+    splatting: whether `encode_filter` has already appended these values.
+    """
+    return 0 if splatting else store.append_floats("distributions", profile_table(pixel_filter))
+
+
+def integrals(pixel_filter: Filter) -> tuple[Floats, Floats, Floats]:
     """Return edges of steps (n,), and the integrals of |f| and of f up to each, in steps.
 
     Raises SceneError for a filter whose integral is not positive.
     """
-    edges = np.linspace(0.0, radius(chosen), STEPS + 1)
-    middle = value(chosen, (edges[1:] + edges[:-1]) / 2.0)
-    absolute, signed = (np.concatenate([[0.0], np.cumsum(f)]) for f in (np.abs(middle), middle))
+    edges = np.linspace(0.0, pixel_filter.half_width, STEPS + 1)
+    values = pixel_filter.value((edges[1:] + edges[:-1]) / 2.0)
+    absolute, signed = (np.concatenate([[0.0], np.cumsum(f)]) for f in (np.abs(values), values))
     if not (np.isfinite(absolute[-1]) and signed[-1] > LEAST * absolute[-1]):
         message = "the filter's integral must be positive"
-        raise SceneError(message, where=f"film.filter {chosen.kind}")
+        raise SceneError(message, where=f"film.filter {pixel_filter.kind}")
     return edges, absolute, signed
 
 
-def _tent(chosen: Tent, x: Floats) -> Floats:
-    return 1.0 - x / chosen.radius
+def sampling_table(pixel_filter: Filter) -> NDArray[np.float32]:
+    """Return n, then n + 1 distances, then n weights: see kernels/film/filter.cl.
+
+    Cells have equal shares of the integral of |f|. A cell's weight is n times its share of the
+    integral of f, so that the weights' mean is 1. Raises SceneError as `integrals` does.
+    """
+    if pixel_filter.is_constant:
+        return np.array([1.0, 0.0, pixel_filter.half_width, 1.0], np.float32)
+    edges, absolute, signed = integrals(pixel_filter)
+    distances = np.interp(np.linspace(0.0, absolute[-1], CELLS + 1), absolute, edges)
+    weights = np.diff(np.interp(distances, edges, signed)) * CELLS / signed[-1]
+    return np.concatenate([[CELLS], distances, weights]).astype(np.float32)
 
 
-def _gaussian(chosen: Gaussian, x: Floats) -> Floats:
-    """Lowered by its value at the radius, so that it ends at zero."""
-    end = radius(chosen) / chosen.stddev
-    return np.exp(-0.5 * (x / chosen.stddev) ** 2) - np.exp(-0.5 * end**2)
+def profile_table(pixel_filter: Filter) -> NDArray[np.float32]:
+    """Return the radius, n, and n + 1 values from the centre to there: see kernels/film/spread.cl.
 
-
-def _mitchell(chosen: Mitchell, x: Floats) -> Floats:
-    """Mitchell and Netravali 1988 eq. 8."""
-    b, c, x = chosen.b, chosen.c, x * (2.0 / chosen.radius)
-    near = (12 - 9 * b - 6 * c) * x**3 + (-18 + 12 * b + 6 * c) * x**2 + (6 - 2 * b)
-    far = (-b - 6 * c) * x**3 + (6 * b + 30 * c) * x**2 + (-12 * b - 48 * c) * x + (8 * b + 24 * c)
-    return np.where(x < 1.0, near, far) / 6.0
-
-
-def _lanczos(chosen: Lanczos, x: Floats) -> Floats:
-    """Windowed by the main lobe of a sinc `lobes` wide (Duchon 1979)."""
-    return np.sinc(x) * np.sinc(x / chosen.lobes)
-
-
-def _blackman_harris(chosen: BlackmanHarris, x: Floats) -> Floats:
-    """The four-term window of Harris 1978, -92 dB."""
-    t = np.pi * (x / chosen.radius + 1.0)
-    return 0.35875 - 0.48829 * np.cos(t) + 0.14128 * np.cos(2 * t) - 0.01168 * np.cos(3 * t)
-
-
-FUNCTIONS: dict[type[Filter], Callable[..., Floats]] = {
-    Box: lambda chosen, x: np.ones_like(x),
-    Tent: _tent,
-    Gaussian: _gaussian,
-    Mitchell: _mitchell,
-    Lanczos: _lanczos,
-    BlackmanHarris: _blackman_harris,
-}
+    The integral of the filter, over both sides, is 1.
+    """
+    radius = pixel_filter.half_width
+    values = pixel_filter.value(np.linspace(0.0, radius, PROFILE + 1))
+    area = 2.0 * np.sum((values[1:] + values[:-1]) / 2.0) * radius / PROFILE
+    return np.concatenate([[radius, PROFILE], values / area]).astype(np.float32)

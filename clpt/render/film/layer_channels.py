@@ -1,4 +1,4 @@
-"""Pictures with their layers as .exr files, by one of two sets of names."""
+"""Pictures with their layers as .exr files; channels have the names of clpt or of Blender."""
 
 from __future__ import annotations
 
@@ -13,15 +13,13 @@ from clpt.choices import Exposure
 from clpt.images import exr_files, spectral_exr
 from clpt.images.colour.view import View
 from clpt.render.film import cryptomatte
-from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.layers import GROUP, matte_names
-from clpt.render.film.picture_form import PictureForm
-from clpt.render.film.pictures import Pictures
+from clpt.render.film.pictures import PictureForm, Pictures
 from clpt.scene.layers import LAYERS
 from clpt.spectra.spaces import chromaticities
 
-VIEW_LAYER = "ViewLayer."  # what Blender's names begin with
-PICTURE = {"clpt": "", "blender": f"{VIEW_LAYER}Combined."}  # before R, G and B of the picture
+VIEW_LAYER = "ViewLayer."  # prefix of Blender's names
+PICTURE = {"clpt": "", "blender": f"{VIEW_LAYER}Combined."}  # prefix of R, G and B of the picture
 SETS = tuple(PICTURE)
 BESIDE = {"noisy": "Noisy Image", "denoised_error": "Denoised Error"}  # Blender's names
 
@@ -35,18 +33,17 @@ def write_layers(
 ) -> None:
     """Write the picture of a renderer or film and its layers as an .exr.
 
-    path: of the file. source: has the picture. names: a set of SETS; "blender" gives names such as
-    ViewLayer.Combined.R. metadata: further attributes of the file. The picture is in half floats,
-    or its bands in float32, layers in float32. A crop has its place in the whole picture as the
-    data window. Raises SceneError.
+    path: of the file. names: one of SETS; "blender" gives names such as ViewLayer.Combined.R.
+    metadata: further attributes of the file. The picture is stored in half floats; bands and layers
+    are stored in float32. The data window of a crop is its part of the whole film. Raises
+    SceneError.
     """
-    source = source._developed()
-    layers, form = source.layers(), source._form
+    source = source.developed()
+    layers, form = source.layers(), source.form
     if form.adaptive:
         layers.setdefault("samples", source.samples_per_pixel()[..., None])
     channels = channels_of(layers, names)
-    if isinstance(source, DenoisedPicture):
-        channels |= _beside(source, names)
+    channels |= _beside(source, names)
     if form.bands and form.alpha:
         channels["A"] = source.picture()[..., 3]
     place = exr_files.windows(source.colours().shape, form.place)
@@ -75,10 +72,10 @@ def write_picture(
 ) -> None:
     """Write the picture of a renderer or film in the format of a path's suffix.
 
-    An .exr has its layers and bands, an .npy its numbers: bands where it has those. The rest: see
-    `write_layers` and `clpt.write_image`. Raises SceneError.
+    An .exr holds its layers and bands, an .npy its bands or else its colours. Other parameters are
+    as in `write_layers` and `clpt.write_image`. Raises SceneError.
     """
-    suffix, form = path.suffix.lower(), source._form
+    suffix, form = path.suffix.lower(), source.form
     if form.bands and suffix == ".npy":
         images.write_npy(path, source.image())
     elif suffix == ".exr":
@@ -93,57 +90,54 @@ def write_picture(
 def channels_of(layers: Mapping[str, Image], names: str = "clpt") -> dict[str, Image]:
     """Return the channels of layers as an .exr has them, (h, w) by names such as depth.Z.
 
-    layers: as `Renderer.layers` returns them; names: a set of SETS, "blender" gives names such as
+    layers: as `Renderer.layers` returns them; names: one of SETS, "blender" gives names such as
     ViewLayer.Position.X.
     """
-    made: dict[str, Image] = {}
+    channels: dict[str, Image] = {}
     for name, image in layers.items():
-        prefix, form = _prefix(name, names), LAYERS[_owner(name)].form
-        if form == "matte":
+        prefix, layer = _prefix(name, names), LAYERS[_kind(name)]
+        if layer.form == "matte":
             blender = names == "blender"
-            of_pairs = cryptomatte.SHORT_LETTERS if blender else cryptomatte.LETTERS
-            made |= cryptomatte.channels_of(prefix, image, of_pairs)
+            letters = cryptomatte.SHORT_LETTERS if blender else cryptomatte.LETTERS
+            channels |= cryptomatte.channels_of(prefix, image, letters)
             continue
-        layer = LAYERS[_owner(name)]
-        own = layer.exr if names == "clpt" else ()
+        exr_names = layer.exr if names == "clpt" else ()
         for i, letter in enumerate(layer.channels):
-            turned = names == "blender" and letter in layer.flipped
-            channel = own[i] if own else f"{prefix}.{letter}"
-            made[channel] = -image[..., i] if turned else image[..., i]
-    return made
+            flipped = names == "blender" and letter in layer.flipped
+            channel = exr_names[i] if exr_names else f"{prefix}.{letter}"
+            channels[channel] = -image[..., i] if flipped else image[..., i]
+    return channels
 
 
-def _beside(denoised: DenoisedPicture, names: str) -> dict[str, Image]:
-    """The channels of the picture with its noise, and of what is known of errors."""
-    made: dict[str, Image] = {}
-    for name, picture in denoised.beside.items():
+def _beside(source: Pictures, names: str) -> dict[str, Image]:
+    channels: dict[str, Image] = {}
+    for name, picture in source.beside.items():
         prefix = VIEW_LAYER + BESIDE[name] if names == "blender" else name
         if picture.ndim == 2:
-            made[f"{prefix}.X" if names == "blender" else prefix] = picture
+            channels[f"{prefix}.X" if names == "blender" else prefix] = picture
         else:
-            made |= {f"{prefix}.{letter}": picture[..., i] for i, letter in enumerate("RGB")}
-    return made
+            channels |= {f"{prefix}.{letter}": picture[..., i] for i, letter in enumerate("RGB")}
+    return channels
 
 
 def attributes_of(form: PictureForm, names: str = "clpt") -> dict[str, str | float]:
-    """Return what an .exr says of a film: stops for screens, the names of mattes of layers."""
-    found: dict[str, str | float] = {}
+    """Return the attributes of an .exr: the stops for screens, and the names in mattes."""
+    attributes: dict[str, str | float] = {}
     if form.display_exposure:
-        found[images.STOPS] = form.display_exposure
+        attributes[images.STOPS] = form.display_exposure
     for name in form.layers:
         if LAYERS[name].form == "matte":
-            found |= cryptomatte.attributes_of(_prefix(name, names), matte_names(form, name))
-    return found
+            attributes |= cryptomatte.attributes_of(_prefix(name, names), matte_names(form, name))
+    return attributes
 
 
-def _owner(name: str) -> str:
-    """The name in LAYERS of a layer."""
+def _kind(name: str) -> str:
+    """Return the key of a layer in LAYERS."""
     return name if name in LAYERS else "light_groups"
 
 
 def _prefix(name: str, names: str) -> str:
-    """Return the beginning of the names of a layer's channels."""
-    layer = LAYERS[_owner(name)]
+    layer = LAYERS[_kind(name)]
     if names == "blender":
         group = "" if name in LAYERS else f"_{name.removeprefix(GROUP)}"
         return f"{VIEW_LAYER}{layer.blender}{group}"

@@ -1,8 +1,8 @@
-"""Layers beside the picture, from the words of a film: see kernels/film/layers.cl."""
+"""Layers beside the picture, from the words of a film (kernels/film/layers.cl), and as colours."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from clpt.arrays import Image, Words
 from clpt.render.film.colour import output_matrix, sensor
 from clpt.render.film.cryptomatte import pairs_of
-from clpt.render.film.picture_form import PictureForm
-from clpt.render.film.pictures import Pictures
+from clpt.render.film.pictures import PictureForm, Pictures
 from clpt.render.film.state import numbers
 from clpt.render.records.film import layer_places
 from clpt.scene.integrators import Film
@@ -24,58 +23,57 @@ GROUP = "light_"  # begins the name of a group's picture
 
 
 def layers_of(
-    arrays: Mapping[str, Words], picture: Pictures, variance: Callable[[], Image]
+    arrays: Mapping[str, Words], picture: Pictures, variance: Image | None
 ) -> dict[str, Image]:
     """Return the layers of a film by name, (h, w, 1 to 12) float32.
 
-    arrays: its words, as `FilmState` has them; picture: its other pictures; variance: makes
-    the layer of that name. Where nothing was seen, as in the sky, a layer is 0, an id -1.
-    `light_groups` becomes a layer light_NAME for each group.
+    arrays: words by name, see `FilmState`; picture: the film's other pictures; variance: its layer
+    of that name, None if the film has none. Where nothing was seen, as in the sky, a layer is 0, an
+    id -1. `light_groups` becomes a layer light_NAME for each group.
     """
-    made: dict[str, Image] = {}
-    form = picture._form
-    sampled = _sampled(form, arrays["layers"])
+    layers: dict[str, Image] = {}
+    form = picture.form
+    first_samples = _first_samples(form, arrays["layers"])
     light = _light(form, arrays["light_layers"], picture)
     mattes = iter(arrays["mattes"])
     for name in form.layers:
-        kept = LAYERS[name].form
-        if kept == "light":
-            made |= light[name]
-        elif kept == "matte":
-            made[name] = pairs_of(next(mattes), arrays["layers"][0], matte_names(form, name))
+        if LAYERS[name].form == "light":
+            layers |= light[name]
+        elif LAYERS[name].form == "matte":
+            layers[name] = pairs_of(next(mattes), arrays["layers"][0], matte_names(form, name))
         elif name == "samples":
-            made[name] = picture.samples_per_pixel()[..., None]
-        elif name == "variance":
-            made[name] = variance()
+            layers[name] = picture.samples_per_pixel()[..., None]
+        elif name == "variance" and variance is not None:
+            layers[name] = variance
         else:
-            made[name] = sampled[name]
-    return made
+            layers[name] = first_samples[name]
+    return layers
 
 
 def matte_names(form: PictureForm, layer: str) -> tuple[str, ...]:
-    """The names that a layer of mattes knows, by number."""
+    """Return the names of objects or materials, by the number that a matte holds."""
     return form.names.materials if layer == "crypto_material" else form.names.objects
 
 
-def _sampled(form: PictureForm, words: Words) -> dict[str, Image]:
-    """The layers of the first samples."""
-    made, places = {}, layer_places(form.layers)
-    for name, place in places.items():
+def _first_samples(form: PictureForm, words: Words) -> dict[str, Image]:
+    """Return the layers that only the first samples of a pixel fill."""
+    layers = {}
+    for name, first in layer_places(form.layers).items():
         layer = LAYERS[name]
-        own = words[place : place + layer.words]
+        layer_words = words[first : first + layer.words]
         if layer.form == "id":
-            made[name] = (own[0].astype(np.float32) - np.float32(1.0))[..., None]
+            layers[name] = (layer_words[0].astype(np.float32) - np.float32(1.0))[..., None]
             continue
-        sums = _near_one(own) if layer.form == "near" else _long(own)
+        sums = _near_one(layer_words) if layer.form == "near" else _long(layer_words)
         mean = np.moveaxis(sums, 0, -1) / np.maximum(words[0], 1)[..., None]
         if layer.is_colour:
             mean = mean @ np.asarray(form.paper).T
-        made[name] = mean.astype(np.float32)
-    return made
+        layers[name] = mean.astype(np.float32)
+    return layers
 
 
 def _light(form: PictureForm, words: Words, picture: Pictures) -> dict[str, dict[str, Image]]:
-    """The pictures of each layer of light."""
+    """Return the pictures of each layer of light, by the layer and by the picture's name."""
     names = [name for name in form.layers if LAYERS[name].form == "light"]
     if not names:
         return {}
@@ -86,23 +84,21 @@ def _light(form: PictureForm, words: Words, picture: Pictures) -> dict[str, dict
         paths = max(picture.light_paths_per_pixel(), 1e-30)
         means = means + sums[len(means) :] * ((samples > 0) / np.float32(paths))
     colours = np.einsum("ij,njhw->nhwi", np.asarray(form.to_output), means).astype(np.float32)
-    found: dict[str, dict[str, Image]] = {}
-    for i, name in enumerate(names):  # of which groups come last
-        pictures = colours[i:]
-        groups = form.names.light_groups
-        found[name] = (
-            {f"{GROUP}{group}": one for group, one in zip(groups, pictures, strict=True)}
-            if name == "light_groups"
-            else {name: pictures[0]}
-        )
-    return found
+    light: dict[str, dict[str, Image]] = {}
+    for i, name in enumerate(names):  # light_groups comes last: it takes all remaining pictures
+        if name == "light_groups":
+            groups = (f"{GROUP}{group}" for group in form.names.light_groups)
+            light[name] = dict(zip(groups, colours[i:], strict=True))
+        else:
+            light[name] = {name: colours[i]}
+    return light
 
 
 def white_paper(film: Film, mode: str) -> NDArray[np.float64]:
-    """Return the matrix (3, 3) from reflectances that the sensor sees to the film's output space.
+    """Return the matrix (3, 3) from the sensor's sums of a reflectance to the output space.
 
-    A thing that reflects all light is (1, 1, 1) there; a channel that sees no light at the film's
-    wavelengths stays as it is.
+    A surface that reflects all light becomes (1, 1, 1); a channel without a response in the film's
+    range is not scaled.
     """
     matrix = output_matrix(film, mode)
     seen = np.ones(3)
@@ -120,3 +116,26 @@ def _near_one(words: Words) -> NDArray[np.float64]:
 def _long(words: Words) -> NDArray[np.float64]:
     parts = words.view(np.int32).reshape(-1, len(LONG_UNITS), *words.shape[1:])
     return np.tensordot(np.array(LONG_UNITS), parts.astype(np.float64), (0, 1))
+
+
+def viewable(name: str, layer: Image) -> Image:
+    """Return the values (h, w, 1 to 4) of a layer as colours in [0, 1], (h, w, 3) float32."""
+    if name.endswith("albedo"):
+        return layer
+    if name.endswith("_normal"):
+        return layer * np.float32(0.5) + np.float32(0.5)
+    if name in ("depth", "z"):  # the nearest point is white; twice as far, half as bright
+        near = np.min(layer, where=layer > 0, initial=np.inf)
+        return np.repeat(np.divide(near, layer, where=layer > 0, out=np.zeros_like(layer)), 3, 2)
+    if name.endswith("_id"):  # consecutive numbers differ in hue; black where nothing is seen
+        hue = layer * np.float32(0.618034) + np.arange(3, dtype=np.float32) / np.float32(3.0)
+        shown = 0.5 + 0.5 * np.cos(2 * np.pi * hue)
+        return np.where(layer < 0, 0.0, shown).astype(np.float32)
+    if name == "motion":  # hue: direction; brightness: length over the greatest length
+        motion = layer[..., 2:] - layer[..., :2]
+        turn = np.arctan2(motion[..., 1:], motion[..., :1])
+        far = np.linalg.norm(motion, axis=2, keepdims=True)
+        wheel = 0.5 + 0.5 * np.cos(turn - 2 * np.pi / 3 * np.arange(3))
+        return (wheel * (far / max(float(far.max()), 1e-6))).astype(np.float32)
+    cells = np.mod(layer, np.float32(1.0))  # positions and uv: colours repeat in every unit
+    return np.pad(cells, ((0, 0), (0, 0), (0, 3 - cells.shape[2])))

@@ -1,14 +1,20 @@
-"""Pictures, and the base of all that they are taken of: renderers, and films in files."""
+"""The pictures of a film, and how its words become them."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from clpt.arrays import Image
 from clpt.errors import SceneError
 from clpt.images.spectral_exr import SpectralImage
-from clpt.render.film.picture_form import PictureForm
+from clpt.render.records.layer_names import LayerNames
+from clpt.scene import Film
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -17,84 +23,126 @@ if TYPE_CHECKING:
 LIGHT_LAYERS = ("layers", "light_layers", "mattes")  # words of layers, as `FilmState` has them
 
 
-class Pictures(ABC):
-    """Base of what has a film: the pictures of it.
+@dataclass(frozen=True)
+class PictureForm:
+    """The conversion of a film's words to a picture.
 
-    All of them are made on the host, of whole numbers, by `clpt.render.film.developed`: films that
-    are equal have equal pictures, whichever device, process or machine took the samples.
-
-    form: how the film's words become a picture; denoise: the denoiser that it was made for, None
-    for none.
+    to_output: (3, 3), rows of the matrix from the sums to the output space; light_paths: all paths
+    start at lights; weighed: light paths are weighted against paths from the camera; weights:
+    samples serve several pixels; paper: the matrix (3, 3) from sums of albedo layers to the output
+    space, see `clpt.render.film.layers.white_paper`; names: of objects, materials and groups of
+    lights; adaptive: whether pixels may differ in their numbers of samples; octaves:
+    `Sampler.octaves` where even and odd octaves of samples have separate sums, else 0; place: of a
+    crop its first column and row, and the size of the whole film, (x, y, width, height). Other
+    members are as in `clpt.scene.Film`.
     """
 
-    _form: PictureForm
+    to_output: tuple[tuple[float, ...], ...]
+    light_paths: bool = False
+    weighed: bool = False
+    weights: bool = False
+    alpha: bool = False
+    bands: int = 0
+    lambda_min: float = 360.0
+    lambda_max: float = 830.0
+    output_space: str = "rec709"
+    exposure: float = 1.0
+    display_exposure: float = 0.0
+    layers: tuple[str, ...] = ()
+    paper: tuple[tuple[float, ...], ...] = ()
+    names: LayerNames = LayerNames()
+    adaptive: bool = False
+    octaves: float = 0.0
+    place: tuple[int, int, int, int] | None = None
+
+    @property
+    def band_centres(self) -> NDArray[np.float64]:
+        """The wavelengths at the centres of the bands, (bands,) [nm]."""
+        film = Film(bands=self.bands, lambda_min=self.lambda_min, lambda_max=self.lambda_max)
+        return film.band_centres
+
+
+class Pictures(ABC):
+    """Base of renderers and saved films: the pictures of a film.
+
+    All pictures are made on the host, from whole numbers, by `clpt.render.film.developed`: equal
+    films have equal pictures, whichever device, process or machine took the samples.
+
+    form: how the film's words become a picture; denoise: name of the denoiser for it, or None.
+    """
+
+    form: PictureForm
     denoise: str | None = None
 
     @abstractmethod
-    def _developed(self, *words: str) -> Pictures:
-        """Return the pictures of the film as it is now, which then stay; wait for the film.
+    def developed(self, *words: str) -> Pictures:
+        """Wait for the film; return its present pictures, which later samples do not change.
 
-        words: which of those of `clpt.FilmState` are wanted, by default all.
+        words: names of the arrays of `clpt.FilmState` that are needed, by default all.
         """
+
+    @property
+    def beside(self) -> Mapping[str, Image]:
+        """Pictures that files show beside this picture, by name."""
+        return {}
 
     def image(self) -> Image:
         """The picture so far: (h, w, 3) float32, linear in the film's output space.
 
-        Of a film with alpha (h, w, 4), colours as they arrive and how much of the pixel is covered:
-        to lie over another picture, which adds the rest of its own. Of a film with bands (h, w,
-        bands), the mean radiance in each.
+        A film with alpha gives (h, w, 4): colours, premultiplied, and the covered share of each
+        pixel. A film with bands gives (h, w, bands): the mean radiance in each band.
         """
-        return self._developed("words", "bands").image()
+        return self.developed("words", "bands").image()
 
     def colours(self) -> Image:
         """The picture so far in three colours, (h, w, 3) float32, also of a film with bands."""
-        return self._developed("words").colours()
+        return self.developed("words").colours()
 
     def picture(self) -> Image:
         """The picture so far in three colours, (h, w, 3) float32; (h, w, 4) of a film with alpha.
 
         Also of a film with bands.
         """
-        return self._developed("words").picture()
+        return self.developed("words").picture()
 
     def spectral_image(self) -> SpectralImage:
         """The picture so far of a film with bands, at their centres. Raises SceneError without."""
-        if not self._form.bands:
+        if not self.form.bands:
             raise SceneError("this picture has no bands; set the film's", where="film.bands")
-        form = self._form
+        form = self.form
         stops = form.display_exposure
         return SpectralImage(self.image(), form.band_centres, emissive=True, exposure=stops)
 
     def samples_per_pixel(self) -> Image:
         """Return how many samples each pixel has, (h, w) float32."""
-        return self._developed("words").samples_per_pixel()
+        return self.developed("words").samples_per_pixel()
 
     def light_paths_per_pixel(self) -> float:
         """Return how many paths have begun at lights for each pixel."""
-        return self._developed("words").light_paths_per_pixel()
+        return self.developed("words").light_paths_per_pixel()
 
     def halves(self) -> tuple[Image, Image]:
-        """Return two independent pictures, of the even and of the odd samples.
+        """Return two independent pictures: of the even samples, and of the odd samples.
 
-        (h, w, 3) float32 each, in the film's output space, of a Renderer with `halves=True`. Their
-        mean, weighted as samples are, is the whole picture. Raises SceneError without.
+        (h, w, 3) float32 each, in the film's output space. Their mean, weighted by samples, is the
+        whole picture. Raises SceneError for a Renderer without `halves=True`.
         """
-        return self._developed("words").halves()
+        return self.developed("words").halves()
 
     def layers(self) -> dict[str, Image]:
-        """The layers of the film by name, (h, w, 1 to 12) float32: what `film.layers` names.
+        """The layers by the names in `film.layers`, (h, w, 1 to 12) float32.
 
         Colours are in the film's output space, white paper is (1, 1, 1); lengths are in metres.
-        Where nothing is seen values are 0, ids -1. `light_groups` is a layer light_NAME for each
-        group, `light_rest` of lights that name none; of mattes (h, w, 12), pairs of a name's hash
-        and its coverage; see docs/layers.md.
+        Where nothing is seen values are 0, ids -1. `light_groups` becomes a layer light_NAME for
+        each group, and `light_rest` for lights without a group. Mattes are (h, w, 12): pairs of a
+        name's hash and its coverage; see docs/layers.md.
         """
-        return self._developed("words", *LIGHT_LAYERS).layers()
+        return self.developed("words", *LIGHT_LAYERS).layers()
 
 
 class Still(Pictures):
     """Base of pictures of a film that does not change."""
 
-    def _developed(self, *words: str) -> Self:
+    def developed(self, *words: str) -> Self:
         """Return itself."""
         return self

@@ -1,4 +1,4 @@
-"""Pictures for a screen, made from a film on the device: exposure, tone curve, sRGB transfer."""
+"""Pictures for a screen from a film on the device: exposure, tone curve, sRGB transfer."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _IMAGE_TYPES: dict[Any, np.dtype] = {
 
 @dataclass(frozen=True)
 class Screen:
-    """A way from light to the colours of a screen, as of `Renderer.resolve`; space: of the film.
+    """Exposure and transfer for a screen, see `Renderer.resolve`; space: of the film.
 
     Raises DeviceError for a view beside a tone curve or a transfer, UnknownKindError for names.
     """
@@ -49,16 +49,16 @@ class Screen:
             raise DeviceError("a view has its own tone curve and transfer; leave out tone and srgb")
 
     def encodes(self, dtype: np.dtype) -> bool:
-        """Whether the sRGB transfer is applied to a picture of this type."""
+        """Return whether a picture of this type gets the sRGB transfer."""
         return self.view is None and (dtype == BYTES if self.srgb is None else self.srgb)
 
 
 @dataclass(frozen=True)
 class _Target:
-    """The memory that a picture goes to.
+    """The memory for a picture.
 
-    memory: the Array or Image that the caller gets; data: its OpenCL memory; offset: where the
-    picture begins there [elements].
+    memory: the Array or Image for the caller; data: its OpenCL memory; offset: of the picture's
+    first element [elements].
     """
 
     memory: Any
@@ -77,7 +77,7 @@ class _Target:
 
 
 class Resolve:
-    """Makes pictures of films on one device; stream: that their commands go through.
+    """Resolves films on a device into pictures; stream: takes the commands.
 
     Raises KernelBuildError.
     """
@@ -87,7 +87,7 @@ class Resolve:
         self.program = device.build(on, device.assemble("stage/resolve.cl"))
         self.steps = device.Buffers(on).upload("the sRGB transfer", srgb8_steps())
         self._bound: dict[str, device.BoundKernel] = {}
-        self._view: View | None = None  # that the table is of
+        self._view: View | None = None  # which `_table` belongs to
         self._no_table = device.Buffers(on).upload("no table", NO_TABLE)
         self._table: dict[str, Any] = {}
 
@@ -101,14 +101,14 @@ class Resolve:
         flip: bool = False,
         wait_for: device.Events = None,
     ) -> Array | cl.Event:
-        """Enqueue that a film (h, w, 4) float32 becomes a picture; see `Renderer.resolve`."""
+        """Enqueue the conversion of a film (h, w, 4) float32; see `Renderer.resolve`."""
         target = self._target(film, into, dtype)
         named = {
             **_to_rec709(screen.space),
             "film": film.base_data,
             "steps": self.steps,
             "scale": 2.0**screen.exposure,
-            **self._looked_up(screen.view),
+            **self._table_arguments(screen.view),
             "tone": TONE_NUMBERS[screen.tone],
             "encoded": int(screen.encodes(target.dtype)),
             "flip": int(flip),
@@ -128,8 +128,8 @@ class Resolve:
         device.supersede(target.memory, event)
         return target.memory
 
-    def _looked_up(self, view: View | None) -> dict[str, Any]:
-        """The arguments of a view's table, which is made when the view is first used."""
+    def _table_arguments(self, view: View | None) -> dict[str, Any]:
+        """Return the arguments for a view's table; upload it at its first use."""
         if view is None:
             return {"table": self._no_table, "size": 0, "bounds": (0.0, 1.0, 1.0, 0.0)}
         if view is not self._view:
@@ -140,7 +140,7 @@ class Resolve:
         return self._table
 
     def _bind(self, kernel: str, named: dict[str, Any]) -> device.BoundKernel:
-        """A kernel with its arguments. It is made once: that takes longer than to set them."""
+        """Return a bound kernel; later calls only set its arguments, which is faster."""
         if kernel in self._bound:
             self._bound[kernel].set_args(**named)
         else:
@@ -148,7 +148,7 @@ class Resolve:
         return self._bound[kernel]
 
     def _target(self, film: Array, into: object, dtype: DTypeLike | None) -> _Target:
-        """Return the memory for a picture. Raises DeviceError, which says what would fit."""
+        """Return the memory for a picture. Raises DeviceError, which says what is needed."""
         wanted = None if dtype is None else np.dtype(dtype)
         if wanted is not None and wanted not in (BYTES, FLOATS):
             raise DeviceError(f"a picture is of uint8 or float32, not {wanted}")
@@ -180,7 +180,7 @@ class Resolve:
 
 @cache
 def _to_rec709(space: str) -> dict[str, Any]:
-    """The arguments of the kernels that convert colours of a space to Rec. 709."""
+    """Return the arguments by which kernels convert colours of a space to Rec. 709."""
     rows = zip(("red", "green", "blue"), between(space, "rec709"), strict=True)
     return {"converted": int(space != "rec709")} | {name: (*row, 0.0) for name, row in rows}
 
@@ -206,7 +206,7 @@ def _buffer_target(
 
 
 def _image_dtype(into: Any, shape: tuple[int, ...]) -> np.dtype:
-    """The type that kernels write to an image. Raises DeviceError if the picture does not fit."""
+    """Return the type that kernels write to an image. Raises DeviceError if it does not fit."""
     size, form = (into.height, into.width), into.format
     dtype = _IMAGE_TYPES.get(form.channel_data_type)
     if size != shape[:2] or dtype is None or form.channel_order not in _ORDERS:

@@ -1,4 +1,4 @@
-"""A film with all that it takes to go on with it: what its samples are of, and what was done."""
+"""A film with all that continues it: the origin of its samples, and the sessions of rendering."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.render.film.developed import Developed
-from clpt.render.film.picture_form import PictureForm
-from clpt.render.film.pictures import Pictures
+from clpt.render.film.pictures import PictureForm, Pictures
 from clpt.render.film.state import FilmState, Ranges
 from clpt.scene.fingerprint import Fingerprint, Plain
 from clpt.scene.integrators import Integrator, Path, Vcm
@@ -22,10 +21,10 @@ MOST_NAMED = 8  # differences that an error names
 
 @dataclass(frozen=True)
 class Session:
-    """A session of rendering: what one process added to a film.
+    """A session of rendering, in which a process added samples to a film.
 
-    began: when, as ISO 8601 in UTC; seconds: that it rendered; clpt: its version; device: by a
-    label, driver, lanes of its kernels and layout of its trees: what decides the last bits.
+    began: ISO 8601 in UTC; seconds: of rendering; clpt: its version; device: label, driver, lanes
+    of its kernels and layout of its trees, on which the last bits depend.
     """
 
     began: str
@@ -38,8 +37,8 @@ class Session:
 class Origin:
     """The origin of a film's samples.
 
-    scene: as `clpt.scene.fingerprint` has it; settings: choices that were made for it, such as the
-    integrator of `auto`; kernels: the digest of their texts; clpt: the version that has them.
+    scene: its fingerprint; settings: choices that were made for it, such as the integrator of
+    `auto`; kernels: the digest of their texts; clpt: the version that has these kernels.
     """
 
     scene: Fingerprint
@@ -48,16 +47,16 @@ class Origin:
     clpt: str
 
     def differences(self, other: Origin) -> list[str]:
-        """Return why the samples of another film are others, such as "seed: 0 -> 3"."""
-        found = self.scene.differences(other.scene)
-        found += Fingerprint(self.settings).differences(Fingerprint(other.settings))
+        """Return why the samples of another film differ, such as "seed: 0 -> 3"."""
+        differences = self.scene.differences(other.scene)
+        differences += Fingerprint(self.settings).differences(Fingerprint(other.settings))
         if self.kernels != other.kernels:
-            found.append(f"kernels: of clpt {self.clpt} -> others, of clpt {other.clpt}")
-        return found
+            differences.append(f"kernels: of clpt {self.clpt} -> others, of clpt {other.clpt}")
+        return differences
 
     @property
-    def way(self) -> Integrator | None:
-        """The integrator, without its depths, if it is one that may have been chosen."""
+    def chosen_integrator(self) -> Integrator | None:
+        """The integrator, without its depths, that `auto` may have chosen; else None."""
         names = ("integrator", "light_paths", "guide_paths")
         kind, paths, guide = (self.settings.get(f"chosen.{name}") for name in names)
         if kind == Vcm.kind:
@@ -68,17 +67,17 @@ class Origin:
         return None
 
     def check_same(self, other: Origin) -> None:
-        """Raise SceneError, which says what differs, if the samples of another film are others."""
-        if found := self.differences(other):
-            raise SceneError(f"the film is of something else: {differences_text(found)}")
+        """Raise SceneError, which names the differences, if samples of another film differ."""
+        if differences := self.differences(other):
+            raise SceneError(f"the film is of something else: {differences_text(differences)}")
 
 
 @dataclass(frozen=True, eq=False)
 class SavedFilm(Pictures):
-    """A film, and all that it takes to go on with it, as `Renderer.save_state` writes it.
+    """A film with all that continues it, as `Renderer.save_state` writes it.
 
-    form: how its pictures are made; counts: paths and rays by name; sessions: what was
-    done; adaptive: the state of adaptive sampling, arrays by name, empty without.
+    form: how its words become pictures; counts: of paths and rays, by name; sessions: of rendering;
+    adaptive: arrays of the state of adaptive sampling by name, empty without it.
     """
 
     film: FilmState
@@ -89,29 +88,24 @@ class SavedFilm(Pictures):
     adaptive: Mapping[str, NDArray[Any]]
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
-        """Take what a pickle holds; in older ones `counts` are a tuple of always one."""
+        """Restore a pickle; in old pickles `counts` is a tuple of length 1."""
         self.__dict__.update(state)
         if isinstance(state["counts"], tuple):
             (self.__dict__["counts"],) = state["counts"]
 
-    @property
-    def _form(self) -> PictureForm:  # type: ignore[override]
-        """The way from the film's words to a picture."""
-        return self.form
-
-    def _developed(self, *words: str) -> Developed:
+    def developed(self, *words: str) -> Developed:
         """Return the pictures of the film."""
         return Developed(self.film, self.form)
 
     def check_fits(self, origin: Origin, film: FilmState) -> None:
-        """Raise SceneError where its samples are of something else, or a film has another form."""
+        """Raise SceneError if its samples have another origin, or `film` has other shapes."""
         self.origin.check_same(origin)
-        given = self.film.arrays
-        if any(array.shape != given[name].shape for name, array in film.arrays.items()):
+        saved = self.film.arrays
+        if any(array.shape != saved[name].shape for name, array in film.arrays.items()):
             raise SceneError("the film has another form than this scene's")
 
-    def _saved_film(self, *, held: bool = False) -> SavedFilm:
-        """Return itself; held: as of a renderer, here without a meaning."""
+    def saved_film(self, *, held: bool = False) -> SavedFilm:
+        """Return itself; held: has a meaning only for renderers."""
         return self
 
     @property
@@ -122,7 +116,7 @@ class SavedFilm(Pictures):
     def merged(self, other: SavedFilm) -> SavedFilm:
         """Return the film of the samples of both.
 
-        Raises SceneError where they are not of the same scene, or a sample is in both.
+        Raises SceneError if their origins differ, or a sample is in both.
         """
         self.origin.check_same(other.origin)
         counts = {name: value + other.counts[name] for name, value in self.counts.items()}
@@ -137,7 +131,7 @@ class SavedFilm(Pictures):
 
 
 def other_devices(sessions: Iterable[Session], device: Mapping[str, Plain]) -> list[str]:
-    """Return how devices that took a film's samples differ from another one, perhaps nothing."""
+    """Return how the devices of a film's sessions differ from `device`; empty if they do not."""
     named: dict[str, None] = {}
     for session in sessions:
         for name, value in session.device.items():
@@ -147,12 +141,12 @@ def other_devices(sessions: Iterable[Session], device: Mapping[str, Plain]) -> l
 
 
 def classes_text(others: list[str]) -> str:
-    """Return a warning of devices that differ, from `other_devices`."""
+    """Return a warning that names the differences from `other_devices`."""
     return "samples of several classes of devices are in one film: " + "; ".join(others)
 
 
 def differences_text(differences: list[str]) -> str:
-    """Return differences for people, no more than a few."""
+    """Return differences for people, at most MOST_NAMED of them."""
     more = len(differences) - MOST_NAMED
     return "; ".join(differences[:MOST_NAMED]) + (f"; and {more} more" if more > 0 else "")
 

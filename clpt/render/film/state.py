@@ -1,4 +1,4 @@
-"""The state of a film on the host: sums of samples that add to the bit, and their numbers."""
+"""The state of a film on the host: sums that add to the bit, and numbers of samples."""
 
 from __future__ import annotations
 
@@ -14,23 +14,26 @@ from clpt.errors import SceneError
 from clpt.render.records import GROUP_WORDS, SUM_WORDS
 
 SAMPLES_WORD = 3 * SUM_WORDS  # after three sums, kernels/film/film.cl
-FILM_WORDS = GROUP_WORDS  # of a pixel; one of weights and one of alpha may follow
-LEAST_WITH_LIGHT_PATHS = 2 * FILM_WORDS  # from which a pixel's last words are those of light paths
+FILM_WORDS = GROUP_WORDS  # of a pixel; a sum of weights and a sum of alpha may follow
+LEAST_WITH_LIGHT_PATHS = 2 * FILM_WORDS  # words of a pixel that end with a group of light paths
 UNIT = 2.0**-48  # of a sum, kernels/core/fixed.cl
 STRIP = 16384  # pixels whose words are added at a time
 
 Ranges = tuple[tuple[int, int], ...]
 
 
-def _none(*shape: int) -> Words:
-    """An array of no words."""
-    none = np.zeros((0, *shape), np.uint32)
-    none.setflags(write=False)
-    return none
+def _no_words(*shape: int) -> Words:
+    words = np.zeros((0, *shape), np.uint32)
+    words.setflags(write=False)
+    return words
 
 
-NO_BANDS = _none(SUM_WORDS, 1, 1)[None]
-NO_LAYERS, NO_LIGHT_LAYERS, NO_MATTES = _none(1, 1), _none(SUM_WORDS, 1, 1), _none(1, 1, 1)
+NO_BANDS = _no_words(SUM_WORDS, 1, 1)[None]
+NO_LAYERS, NO_LIGHT_LAYERS, NO_MATTES = (
+    _no_words(1, 1),
+    _no_words(SUM_WORDS, 1, 1),
+    _no_words(1, 1, 1),
+)
 DIMENSIONS = {"words": 4, "bands": 5, "layers": 3, "light_layers": 4, "mattes": 4}
 
 
@@ -39,20 +42,20 @@ class FilmState:
     """The film of a renderer as whole numbers, from `Renderer.film_state`.
 
     A sum is 96 bits in two's complement, three words with the lowest first, in units of 2^-48. So
-    two states of different samples merge to the state of one run, to the bit, in any order.
+    states of different samples merge, to the bit and in any order, to the state of a single run.
 
-    words: (parts, 10 to 26, h, w) uint32; of each pixel three sums, and the number of its samples;
-    then, where samples serve all pixels whose filters hold them, a sum of the filter's values, and
-    with alpha a sum of what is covered; then, where light paths are weighed, three sums of theirs,
-    and how many began at the pixel's number.
-    parts: one; twice as many where even and odd samples are kept apart, and twice as many where
-    octaves are, see `film_part` in kernels/film/film.cl. bands: (parts, sums, 3, h, w) uint32, a
-    sum for each band, then, where light paths are weighed, one of theirs for each; sums may be 0.
-    taken: first and end of each range of sample numbers that were taken, ascending and apart.
-    scale: of a value of 1, a power of two that follows from the film's exposure and the scene's
-    light. layers: (words, h, w) uint32, those of the first samples, see kernels/film/layers.cl;
-    light_layers: (sums, 3, h, w) uint32; mattes: (lists, slots, h, w) uint32, names and how often
-    they were met, the first ones of the scene.
+    words: (parts, 10 to 26, h, w) uint32. Each pixel has three sums and the number of its samples.
+    Where samples serve all pixels whose filters hold them, a sum of the filter's values follows;
+    with alpha, a sum of coverage. Where light paths are weighted, their three sums follow, and the
+    number of light paths that have the pixel's number.
+    parts: 1; times 2 if even and odd samples have separate sums; times 2 if octaves have; see
+    `film_part` in kernels/film/film.cl. bands: (parts, sums, 3, h, w) uint32, a sum for each band,
+    then, where light paths are weighted, their sum for each band; sums may be 0.
+    taken: first and end of each range of sample numbers in the film, ascending and disjoint.
+    scale: the number that a value of 1 adds, a power of two that follows from the film's exposure
+    and the scene's light. layers: (words, h, w) uint32, of the first samples, see
+    kernels/film/layers.cl; light_layers: (sums, 3, h, w) uint32; mattes: (lists, slots, h, w)
+    uint32, numbers of names and how often a ray met each.
     """
 
     words: Words
@@ -64,7 +67,7 @@ class FilmState:
     mattes: Words = field(default_factory=lambda: NO_MATTES)
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
-        """Take what a pickle holds; older ones have `words` of a row of films, always one."""
+        """Restore a pickle; in old pickles `words` has a first axis of length 1."""
         self.__dict__.update(state)
         if self.words.ndim > DIMENSIONS["words"]:
             self.__dict__["words"] = self.words[0]
@@ -86,10 +89,11 @@ class FilmState:
         Raises SceneError where films differ in their form, or a sample is in both.
         """
         for name, array in self.arrays.items():
-            own, given = array.shape, other.arrays[name].shape
-            if own != given:
+            shapes = array.shape, other.arrays[name].shape
+            if shapes[0] != shapes[1]:
                 raise SceneError(
-                    f"films of another form cannot be merged: {name} are {own} and {given}"
+                    f"films of another form cannot be merged: {name} are {shapes[0]} and "
+                    f"{shapes[1]}"
                 )
         if self.scale != other.scale:
             message = "films cannot be merged whose exposure, or whose light, is of another scale"
@@ -98,7 +102,7 @@ class FilmState:
         return replace(self.plus(other), taken=taken)
 
     def plus(self, other: FilmState) -> FilmState:
-        """Return the sums of both films, of one form, whatever samples they are of."""
+        """Return the sums of both films, which have equal shapes; `taken` is that of the first."""
         return replace(
             self,
             words=add_films(self.words, other.words),
@@ -125,7 +129,7 @@ def add_films(a: Words, b: Words) -> Words:
 
 
 def light_group(words: int) -> int:
-    """Return which of a pixel's words is the first of light paths; `words` where there are none."""
+    """Return the first of a pixel's words for light paths; `words` where it has none."""
     return words - FILM_WORDS if words >= LEAST_WITH_LIGHT_PATHS else words
 
 
@@ -176,9 +180,9 @@ def _strips(words: Words) -> Iterator[tuple[Any, ...]]:
 
 
 def _carry(total: Words, a: Words) -> None:
-    """Carry between the words of sums, (..., 3, h, w), whose words were added to those of `a`.
+    """Carry between the words of `total`, (..., 3, h, w): `a` plus another array, word by word.
 
-    A sum that wrapped around is less than what it was made of.
+    A word that wrapped around is less than its summand.
     """
     low, middle, high = (total[..., i, :, :] for i in range(SUM_WORDS))
     carry = low < a[..., 0, :, :]
@@ -189,7 +193,7 @@ def _carry(total: Words, a: Words) -> None:
 
 
 def join_ranges(a: Ranges, b: Ranges) -> Ranges:
-    """Return two sets of ranges as one; neighbours become one range.
+    """Return the union of two sets of ranges; adjacent ranges are joined.
 
     Raises SceneError if a number is in both.
     """

@@ -10,8 +10,8 @@ from clpt.render.records import Features
 ESCAPE = ("escape", "escape_axis", "escape_width", "escape_plane", "escape_depth")
 CHANGED = (
     "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "sampled_wo",
-    "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "medium", "around", "bodies", "lead",
-    "rival", "pending", "expected", *ESCAPE, "state", "cone",
+    "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "medium", "around", "bodies",
+    "ray_offset", "mis_ratio", "merge_ratio", "expected", *ESCAPE, "state", "cone",
 )  # fmt: skip
 READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and not changed
 # members that not every scene has, each with the features that ask for it
@@ -26,11 +26,11 @@ NEEDED: dict[str, Callable[[Features], bool]] = {
     "medium": lambda f: f.media.absorbing,
     "around": lambda f: f.media.present and f.media.absorption and not f.media.bodies,
     "bodies": lambda f: f.media.bodies,
-    "lead": lambda f: f.media.absorbing,
+    "ray_offset": lambda f: f.media.absorbing,
     "through": lambda f: f.shadow_media,
     "into": lambda f: f.lights.volumes,
-    "rival": lambda f: f.transport.balanced,
-    "pending": lambda f: f.transport.merged,
+    "mis_ratio": lambda f: f.transport.balanced,
+    "merge_ratio": lambda f: f.transport.merged,
     "expected": lambda f: f.transport.guided,
     **dict.fromkeys(ESCAPE, lambda f: f.media.escapes),
     "cone": lambda f: f.textures.mips,

@@ -7,7 +7,7 @@ from clpt.geometry import shapes
 from clpt.geometry.instancing import distinct
 from clpt.geometry.motion import Motions, at_rest
 from clpt.geometry.motion import check as check_motion
-from clpt.render.camera.check import check_camera
+from clpt.render.camera.encode import check_camera
 from clpt.render.film.check import check_film
 from clpt.render.geometry.check import check_instances, check_shapes
 from clpt.render.lights.check import check_light

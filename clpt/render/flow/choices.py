@@ -22,13 +22,13 @@ def either(holds: object, file: str) -> tuple[str, ...]:
     return (file if holds else f"{file}{TWIN}",)
 
 
-def _grid_meet(features: Features) -> str:
+def _grid_collision(features: Features) -> tuple[str, ...]:
     """Return the file about collisions in grids."""
     grids = features.media.grids
     if grids.mixed:
-        return "grid_meet_mixed"
+        return ("media/grid_collision_mixed.cl",)
     varied = features.ratios and (grids.coloured or grids.tinted)
-    return "grid_meet_coloured" if varied else "grid_meet"
+    return either(varied, "media/grid_collision.cl")
 
 
 # name: the files that stand for it, for a scene's features and the layout of its triangles
@@ -68,13 +68,14 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/join_light.cl": lambda f, _: either(f.shows_lights, "lights/join_light.cl"),
     "generated/layer_sums.cl": lambda f, _: (
+        "generated/layer_args.cl",
         *either(f.film.layers.words > 0, "film/layers.cl"),
         *_screen_motion(f),
     ),
     "generated/layers.cl": lambda f, _: (
+        "generated/layer_args.cl",
         *when(
             f.film.layers.words > 0,
-            "generated/layer_args.cl",
             *_screen_motion(f),
             *either(f.screen_motion, "film/screen_motion_record.cl"),
             *either(f.motion.camera, "cameras/camera_axis.cl"),
@@ -90,7 +91,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/scout_choice.cl": lambda f, _: either(f.scouts, "film/scout_choice.cl"),
     "generated/mattes.cl": lambda f, _: either(f.film.layers.mattes, "film/mattes.cl"),
     "generated/light_layers.cl": lambda f, _: (
-        *when(f.film.layers.lights, "generated/light_layer_args.cl", "generated/sampler.cl"),
+        *when(f.film.layers.lights, "generated/sampler.cl"),
         *either(f.film.layers.lights, "film/light_layers.cl"),
     ),
     "generated/met_weight.cl": lambda f, _: (
@@ -123,9 +124,14 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/infinite_weight.cl": lambda f, _: either(
         f.transport.balanced, "lights/infinite_weight.cl"
     ),
-    "generated/rival_dull.cl": lambda f, _: either(f.dull_paths_end, "transport/rival_dull.cl"),
+    "generated/diffuse_roulette.cl": lambda f, _: either(
+        f.dull_paths_end, "transport/diffuse_roulette.cl"
+    ),
+    "generated/light_path_endless.cl": lambda f, _: either(
+        f.media.grids.present, "media/light_path_endless.cl"
+    ),
     "generated/emit_steps.cl": lambda f, _: (
-        *either(f.transport.aimed, "transport/aimed_rival.cl"),
+        *either(f.transport.aimed, "transport/mis_ratio_aimed.cl"),
         *either(f.transport.balanced, "lights/light_kept.cl"),
     ),
     "generated/medium_steps.cl": lambda f, _: either(f.media.present, "media/medium_flies.cl"),
@@ -139,36 +145,33 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *either(f.media.grids.mixed, "media/grid_mixed.cl"),
     ),
     "generated/grid_glow.cl": lambda f, _: (
-        *when(f.media.grids.hot, f"media/black_body_{f.spectra.mode}.cl"),
+        *when(f.media.grids.hot, *either(f.spectra.spectral, "media/black_body.cl")),
         *either(f.media.grids.hot, "media/grid_glow.cl"),
     ),
     "generated/flight_steps_of_grids.cl": lambda f, _: (
         *either(f.ratios, "media/grid_weigh.cl"),
         *either(f.media.grids.emissive, "media/grid_gather.cl"),
-        f"media/{_grid_meet(f)}.cl",
+        *_grid_collision(f),
     ),
     "generated/brick_weight.cl": lambda f, _: either(f.lights.bricks, "media/brick_weight.cl"),
     "generated/body_weight.cl": lambda f, _: either(f.lights.bodies, "media/body_weight.cl"),
     "generated/aim_cone.cl": lambda f, _: either(f.media.aim_cones, "media/aim_cone.cl"),
     "generated/grid_origin.cl": lambda f, _: either(f.media.grids.emissive, "media/grid_origin.cl"),
-    "generated/flight_medium.cl": lambda f, _: (
-        f"media/flight_medium{'_bodies' * f.media.bodies}.cl",
-    ),
+    "generated/flight_medium.cl": lambda f, _: either(f.media.bodies, "media/flight_medium.cl"),
     "generated/flight_steps.cl": lambda f, _: (
-        f"media/flight_medium{'_bodies' * f.media.bodies}.cl",
-        *either(f.media.grids.present, "media/near_grids.cl"),
-        *either(f.media.aims and not f.transport.light_paths, "media/flight_near.cl"),
+        *either(f.media.bodies, "media/flight_medium.cl"),
+        *either(f.media.grids.present, "media/flight_grids.cl"),
+        *either(f.media.aims and not f.transport.light_paths, "media/equiangular.cl"),
         *either(f.media.dyed, "media/flight_dye.cl"),
         *either(f.ratios, "media/flight_weight.cl"),
         *either(f.media.emissive, "media/flight_emission.cl"),
-        *either(f.media.grids.present, "media/flight_grids.cl"),
     ),
     "generated/light_of_flight.cl": lambda f, _: either(
         bool(f.film.layers.lights) and not f.transport.light_paths, "media/flight_light_layers.cl"
     ),
     "generated/way_steps.cl": lambda f, _: (
-        *either(f.media.grids.present, "media/grid_way.cl"),
-        f"media/way_{'bodies' if f.media.bodies else 'shapes'}.cl",
+        *either(f.media.grids.present, "media/grid_shadow.cl"),
+        *either(f.media.bodies, "media/shadow_boundary.cl"),
     ),
     "generated/light_medium.cl": lambda f, _: (
         ("generated/textures.cl", "generated/medium.cl")
@@ -176,9 +179,8 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         else (f"media/light_media.cl{TWIN}", f"media/medium_dims.cl{TWIN}")
     ),
     "generated/shading_frame.cl": lambda f, _: (
-        ("generated/normal_map.cl", "materials/shading_frame_mapped.cl")
-        if f.materials.normal_mapped
-        else ("materials/shading_frame.cl",)
+        *when(f.materials.normal_mapped, "generated/normal_map.cl"),
+        *either(f.materials.normal_mapped, "materials/shading_frame.cl"),
     ),
     "generated/transmittance.cl": lambda f, _: (f"tracing/transmittance{_passing(f)}.cl",),
     "generated/shadow_ray.cl": lambda f, _: (
@@ -241,7 +243,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
 }
 
-_RIVALS = (
+_MIS_RATIO = (
     "generated/merging.cl",
     "cameras/camera.cl",
     "generated/camera.cl",
@@ -265,16 +267,16 @@ def _escapes(features: Features, cls: type[Scatterer]) -> str:
 
 # likewise, for a scene's features and the kind of material that a program shades
 MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...]]] = {
-    "generated/rivals.cl": lambda f, cls: (
-        *when(weighs := f.transport.balanced and not flags.is_null(f, cls), *_RIVALS),
-        *either(weighs, "transport/rivals.cl"),
+    "generated/mis_ratio.cl": lambda f, cls: (
+        *when(weighs := f.transport.balanced and not flags.is_null(f, cls), *_MIS_RATIO),
+        *either(weighs, "transport/mis_ratio.cl"),
     ),
-    "generated/rival_steps.cl": lambda f, cls: (
-        *either(f.transport.merged, "transport/rivals_merging.cl"),
-        *either(f.transport.joined and not cls.delta, "transport/rivals_camera.cl"),
+    "generated/mis_ratio_steps.cl": lambda f, cls: (
+        *either(f.transport.merged, "transport/mis_ratio_merging.cl"),
+        *either(f.transport.joined and not cls.delta, "transport/mis_ratio_camera.cl"),
     ),
-    "generated/rival_area.cl": lambda f, cls: (
-        f"transport/rival_area{'_along' * cls.is_phase}.cl",
+    "generated/mis_merging_area.cl": lambda f, cls: (
+        f"transport/mis_merging_area{'_along' * cls.is_phase}.cl",
     ),
     "generated/hero_steps.cl": lambda f, cls: (
         *either(
@@ -284,10 +286,10 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         *(
             either(
                 flags.is_chromatic(f, cls) and (f.told_dispersion or cls.is_phase),
-                "transport/rival_pdf.cl",
+                "transport/mis_pdf.cl",
             )
             if f.transport.balanced and not flags.is_null(f, cls)
-            else ("transport/rival_pdf_unasked.cl",)
+            else ("transport/mis_pdf_unused.cl",)
         ),
     ),
     "generated/pair.cl": lambda f, cls: ("materials/pair.cl",),
@@ -310,7 +312,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
     ),
     "generated/light_path_steps.cl": lambda f, cls: (
         *either(f.transport.joined and not cls.delta, "integrator/steps/join_camera.cl"),
-        *either(flags.asks_chance(f, cls), "transport/rival_chosen.cl"),
+        *either(flags.asks_chance(f, cls), "transport/mis_ratio_chosen.cl"),
         *either(f.dull_paths_end and not cls.delta, "integrator/steps/dull_goes_on.cl"),
         "integrator/steps/adjoint_weight.cl",
         *either(not flags.is_null(f, cls), "integrator/steps/light_path_roulette.cl"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from clpt.geometry import shape_records
-from clpt.render.camera.find import dispersive_glasses
 from clpt.render.geometry.find import Geometry, spheres_move
 from clpt.render.lights.encode import LightRows
 from clpt.render.materials.encode import MaterialWords
@@ -24,7 +23,6 @@ from clpt.render.records import (
     TransportFeatures,
 )
 from clpt.render.scene_index import SceneIndex
-from clpt.scene.cameras import Lens
 from clpt.scene.media import Medium
 
 FEW_LIGHTS = 256  # up to which one random number chooses a light and a point on it
@@ -37,9 +35,9 @@ def of_camera(index: SceneIndex) -> CameraFeatures:
     camera = index.camera
     return CameraFeatures(
         kind=camera.kind,
-        disperses=index.spectral and bool(dispersive_glasses(camera)),
-        losses=isinstance(camera, Lens) and camera.reflects,
-        ghosts=index.lit_ghosts or (isinstance(camera, Lens) and camera.ghosts > 0.0),
+        disperses=index.spectral and bool(camera.dispersive_glasses),
+        losses=camera.reflects,
+        ghosts=index.lit_ghosts or camera.has_ghosts,
     )
 
 
@@ -82,6 +80,7 @@ def of_lights(lights: LightRows, gloss: int = 0) -> LightFeatures:
         infinite=lights.infinite > 0,
         visible=lights.visible,
         two_sided=lights.two_sided,
+        unseen=lights.unseen,
         tree=lights.tree is not None,
         few=len(lights.rows) <= FEW_LIGHTS,
         gloss=gloss,

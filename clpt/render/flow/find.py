@@ -27,9 +27,8 @@ from clpt.render.geometry.surroundings import (
 from clpt.render.lights.aims import aims
 from clpt.render.lights.find import Sources, sources_of
 from clpt.render.media.bodies import matter_of
-from clpt.render.media.escapes import escape_lamps
 from clpt.render.media.light_media import NOWHERE, LightMedia, light_media
-from clpt.render.media.sealed import sealed_media
+from clpt.render.media.sealed import escape_lamps, sealed_media
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look

@@ -1,8 +1,8 @@
 """The fewest registers that a work-item of a GPU is to have, by program.
 
 Left alone, compilers take more than some programs need, and fewer work-items run at once. These
-limits are tried (clpt/device/registers.py). With one that spills nothing a program of the scenes
-has some 4 % more instructions at most: `python -m bench.gpu_compilers` compiles by them.
+limits are tried by `native_programs.with_fewest_registers`. A program within a limit that does not
+spill has at most 4 % more instructions: `python -m bench.gpu_compilers` uses them.
 """
 
 from __future__ import annotations

@@ -14,26 +14,23 @@ from clpt.geometry import shape_records, shapes
 from clpt.geometry.instancing import Instances
 from clpt.geometry.refining import is_refined
 from clpt.records import SHAPE_BITS
-from clpt.render.camera import find as cameras
-from clpt.render.camera.encode import lower_camera
-from clpt.render.film import encode_filters as filters
+from clpt.render.camera.encode import encode_camera
+from clpt.render.film import filters
 from clpt.render.film.colour import sensor
 from clpt.render.flow import features as needs
 from clpt.render.flow.find import Analysis, Before, analyse
 from clpt.render.flow.layer_names import lower_names
 from clpt.render.flow.settings import Found, settings_of
-from clpt.render.geometry.encode import lower_geometry, shape_words
-from clpt.render.geometry.encode_attributes import lower_attributes
+from clpt.render.geometry.encode import encode_attributes, encode_geometry, shape_words
 from clpt.render.geometry.find import Geometry, Owner, spheres_move
 from clpt.render.lights.encode import LightRows, has_tree, light_rows
 from clpt.render.lights.find import Sources
-from clpt.render.materials import gloss
-from clpt.render.materials.encode import MaterialWords
+from clpt.render.materials.encode import MaterialWords, gloss_word
 from clpt.render.materials.encoder import Encoder
-from clpt.render.media.device_grids import DeviceGrid
+from clpt.render.media.bodies import BodyWords
 from clpt.render.media.encode import MediumWords, medium_aims
-from clpt.render.media.encode_bodies import BodyWords
-from clpt.render.media.encode_light_media import light_media_words
+from clpt.render.media.grids import DeviceGrid
+from clpt.render.media.light_media import light_media_words
 from clpt.render.motion.encode import lower_motion
 from clpt.render.records import Features, GeometryFeatures, LayerFeatures, SpectraFeatures
 from clpt.render.records.device_arrays import is_table
@@ -46,10 +43,9 @@ from clpt.render.textures.image_files import ImageFiles
 from clpt.render.transport import photons
 from clpt.scene import Scene
 from clpt.scene import materials as mt
+from clpt.scene.cameras import CONNECTED
 from clpt.scene.fingerprint import named_files
 from clpt.scene.integrators import DEEPEST, Film, Integrator
-from clpt.scene.lights import Point
-from clpt.scene.media import Lattice
 from clpt.scene.params import Kind, params
 from clpt.scene.roles import INDEX
 from clpt.scene.shapes import Mesh, Shape
@@ -68,7 +64,7 @@ class Lowered:
     instances: what trees are built of, see `Geometry`. tables: every other read-only array by name;
     where an instance's tree begins is filled in when trees are built. zero_copy: tables that are
     the caller's buffers. owners: of each row of `shapes`. layer_names: what layers tell of.
-    glass_rows: of the camera, see `lower_camera`. integrator: of the scene, or what was chosen;
+    glass_rows: of the camera, see `encode_camera`. integrator: of the scene, or what was chosen;
     reason: why, "" where there was no choice; candidates: see `SceneIndex`; samples: of the
     whole film, as the scene asks for. encoder: what made the tables, for values that are edited.
     cache: what the next lowering need not make again. around: media at the camera, or the matter of
@@ -210,11 +206,11 @@ class _Surfaces:
 def _encode_surfaces(found: Analysis, encoder: Encoder) -> _Surfaces:
     """Append shapes, materials, media and lights."""
     index = found.index
-    filters.lower_filter(index.film.filter, encoder.store, index.splatting)
+    filters.encode_filter(index.film.filter, encoder.store, index.splatting)
     materials = _begin_materials(found, encoder)
     moves = spheres_move(index)
-    geometry = lower_geometry(found.geometry, encoder, materials, spheres_move=moves)
-    media = MediumWords(index, encoder, materials, found.sealed, found.sources.glows)
+    geometry = encode_geometry(found.geometry, encoder, materials, spheres_move=moves)
+    media = MediumWords(index, encoder, materials, found.sealed, found.sources.volumes)
     lights = _lower_lights(index, encoder, geometry, found.sources, media)
     near = _lower_medium_aims(index, encoder, lights)
     around = _lower_bodies(found, geometry, encoder, materials, media)
@@ -246,9 +242,9 @@ def _encode_views(
     density_row, tabulated = _lower_density(index, encoder, wavelengths)
     aims = store.append_floats("distributions", found.aims)
     counts = geometry.single_count, geometry.keys
-    lower_attributes(geometry.owners, encoder.textures, encoder.cache, *counts)
+    encode_attributes(geometry.owners, encoder.textures, encoder.cache, *counts)
     store.append("shapes", shape_words(geometry.rows))
-    glasses = _lower_camera(index, encoder)
+    glasses = _encode_camera(index, encoder)
     ambient = _lower_ambient(index, encoder)
     return _Views(profile, density_row, tabulated, aims, glasses, ambient)
 
@@ -311,7 +307,7 @@ def _lower_profile(index: SceneIndex, encoder: Encoder) -> int:
     """Append the filter's values for light paths, if any; return their place in `distributions`."""
     if not index.weighed:
         return 0
-    return filters.lower_profile(index.film.filter, encoder.store, index.splatting)
+    return filters.encode_profile(index.film.filter, encoder.store, index.splatting)
 
 
 def _lower_density(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool]:
@@ -343,13 +339,13 @@ def _asks_gloss(found: Analysis) -> bool:
     index = found.index
     tree = not index.light_paths and has_tree(found.sources.every, TREE_FROM)
     leaves = (leaf for shape in index.shapes for leaf in mt.parts(shape.material))
-    return tree and any(gloss.word(leaf) for leaf in leaves)
+    return tree and any(gloss_word(leaf) for leaf in leaves)
 
 
 def _lower_medium_aims(index: SceneIndex, encoder: Encoder, lights: LightRows) -> int:
     """Append the lamps near which flights through media end; return how many."""
-    homogeneous = (one for one in index.media if not isinstance(one, Lattice))
-    near = medium_aims(lights) if any(one.scatters for one in homogeneous) else ()
+    homogeneous = (medium for medium in index.media if medium.lattice is None)
+    near = medium_aims(lights) if any(medium.scatters for medium in homogeneous) else ()
     encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
     return len(near)
 
@@ -403,12 +399,12 @@ def _lower_lights(
     return lights
 
 
-def _lower_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
+def _encode_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
     """Append the camera; return the rows in `spectra` of its glasses that disperse."""
     camera, film = index.camera, index.film
-    glasses = cameras.dispersive_glasses(camera)
+    glasses = camera.dispersive_glasses
     rows = tuple(encoder.spectra.row(glass) for glass in glasses) if index.spectral else ()
-    _, words = lower_camera(camera, film.width, film.height, rows)
+    words = encode_camera(camera, film.width, film.height, rows)
     encoder.store.append_floats("camera", words)
     return rows
 
@@ -425,7 +421,7 @@ def _warnings(index: SceneIndex) -> list[str]:
     """Return warnings of parts of the scene that are not rendered as it says."""
     film, integrator = index.film, index.integrator
     warnings = list(index.warnings)
-    if index.mode == "rgb" and cameras.dispersive_glasses(index.camera):
+    if index.mode == "rgb" and index.camera.dispersive_glasses:
         warnings.append(f"{index.camera.kind}.glass: in RGB mode all wavelengths have one focus")
     if index.mode == "rgb" and any(map(_disperses, index.shapes)):
         warnings.append("in rgb mode glass does not disperse: ask for the spectral mode")
@@ -467,7 +463,8 @@ def _of_motion(index: SceneIndex) -> list[str]:
     warnings: list[str] = []
     for i in index.motions.shapes:
         shape = index.listed[i]
-        if any(isinstance(one, Lattice) for s in shape.members for one in (s.interior, s.exterior)):
+        media = (medium for s in shape.members for medium in (s.interior, s.exterior))
+        if any(medium is not None and medium.lattice is not None for medium in media):
             warnings.append(
                 f"{shapes.where(shape)}.motion: its boundary moves, the grid of its medium stays"
             )
@@ -479,9 +476,9 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
     camera, integrator = index.camera, index.integrator
     kind, warnings = integrator.kind, []
     if integrator.light_tracing and not index.joined:
-        names = " and ".join(cameras.CONNECTED)
+        names = " and ".join(CONNECTED)
         reason = f"a {camera.kind} camera cannot be joined to a point"
-        if camera.kind in cameras.CONNECTED:
+        if camera.kind in CONNECTED:
             reason = "its glass disperses"
         name = "light_tracing" if kind == "vcm" else "light_paths"
         warnings.append(f"{kind}.{name}: left aside, as {reason}; {names} can, without such glass")
@@ -499,7 +496,7 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
             f"{kind}.light_paths: none start at lights[{i}], whose light does not fall with "
             "distance"
             for i, light in enumerate(index.lights)
-            if isinstance(light, Point) and not light.falloff
+            if light.reach == "placed" and not light.falloff
         ]
     return warnings
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from clpt.records import SETTINGS
 from clpt.render.film.colour import film_scale, output_matrix
 from clpt.render.geometry.find import Geometry
-from clpt.render.lights.encode import LightRows
-from clpt.render.lights.level import light_level
+from clpt.render.lights.encode import LightRows, light_level
 from clpt.render.records import LayerFeatures
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.find import Density
@@ -66,7 +65,7 @@ def settings_of(
         paths = settings["guide_paths"] = index.integrator.guide_paths or guides.PATHS
         settings["photon_cells"], side = guides.cells_for(paths)
         settings["guide_side"] = side * sphere[1]
-    settings["rival_area"] = rival_area(sphere[1])
+    settings["mis_area_unit"] = mis_area_unit(sphere[1])
     _set_places(settings, found)
     settings["light_count"] = len(lights.rows)
     settings["infinite_count"] = lights.infinite
@@ -132,8 +131,8 @@ def _set_layers(settings: NDArray[np.void], layers: LayerFeatures) -> None:
     settings["layer_groups"], settings["light_groups"] = layers.groups, layers.light_group_row or 0
 
 
-def rival_area(scene_radius: float) -> float:
-    """Return the unit of areas in rivals of light paths [m^2], a power of two.
+def mis_area_unit(scene_radius: float) -> float:
+    """Return the unit of areas in MIS ratios of light paths [m^2], a power of two.
 
     1 for scenes of ordinary size; of larger and smaller ones, what brings their size to these.
     """

@@ -44,7 +44,7 @@ def virtual_files(features: Features, layout: str) -> dict[str, str]:
         "deposit": (deposit_args(features), True),
         "merge": (merge_args(features), True),
         "shade": (shade_args(features), True),
-        "layer": (layer_args(features), False),
+        "layer": (layer_args(features), True),
         "light_layer": (light_layer_args(features), True),
         "flight": (flight_args(features), True),
         "gather": (gather_args(features), True),

@@ -12,7 +12,7 @@ from clpt.render.flow import flags
 from clpt.render.lights import cases as lights
 from clpt.render.lights import emission_cases as emission
 from clpt.render.materials import cases as parameters
-from clpt.render.materials import thin_film_cases as thin_films
+from clpt.render.materials import thin_films
 from clpt.render.records import CameraFeatures, Features, GridFeatures, MaterialFeatures
 from clpt.render.records import camera_rows as camera_records
 from clpt.render.records.dispatch import Case, Function, active, function

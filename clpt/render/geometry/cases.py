@@ -1,4 +1,4 @@
-"""Kernel text of the shapes: their structs, and how rays meet those that are no triangles."""
+"""Kernel text of shapes: their structs, and the intersection of rays with analytic shapes."""
 
 from __future__ import annotations
 
@@ -11,25 +11,30 @@ _FIRST = next(m.word for m in ROWS["curve"].members if m.name == "first")
 
 
 def virtual_files(features: Features) -> dict[str, str]:
-    """Return what shapes give, and generated/shape/<kind>.cl: struct, loader and functions."""
+    """Return the structs of points of shapes, and generated/shape/<kind>.cl for each kind.
+
+    Such a file has the kind's struct, its loader and its functions.
+    """
     files = {f"generated/{record.snake_name}.cl": record.select_text() for record in VALUES}
     many = not features.lights.few
     structs = {kind: record.row_text(many and kind == "triangle") for kind, record in ROWS.items()}
-    structs |= {kind: f'#include "generated/shape/{one}.cl"\n' for kind, one in ONE_OF.items()}
+    structs |= {
+        kind: f'#include "generated/shape/{single}.cl"\n' for kind, single in ONE_OF.items()
+    }
     for kind, struct in structs.items():
         files[f"generated/shape/{kind}.cl"] = f'{struct}#include "shapes/kinds/{kind}.cl"\n'
     return files
 
 
 def hit_text(features: Features) -> str:
-    """Return `shape_hit`: meeting one analytic shape, which is the same for all lanes."""
+    """Return `shape_hit`, which intersects an analytic shape, the same for all lanes."""
     if not features.geometry.analytic:
         return ""
     word = {member.name: member.word for member in SHAPE.members}
     moves = features.motion.shapes
     answer = "none =" if moves else "return"
     none = "ShapeHit none = {FAR, {0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}};"
-    moved = _at_rest(word["number"], none) if moves else []
+    to_rest = _at_rest(word["number"], none) if moves else []
     back = _in_motion() if moves else [none]
     curves = "curves" in features.geometry.analytic
     number = f"(integer)((int)shape[{word['number']}])"
@@ -41,7 +46,7 @@ def hit_text(features: Features) -> str:
         for kind in features.geometry.analytic
     ]
     many = len(ONE_OF.keys() & set(features.geometry.analytic))
-    # What moves by itself needs its own row to be met too.
+    # An intersection with a shape that moves separately needs the shape's row.
     rows = ("single", "many", "mixed")[2 if many and (moves or _keyed(features)) else many]
     signature = (
         "ShapeHit shape_hit(Scene scene, int prim, int row, vec3 o, vec3 d, real tmin, real tmax)"
@@ -51,7 +56,7 @@ def hit_text(features: Features) -> str:
         f"int kind = (int)shape[{word['kind']}];",
         f"integer params = (int)shape[{word['params']}];",
         *([none] if curves and not moves else []),
-        *moved,
+        *to_rest,
         *cases,
         *back[curves and not moves :],
         "return none;",
@@ -63,7 +68,7 @@ def hit_text(features: Features) -> str:
 
 
 def _at_rest(number: int, none: str) -> list[str]:
-    """Statements that turn the ray to where a shape that moves was lowered."""
+    """Return statements that take the ray to the place where a moving shape was lowered."""
     return [
         none,
         f"Motion motion = motion_of_shape(scene, (integer)((int)shape[{number}]));",
@@ -76,7 +81,7 @@ def _at_rest(number: int, none: str) -> list[str]:
 
 
 def _in_motion() -> list[str]:
-    """Statements that bring a hit back to the world."""
+    """Return statements that take a hit back to the world."""
     return [
         "none.t = sel(none.t < tmax, none.t / longer, (real)(FAR));",
         "none.n = normalize3(motion_normal(motion, none.n));",
@@ -84,7 +89,7 @@ def _in_motion() -> list[str]:
 
 
 def points_text(features: Features) -> str:
-    """Return what shading asks of points of analytic shapes, `<verb>_of_shape`, in lanes."""
+    """Return `<verb>_of_shape`, by which shading computes points of analytic shapes."""
     if not features.geometry.analytic:
         return ""
     functions = [_of_shape(features, "vec3", "onto", "vec3 p"), _of_shape(features, "real", "size")]
@@ -98,12 +103,12 @@ def _of_shape(features: Features, type_: str, verb: str, *parameters: str) -> st
     """Return `<verb>_of_shape`, which chooses among `<kind>_<verb>` of the scene's kinds."""
     head = ", ".join(("Scene scene", "ShapeRow shape", "integer prim", *parameters))
     names = [parameter.split()[-1] for parameter in parameters]
-    at = active("shape.params"), active("shape.number")
+    indices = active("shape.params"), active("shape.number")
     cases = [
         Case(
             f"shape.kind == {_number(kind)}",
             f"{ONE_OF.get(kind, kind)}_{verb}"
-            f"({', '.join((_row_text(features, kind, *at, 'm'), *names))})",
+            f"({', '.join((_row_text(features, kind, *indices, 'm'), *names))})",
         )
         for kind in features.geometry.analytic
     ]
@@ -122,7 +127,7 @@ def _includes(features: Features) -> str:
 
 
 def _keyed(features: Features) -> bool:
-    """Whether many spheres in one shape have a row for each key."""
+    """Return whether each sphere of a `spheres` shape has a row for each key."""
     return features.motion.spheres
 
 
@@ -134,7 +139,7 @@ def _number(kind: str) -> int:
 def _row_text(
     features: Features, kind: str, params: str, number: str, mask: str = "mask_of(1)"
 ) -> str:
-    """The parameters of primitive `prim`, which lie at `params` or, of many in one, beside it."""
+    """Return the expression for the parameters of primitive `prim`."""
     if kind == "spheres" and _keyed(features):
         return f"spheres_then(scene, {params}, prim, {number}, scene.time, {mask})"
     if kind in ONE_OF:

@@ -1,4 +1,4 @@
-"""Rules of shapes: what makes one of another form, and what its surface asks of it."""
+"""Rules of shapes: deformations, subdivision, displacement, placement and attributes."""
 
 from __future__ import annotations
 
@@ -8,20 +8,18 @@ from dataclasses import replace
 from clpt.errors import SceneError
 from clpt.geometry import analytic, refining, shapes, triangles
 from clpt.render.textures.check import check_image
-from clpt.scene.shapes import Curves, Cylinder, Instance, Mesh, Shape, Sphere, Spheres
+from clpt.scene.shapes import Cylinder, Mesh, Shape, Sphere, Spheres
 from clpt.scene.textures import attributes_in
 
 
-def check_shapes(things: Iterable[Shape]) -> None:
+def check_shapes(scene_shapes: Iterable[Shape]) -> None:
     """Raise SceneError for the first shape whose parameters contradict each other.
 
-    What its arrays hold is not looked at.
+    The values in arrays are not checked.
     """
-    asked: dict[int, set[str]] = {}  # attributes, by what reads them
-    for shape in things:
-        if isinstance(shape, Instance):
-            continue
-        if isinstance(shape, (Mesh, Spheres, Curves)) and shape.deformation is not None:
+    names: dict[int, set[str]] = {}  # of attributes, by the id of the material or light
+    for shape in scene_shapes:
+        if shape.deformation is not None:
             triangles.check_deformation(shape)
         if isinstance(shape, Mesh):
             refining.check(shape)
@@ -30,27 +28,25 @@ def check_shapes(things: Iterable[Shape]) -> None:
         elif isinstance(shape, (Sphere, Spheres, Cylinder)):
             analytic.check(shape)
         for user, kind in (("material", shape.material), ("emission", shape.emission)):
-            if id(kind) not in asked:
-                asked[id(kind)] = attributes_in(kind)
-            if asked[id(kind)]:
-                _check_attributes(shape, user, asked[id(kind)])
+            if id(kind) not in names:
+                names[id(kind)] = attributes_in(kind)
+            if names[id(kind)]:
+                _check_attributes(shape, user, names[id(kind)])
 
 
-def check_instances(things: Iterable[Shape]) -> None:
-    """Raise SceneError for an instance that stretches what cannot become triangles."""
-    for thing in things:
-        if isinstance(thing, Instance):
-            for shape in thing.group.shapes:
-                if isinstance(shape, Spheres):
-                    matrix = shapes.placement(thing) @ shapes.placement(shape)
-                    analytic.check(replace(shape, to_world=matrix))
+def check_instances(scene_shapes: Iterable[Shape]) -> None:
+    """Raise SceneError for an instance that stretches spheres."""
+    for instance in scene_shapes:
+        for shape in instance.members:
+            if shape is not instance and isinstance(shape, Spheres):
+                matrix = shapes.placement(instance) @ shapes.placement(shape)
+                analytic.check(replace(shape, to_world=matrix))
 
 
-def _check_attributes(shape: Shape, user: str, asked: set[str]) -> None:
-    """Raise SceneError for attributes that a shape lacks; user: which part of it reads them."""
-    held = shape.attributes if isinstance(shape, (Mesh, Spheres)) else {}
-    missing = sorted(asked.difference(held))
+def _check_attributes(shape: Shape, user: str, names: set[str]) -> None:
+    """Raise SceneError for attributes that a shape lacks; user: the part of it that reads them."""
+    missing = sorted(names.difference(shape.attributes))
     if missing:
-        known = ", ".join(held) or "none"
+        known = ", ".join(shape.attributes) or "none"
         message = f"its {user} asks for the attribute {missing[0]!r}; it has {known}"
         raise SceneError(message, where=shapes.where(shape))

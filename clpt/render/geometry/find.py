@@ -1,4 +1,4 @@
-"""The shapes of a scene as rays meet them: triangles, boxes and instances, all in order."""
+"""The shapes of a scene in the forms that rays intersect: triangles, boxes and instances."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from clpt.scene.shapes import Shape
 from clpt.scene.textures import Texture
 
 LEAST_RADIUS = 1e-12  # of a sphere around a scene [m]
-SWEPT_CELLS = 4  # of the hull of what moves, see `instancing.hull_points`
+SWEPT_CELLS = 4  # of the hull of a moving instance, see `instancing.hull_points`
 
 Owner = tuple[np.ndarray, Shape, int, int]  # a row of `shapes`, its shape, first vertex and face
 Triangles = tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32]]
@@ -44,9 +44,9 @@ Triangles = tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32]]
 class Emitter:
     """A shape with an `emission`.
 
-    shape_row: its row in `shapes`; vertices, faces, uvs: its triangles as `shapes.triangles` gave
-    them, needed for a mesh and a cube; of `spheres`, vertices are their balls; keys: rows of each
-    vertex, as of `triangles.keyed`.
+    shape_row: its row in `shapes`; vertices, faces, uvs: its triangles from `shapes.triangles`,
+    for a mesh and a cube; for `spheres`, vertices are balls (n, 4); keys: rows of each vertex, see
+    `triangles.keyed`.
     """
 
     shape: Shape
@@ -59,10 +59,10 @@ class Emitter:
 
 @dataclass(frozen=True)
 class Stored:
-    """Arrays of a shape that go to tables beside its row.
+    """Arrays of a shape for tables beside `shapes`.
 
-    vertices: how many it has; normals, uvs: of the vertices, or None; many: balls (n, 4) or
-    (n, k, 4), or pieces of curves, where one shape stands for many.
+    vertices: their number; normals, uvs: of the vertices, or None; many: balls (n, 4) or (n, k, 4)
+    of `spheres`, or pieces of `curves`; else None.
     """
 
     vertices: int = 0
@@ -75,15 +75,15 @@ class Stored:
 class Geometry:
     """The shapes of a scene as triangles, boxes and instances, with their rows of `shapes`.
 
-    rows: those of analytic shapes last, with what is known before lowering: number, kind, first
-    primitive and flags; owners: the shape of each row, with its first vertex and face; stored: for
-    each row, arrays for other tables; vertices (n, 3) float32, faces (m, 3) uint32 and tags (m,)
-    uint32, the shape of each triangle: the world's before those of groups; boxes (k, 2, 3) float32:
-    of analytic shapes; world_vertices: number of vertices that are not a group's; first_analytic:
-    the first row of an analytic shape; single_count: number of analytic shapes that are one each;
-    analytic: their kinds; normals, uvs: whether a shape needs them; tangents: of shapes that have
-    their own, each with its first vertex; keys: by the first vertex of a shape how many rows each
-    of its vertices has, where that is not one.
+    rows: with number, kind, first primitive and flags, analytic shapes last; owners: the shape of
+    each row, with its first vertex and face; stored: for each row, arrays for other tables;
+    vertices (n, 3) float32, faces (m, 3) uint32 and tags (m,) uint32, the row of each triangle's
+    shape: first the world's, then those of groups; boxes (k, 2, 3) float32: of analytic shapes;
+    world_vertices: number of vertices outside of groups; first_analytic: the first row of an
+    analytic shape; single_count: number of analytic shapes but for `spheres` and `curves`;
+    analytic: their kinds; normals, uvs: whether a shape needs them; tangents: arrays of shapes with
+    tangents, each with its first vertex; keys: number of rows of each vertex of a shape, by the
+    shape's first vertex; 1 where it is absent.
     """
 
     rows: tuple[np.ndarray, ...]
@@ -127,35 +127,35 @@ class Geometry:
 
 
 def _divided(placed: Iterable[Placed]) -> tuple[list[Placed], list[Placed]]:
-    """Divide shapes into those of triangles and others; the latter, with many in one, come last."""
+    """Return shapes of triangles, and analytic shapes with `spheres` and `curves` at the end."""
     meshes: list[Placed] = []
     others: list[Placed] = []
     many = list(shape_records.ONE_OF)
-    for one in placed:
-        (others if one.shape.kind in shape_records.ANALYTIC else meshes).append(one)
-    others.sort(key=lambda one: one.shape.kind in many and 1 + many.index(one.shape.kind))
+    for each in placed:
+        (others if each.shape.kind in shape_records.ANALYTIC else meshes).append(each)
+    others.sort(key=lambda each: each.shape.kind in many and 1 + many.index(each.shape.kind))
     return meshes, others
 
 
 def assembled(index: SceneIndex, cache: LoweringCache) -> Geometry:
-    """Return the shapes of a scene as rays meet them.
+    """Return the shapes of a scene in the forms that rays intersect.
 
-    Raises SceneError for a shape that makes no sense, and for more triangles than a tree can hold.
+    Raises SceneError for an invalid shape, and for more triangles than a tree can hold.
     """
     meshes, others = _divided(index.placed)
-    single = [one for one in others if one.shape.kind not in shape_records.ONE_OF]
+    single = [each for each in others if each.shape.kind not in shape_records.ONE_OF]
     builder = _Builder(cache, len(single), index.motions)
-    for one in meshes:
-        builder.add(one)
+    for each in meshes:
+        builder.add(each)
     world_vertices = builder.vertex_count
     instances = instancing.concatenated([builder.share(p) for p in index.prototypes])
     first_analytic = len(builder.rows)
-    for one in others:
-        builder.add(one)
+    for each in others:
+        builder.add(each)
     boxes = [np.zeros((0, 2, 3), np.float32)]
-    boxes += [builder.around(one, np.array([analytic.bounds(one.shape)])) for one in single]
+    boxes += [builder.swept(each, np.array([analytic.bounds(each.shape)])) for each in single]
     many_boxes = zip(others[len(single) :], builder.many, strict=True)
-    boxes += [builder.around(one, own) for one, own in many_boxes]
+    boxes += [builder.swept(each, many) for each, many in many_boxes]
     vertices, faces, tags = builder.concatenated()
     return Geometry(
         rows=tuple(builder.rows),
@@ -170,7 +170,7 @@ def assembled(index: SceneIndex, cache: LoweringCache) -> Geometry:
         world_vertices=world_vertices,
         first_analytic=first_analytic,
         single_count=len(single),
-        analytic=frozenset(one.shape.kind for one in others),
+        analytic=frozenset(each.shape.kind for each in others),
         normals=builder.normals,
         uvs=builder.uvs,
         tangents=tuple(builder.tangents),
@@ -180,14 +180,14 @@ def assembled(index: SceneIndex, cache: LoweringCache) -> Geometry:
 
 
 def spheres_move(index: SceneIndex) -> bool:
-    """Whether many spheres in one shape belong to something that deforms."""
+    """Return whether a `spheres` shape deforms."""
     deforming = index.motions.deforming
-    return any(one.shape.kind == "spheres" and one.number in deforming for one in index.placed)
+    return any(each.shape.kind == "spheres" and each.number in deforming for each in index.placed)
 
 
 @dataclass
 class _Builder:
-    """The parts of a `Geometry` that `assembled` has found so far."""
+    """The parts of a `Geometry` while `assembled` collects them."""
 
     cache: LoweringCache
     single_count: int
@@ -206,15 +206,15 @@ class _Builder:
     tangents: list[tuple[int, np.ndarray]] = field(default_factory=list)
     keys: dict[int, int] = field(default_factory=dict)
 
-    def add(self, one: Placed, times: Sequence[float] = ()) -> None:
-        """Append a shape's row, and its triangles or what it is many of.
+    def add(self, placed: Placed, times: Sequence[float] = ()) -> None:
+        """Append a shape's row, and its triangles, balls or pieces.
 
-        times: at which the vertices have rows, for what belongs to something that deforms.
+        times: of the rows of each vertex, if the shape or another in its group deforms.
         """
         budget.check_time()
-        shape = one.shape
+        shape = placed.shape
         row = np.zeros((), SHAPE.dtype)
-        row["number"], row["light"] = one.number, -1
+        row["number"], row["light"] = placed.number, -1
         self.owners.append((row, shape, self.vertex_count, self.face_count))
         corners: tuple[Any, Any, Any] = (None, None, None)
         stored = Stored()
@@ -225,7 +225,8 @@ class _Builder:
             if shape.kind == "curves":
                 stored = self._add_curves(shape, row)
             elif shape.kind in shape_records.ONE_OF:
-                balls, stored = self._add_balls(shape, row, self.motions.deforming.get(one.number))
+                times_of = self.motions.deforming.get(placed.number)
+                balls, stored = self._add_balls(shape, row, times_of)
                 corners = balls, None, None
         if shape.emission is not None:
             count = len(times) if _in_triangles(shape) else 1
@@ -235,53 +236,49 @@ class _Builder:
         self.rows.append(row)
         self.stored.append(stored)
 
-    def around(self, one: Placed, boxes: NDArray[Any]) -> NDArray[np.float32]:
-        """Boxes (n, 2, 3) of a shape, and where it moves around all that they sweep."""
-        if one.number not in self.motions.shapes:
+    def swept(self, placed: Placed, boxes: NDArray[Any]) -> NDArray[np.float32]:
+        """Return the boxes (n, 2, 3) of a shape, enlarged by its motion."""
+        if placed.number not in self.motions.shapes:
             return np.asarray(boxes, np.float32)
-        return self.motions.swept(one.number, boxes)
+        return self.motions.swept(placed.number, boxes)
 
     def _add_balls(
         self, shape: Shape, row: np.ndarray, times: tuple[float, ...] | None
     ) -> tuple[Any, Stored]:
-        """Append the boxes of many spheres; return the spheres as they are at first, and all.
-
-        times: at which they have rows, for what belongs to something that deforms.
-        """
+        """Append the boxes of `spheres`; return their balls (n, 4) at the first of the times."""
         row["prim"] = self.single_count + sum(map(len, self.many))
         row["flags"] |= SHAPE_BITS["many"]
         by = shapes.geometry(shape)
         if times:
             keyed = self.cache(spheres.keyed, shape, times, by=(*by, times))
             self.many.append(spheres.swept(keyed))
-            budget.take_made((keyed, self.many[-1]), shapes.where(shape))
+            budget.take_arrays((keyed, self.many[-1]), shapes.where(shape))
             return keyed[:, 0], Stored(many=keyed)
         balls = self.cache(spheres.balls, shape, by=by)
         self.many.append(spheres.boxes([balls]))
-        budget.take_made((balls, self.many[-1]), shapes.where(shape))
+        budget.take_arrays((balls, self.many[-1]), shapes.where(shape))
         return balls, Stored(many=balls)
 
     def _add_curves(self, shape: Shape, row: np.ndarray) -> Stored:
-        """Append the boxes of a shape's pieces."""
         row["prim"] = self.single_count + sum(map(len, self.many))
-        found = self.cache(strands.pieces, shape, by=shapes.geometry(shape))
-        self.many.append(strands.boxes(found))
-        budget.take_made((found, self.many[-1]), shapes.where(shape))
-        return Stored(many=found)
+        pieces = self.cache(strands.pieces, shape, by=shapes.geometry(shape))
+        self.many.append(strands.boxes(pieces))
+        budget.take_arrays((pieces, self.many[-1]), shapes.where(shape))
+        return Stored(many=pieces)
 
     def _add_triangles(
         self, shape: Shape, row: np.ndarray, times: Sequence[float]
     ) -> tuple[tuple[Any, Any, Any], Stored]:
-        """Append a shape's triangles; return their vertices, faces and uvs, and what is stored."""
+        """Append a shape's triangles; return their vertices, faces, uvs, and the other arrays."""
         by = shapes.geometry(shape)
         if times:
             row["flags"] |= SHAPE_BITS["deforms"]
             self.keys[self.vertex_count] = len(times)
-            made = self.cache(triangles.keyed, shape, times, by=(*by, times))
+            arrays = self.cache(triangles.keyed, shape, times, by=(*by, times))
         else:
-            made = self.cache(triangles.counted, shape, by=by)
-        vertices, faces, normals, uvs, flat = made
-        budget.take_made((vertices, faces, normals, uvs), shapes.where(shape))
+            arrays = self.cache(triangles.counted, shape, by=by)
+        vertices, faces, normals, uvs, flat = arrays
+        budget.take_arrays((vertices, faces, normals, uvs), shapes.where(shape))
         self.flat += flat
         row["prim"] = self.face_count
         row["flags"] |= SHAPE_BITS["normals"] if normals is not None else 0
@@ -289,24 +286,23 @@ class _Builder:
         self.normals |= normals is not None
         if shape.tangents is not None and not times:
             row["flags"] |= SHAPE_BITS["tangents"]
-            own = (*shapes.geometry(shape), shape.tangents)
-            along = self.cache(triangles.tangents, shape, by=own)
-            self.tangents.append((self.vertex_count, along))
-        moved = faces + np.uint32(self.vertex_count)
-        self.parts.append((vertices, moved, len(self.rows)))
+            tangents = self.cache(triangles.tangents, shape, by=(*by, shape.tangents))
+            self.tangents.append((self.vertex_count, tangents))
+        numbered = faces + np.uint32(self.vertex_count)
+        self.parts.append((vertices, numbered, len(self.rows)))
         self.vertex_count += len(vertices)
         self.face_count += len(faces)
         return (vertices, faces, uvs), Stored(len(vertices), normals, uvs)
 
     def share(self, prototype: Prototype) -> instancing.Shared:
-        """Append the rows of shapes that instances share, and their triangles once."""
+        """Append the rows and the triangles of shapes that instances share."""
         before, first = len(self.parts), self.face_count
         times = self.motions.deforming.get(int(prototype.numbers[0]), ())
         number = int(prototype.numbers[0]) if prototype.moves or times else 0
         for shape in prototype.shapes:
             self.add(Placed(shape, number), times)
-        own = self.parts[before:]
-        whole, centre = instancing.centred(np.concatenate([v for v, _, _ in own]))
+        parts = self.parts[before:]
+        whole, centre = instancing.centred(np.concatenate([v for v, _, _ in parts]))
         points = instancing.hull_points(whole)
         placed, boxes = instancing.place(prototype.to_world, prototype.numbers, points, centre)
         moving = [i for i, n in enumerate(prototype.numbers) if int(n) in self.motions.shapes]
@@ -316,17 +312,16 @@ class _Builder:
                 keys = self.motions.shapes[int(prototype.numbers[i])]
                 swept = transforms.transform_points(prototype.to_world[i], coarse)
                 boxes[i] = motion.swept(keys, swept[None], self.motions.shutter)[0]
-        ends = np.cumsum([len(v) for v, _, _ in own])[:-1]
+        ends = np.cumsum([len(v) for v, _, _ in parts])[:-1]
         self.parts[before:] = [
-            (moved, faces, number)
-            for moved, (_, faces, number) in zip(np.split(whole, ends), own, strict=True)
+            (vertices, faces, number)
+            for vertices, (_, faces, number) in zip(np.split(whole, ends), parts, strict=True)
         ]
         placed["prim"] = first
         count = max(len(times), 1)
         return instancing.Shared(placed, boxes, self.face_count - first, centre, count)
 
     def concatenated(self) -> Triangles:
-        """Return all vertices, faces and tags."""
         if max(self.vertex_count, self.face_count) > MOST:
             raise SceneError(
                 f"{self.face_count:,} triangles with {self.vertex_count:,} vertices: of either "
@@ -341,5 +336,5 @@ class _Builder:
 
 
 def _in_triangles(shape: Shape) -> bool:
-    """Whether each triangle of a shape that emits is a light."""
+    """Return whether each triangle of an emitting shape becomes a light."""
     return shape.kind not in (*shape_records.RECORDS, *shape_records.ANALYTIC)

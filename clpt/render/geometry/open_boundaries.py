@@ -1,16 +1,16 @@
-"""Meshes around something with an inside, a medium or what a glass absorbs, that have a hole.
+"""Warnings of holes in meshes that enclose a medium or absorb inside.
 
-What a ray passes is told by the boundaries that it meets. Where it leaves or enters through a hole
-it meets none, and what it is in from there on is not defined: paths from the camera and from lights
-take it for one thing or the other, so that their pictures differ.
+A ray knows its medium from the boundaries that it crosses. If it passes through a hole, its medium
+is undefined: paths from the camera and paths from lights may assume different media, and their
+pictures differ.
 
-A hole is where edges have triangles on one side alone, or of unlike winding. Its size is the area
-that its edges enclose, so that a vertex on another triangle's edge is none.
+The edges of a hole have a triangle on only one side, or triangles of opposite winding. Its size is
+the area that its edges enclose, so a vertex on the edge of another triangle makes no hole.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -20,32 +20,30 @@ from clpt.arrays import on_device
 from clpt.geometry import holes, shapes
 from clpt.geometry.winding import triangles_of
 from clpt.render.geometry.surroundings import every
+from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import materials as mt
 from clpt.scene.materials import CLEAR
 from clpt.scene.shapes import Cylinder, Disk, Mesh, Shape
 
-HOLE = 1e-4  # of a mesh's area: smaller ones are no matter
+HOLE = 1e-4  # of a mesh's area: smaller holes are ignored
 ROUND = Disk, Cylinder
 
 
-def warnings_of(index: SceneIndex, cached: Callable[..., Any] | None = None) -> list[str]:
-    """Return a warning where meshes that have an inside are not closed, else none.
-
-    cached: `LoweringCache`, which keeps what was found of a mesh.
-    """
+def warnings_of(index: SceneIndex, cached: LoweringCache | None = None) -> list[str]:
+    """Return a warning if meshes with an inside are not closed, else an empty list."""
     suspects: list[tuple[Any, Mesh]] = []
     for shape in index.shapes:
         if isinstance(shape, Mesh) and not on_device(shape.vertices):
             for inside in _insides(shape):
                 known = any(inside == other for other, _ in suspects)
-                if not known and _own_hole(shape, cached) > HOLE:
+                if not known and _largest_hole(shape, cached) > HOLE:
                     suspects.append((inside, shape))
-    found = [(shape, hole_around(index, inside, cached)) for inside, shape in suspects]
-    holes = [(shape, share) for shape, share in found if share > HOLE]
-    if not holes:
+    shares = [(shape, hole_around(index, inside, cached)) for inside, shape in suspects]
+    open_meshes = [(shape, share) for shape, share in shares if share > HOLE]
+    if not open_meshes:
         return []
-    (shape, share), more = holes[0], len(holes) - 1
+    (shape, share), more = open_meshes[0], len(open_meshes) - 1
     others = f", and {more} other{'s' * (more > 1)}" * (more > 0)
     return [
         f"{shapes.where(shape)}{others}: not closed, a hole has {100.0 * share:.2g}% of the area, "
@@ -66,8 +64,8 @@ def _insides(shape: Shape) -> Iterator[Any]:
             yield part.absorption
 
 
-def _own_hole(shape: Shape, cached: Callable[..., Any] | None) -> float:
-    """The largest hole of a shape alone, over its area."""
+def _largest_hole(shape: Shape, cached: LoweringCache | None) -> float:
+    """Return the size of a shape's largest hole over the shape's area."""
     if cached is None:
         return holes.largest_hole(*triangles_of(shape))
     vertices, faces = triangles_of(shape, cached)
@@ -75,24 +73,24 @@ def _own_hole(shape: Shape, cached: Callable[..., Any] | None) -> float:
     return share
 
 
-def hole_around(index: SceneIndex, inside: object, cached: Callable[..., Any] | None) -> float:
-    """The largest hole of all shapes around something, over their area."""
+def hole_around(index: SceneIndex, inside: object, cached: LoweringCache | None) -> float:
+    """Return the size of the largest hole in all shapes around an inside, over their area."""
     around: list[tuple[float, Shape]] = []
-    for shape in every(index.listed, lambda one: True):
-        around += [(1.0, shape)] * any(inside == own for own in _insides(shape))
+    for shape in every(index.listed, lambda shape: True):
+        around += [(1.0, shape)] * any(inside == other for other in _insides(shape))
         around += [(-1.0, shape)] * (shape.exterior is inside)
     if len(around) == 1:
-        return _own_hole(around[0][1], cached)
+        return _largest_hole(around[0][1], cached)
     if any(isinstance(shape, ROUND) for _, shape in around):
-        return 0.0  # their rims are no edges
+        return 0.0  # their rims have no edges
     points: list[NDArray[Any]] = []
     faces: list[NDArray[Any]] = []
     first = 0
     for sign, shape in around:
         if isinstance(shape, Mesh) and on_device(shape.vertices):
             return 0.0
-        own, triangles = triangles_of(shape, cached)
-        points.append(np.asarray(own, np.float64))
+        vertices, triangles = triangles_of(shape, cached)
+        points.append(np.asarray(vertices, np.float64))
         faces.append(np.asarray(triangles, np.int64)[:, :: int(sign)] + first)
-        first += len(own)
+        first += len(vertices)
     return holes.largest_hole(holes.together(np.concatenate(points)), np.concatenate(faces))

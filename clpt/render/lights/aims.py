@@ -1,4 +1,4 @@
-"""Spheres around what is sharp, at which light paths aim: see kernels/lights/aiming.cl."""
+"""Spheres around specular shapes, at which light paths aim: kernels/lights/aiming.cl."""
 
 from __future__ import annotations
 
@@ -18,34 +18,33 @@ from clpt.scene.params import fields_of
 
 AIMED = 0.7  # share of the light paths that aim
 MOST = 32  # spheres
-SHARP = 0.2  # roughness alpha of microfacets below which a surface is sharp
-LARGE = 0.5  # of the scene's radius: one sphere that is larger is no aim
-CLUSTERS = 256  # into which all that is sharp is cut, to see what stands apart
-CELLS = 16  # along each side of a grid: of more pieces than it has cells those of one count as one
-GAP = 0.05  # of the span of pieces along an axis: where they are cut first
-SEVERAL = 1 << 12  # pieces among which gaps are looked for
-PRICE = 1e-3  # of a sphere, over the area of all: what gains less is not cut
-PAD = 1.01  # radius over that of what is inside
+SHARP = 0.2  # roughness alpha of microfacets below which a surface counts as specular
+LARGE = 0.5  # of the scene's radius: a single sphere that is larger is no aim
+CLUSTERS = 256  # most clusters into which specular pieces are cut
+CELLS = 16  # along each side of a grid, in which many pieces are merged cell by cell
+GAP = 0.05  # of the span of pieces along an axis: wider gaps are cut first
+SEVERAL = 1 << 12  # most pieces among which gaps are searched
+PRICE = 1e-3  # of a sphere, over the area of all: a cut that gains less is not made
+PAD = 1.01  # radius over the radius of the pieces inside
 ROUNDING = 4e-6  # of the scene's coordinates, added to a radius
 
-# Pieces are (n, 10): three corners of a triangle, and how far around it a piece reaches [m]. To be
-# cut they are columns (16, n), with their lowest and highest coordinates: numpy is slow along short
-# axes.
+# Pieces are (n, 10): three corners of a triangle, and how far a piece reaches beyond it [m]. Cuts
+# use columns (16, n), with the lowest and highest coordinates: numpy is slow along short axes.
 
 
 def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[np.float32]:
     """Return centre, radius and share (k, 5) of the spheres by their size, k from 0 to MOST [m].
 
-    They are around all shapes of which a material is sharp; what stands close together shares one.
-    The shares of the light paths add up to AIMED. Half of them go to all spheres alike, half by the
-    areas of their disks. None where no path is aimed: one large sphere would gain nothing.
+    They enclose all shapes with a specular material; close shapes share a sphere. The shares of the
+    light paths add up to AIMED: half is spread evenly over the spheres, half by the areas of their
+    disks. k is 0 where no path is aimed: a single large sphere would gain nothing.
     """
     none = np.zeros((0, 5), np.float32)
-    every = sharp_pieces(geometry, index.motions.shapes) if index.balanced else ()
-    found = [pieces for pieces in every if len(pieces)]
-    if not found:
+    by_shape = sharp_pieces(geometry, index.motions.shapes) if index.balanced else ()
+    pieces = [part for part in by_shape if len(part)]
+    if not pieces:
         return none
-    spheres = _spheres(np.concatenate(found))
+    spheres = _spheres(np.concatenate(pieces))
     centre, radius = np.split(spheres[np.argsort(spheres[:, 3], kind="stable")], [3], axis=1)
     if len(radius) == 1 and radius[0] > LARGE * scene_radius:
         return none
@@ -55,10 +54,10 @@ def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[
 
 
 def is_sharp(material: mt.Material, below: float = SHARP) -> bool:
-    """Whether a material, or one inside it, sends light on in about one direction.
+    """Whether a material, or a part of it, is specular or nearly so.
 
-    Of a coat over something dull that does not count. Nor does what ends light paths. below: the
-    roughness alpha of what is not perfectly smooth.
+    A coat over a diffuse base does not count, nor does a material that ends light paths. below:
+    the roughness alpha up to which a rough material counts.
     """
     if isinstance(material, mt.NormalMapped) or not material.reversible:
         return False
@@ -70,13 +69,13 @@ def is_sharp(material: mt.Material, below: float = SHARP) -> bool:
 
 
 def _roughness(material: mt.Material) -> float:
-    """The least alpha of a metal or of what lets light through, 1 of all else and of images."""
+    """Return the least alpha of a metal or a transmissive material, 1 of others and of images."""
     if isinstance(material, (mt.RoughDielectric, mt.RoughConductor, mt.CoatedConductor)):
-        values = material.alpha_u, material.alpha_v
-        return min((v for v in values if isinstance(v, (int, float))), default=1.0)
-    given = fields_of(material)
-    shares = [given.get(name, 0.0) for name in ("metallic", "spec_trans", "transmission")]
-    roughness = given.get("roughness", 1.0)
+        alphas = material.alpha_u, material.alpha_v
+        return min((v for v in alphas if isinstance(v, (int, float))), default=1.0)
+    values = fields_of(material)
+    shares = [values.get(name, 0.0) for name in ("metallic", "spec_trans", "transmission")]
+    roughness = values.get("roughness", 1.0)
     if not isinstance(roughness, (int, float)) or all(share == 0.0 for share in shares):
         return 1.0
     return roughness**2
@@ -87,26 +86,26 @@ def sharp_pieces(
     moving: Collection[int] = (),
     wanted: Callable[[mt.Material], bool] = is_sharp,
 ) -> Iterator[Floats]:
-    """Yield what every sharp shape consists of, in the world: a row for each triangle or ball.
+    """Yield the pieces of every specular shape, in the world: a row for each triangle or ball.
 
-    moving: the numbers of shapes that move, of which the boxes of their ways are taken; wanted:
-    tells of a material whether a shape of it is meant.
+    moving: numbers of shapes that move: the boxes around their ways are taken; wanted: whether a
+    material counts as specular.
     """
-    own, placed = geometry.owners, geometry.instances
-    ends = [*(face for _, _, _, face in own), len(geometry.faces)][1:]
+    owners, placed = geometry.owners, geometry.instances
+    ends = [*(face for _, _, _, face in owners), len(geometry.faces)][1:]
     firsts = len(geometry.faces) - sum(placed.triangles) + np.cumsum((0, *placed.triangles))[:-1]
     boxes = geometry.boxes.astype(np.float64)
-    for i, ((row, shape, _, face), end) in enumerate(zip(own, ends, strict=True)):
+    for i, ((row, shape, _, face), end) in enumerate(zip(owners, ends, strict=True)):
         if not wanted(shape.material):
             continue
         if row["kind"]:
             many = shape.kind in shape_records.ONE_OF
             first = int(row["prim"]) if many else i - geometry.first_analytic
-            behind = own[i + 1][0]["prim"] if i + 1 < len(own) else len(boxes)
-            own_boxes = boxes[first : int(behind) if many else first + 1]
+            behind = owners[i + 1][0]["prim"] if i + 1 < len(owners) else len(boxes)
+            shape_boxes = boxes[first : int(behind) if many else first + 1]
             still = int(row["number"]) not in moving
             still &= shape.deformation is None
-            yield _fewer(_in_boxes(own_boxes, still and "sphere" in shape.kind))
+            yield _fewer(_in_boxes(shape_boxes, still and "sphere" in shape.kind))
         elif end > face:
             pieces = _of_triangles(geometry, face, end)
             prototype = int(np.searchsorted(firsts, face, side="right")) - 1
@@ -114,38 +113,35 @@ def sharp_pieces(
 
 
 def _pieces(middles: NDArray[np.float64], reach: NDArray[np.float64]) -> Floats:
-    """Pieces within a distance (n,) of points (n, 3)."""
     return np.hstack([middles, middles, middles, reach[:, None]])
 
 
 def _in_boxes(boxes: NDArray[np.float64], round_: bool) -> Floats:
-    """Return a piece around each of boxes (n, 2, 3); round_: a sphere fills each."""
+    """Return pieces around boxes (n, 2, 3); round_: each box is filled by a sphere."""
     half = (boxes[:, 1] - boxes[:, 0]) / 2
     return _pieces(boxes.mean(axis=1), half.max(axis=1) if round_ else np.linalg.norm(half, axis=1))
 
 
 def _of_triangles(geometry: Geometry, face: int, end: int) -> Floats:
-    """Return triangles as pieces; coordinates as `vertices` has them."""
     corners = geometry.vertices[geometry.faces[face:end]].astype(np.float64)
     return np.hstack([corners.reshape(-1, 9), np.zeros((len(corners), 1))])
 
 
 def _placed(geometry: Geometry, pieces: Floats, prototype: int, moving: Collection[int]) -> Floats:
-    """Return a piece around each instance of a prototype, given the pieces of the prototype."""
-    own = geometry.instances.prototypes == prototype
-    rows = geometry.instances.rows[own]
+    """Return a piece around each instance of a prototype; pieces: of the prototype."""
+    mine = geometry.instances.prototypes == prototype
+    rows = geometry.instances.rows[mine]
     linear = np.linalg.inv(np.stack([rows[name] for name in "xyz"], axis=1).astype(np.float64))
     centre, radius = np.split(_around(_columns(pieces)), [3])
     placed = _pieces(linear @ centre + rows["origin"], np.linalg.norm(linear, 2, (1, 2)) * radius)
     ways = np.isin(rows["number"], list(moving))
     if ways.any():
-        boxes = geometry.instances.boxes[own][ways].astype(np.float64)
+        boxes = geometry.instances.boxes[mine][ways].astype(np.float64)
         placed[ways] = _in_boxes(boxes, False)
     return placed
 
 
 def _columns(pieces: Floats) -> Floats:
-    """The columns (16, n) of pieces."""
     columns = np.empty((16, len(pieces)))
     columns[:10] = pieces.T
     (a, b, c), reach = columns[:9].reshape(3, 3, -1), columns[9]
@@ -155,7 +151,7 @@ def _columns(pieces: Floats) -> Floats:
 
 
 def _around(columns: Floats) -> NDArray[np.float64]:
-    """Centre and radius (4,) of a sphere around pieces: about the middle of their box."""
+    """Return centre and radius (4,) of a sphere about the middle of the pieces' box."""
     centre = (columns[10:13].min(axis=1) + columns[13:].max(axis=1)) / 2
     squares = (columns[:9].reshape(3, 3, -1) - centre[:, None]) ** 2
     away = np.sqrt(squares[:, 0] + squares[:, 2] + squares[:, 1])
@@ -163,9 +159,9 @@ def _around(columns: Floats) -> NDArray[np.float64]:
 
 
 def _cut(columns: Floats) -> tuple[tuple[Floats, ...], bool]:
-    """Return pieces in two parts, and whether there is a wide gap between these.
+    """Return pieces in two parts, and whether a wide gap separates these.
 
-    They are cut at a wide gap along an axis, else where the longest axis is halved.
+    Without a wide gap along an axis, the longest axis is halved.
     """
     lows, highs = columns[10:13], columns[13:]
     number = columns.shape[1]
@@ -175,20 +171,20 @@ def _cut(columns: Floats) -> tuple[tuple[Floats, ...], bool]:
         reached = np.maximum.accumulate(np.take_along_axis(highs, order[:, :-1], axis=1), axis=1)
         gaps = (np.take_along_axis(lows, order[:, 1:], axis=1) - reached) / span[:, None]
         places = gaps.argmax(axis=1)
-        axis = min(range(3), key=lambda one: (-gaps[one, places[one]], places[one]))
+        axis = min(range(3), key=lambda i: (-gaps[i, places[i]], places[i]))
         if gaps[axis, places[axis]] > GAP:
             left, right = np.split(order[axis], [places[axis] + 1])
             return (columns[:, left], columns[:, right]), True
     middles = (lows + highs) / 2
     along = middles[np.ptp(middles, axis=1).argmax()]
     low = along < (along.min() + along.max()) / 2
-    if not low.any():  # all in one place
+    if not low.any():  # all at the same point
         low = np.arange(number) < number // 2
     return (columns[:, low], columns[:, ~low]), False
 
 
 def _fewer(pieces: Floats) -> Floats:
-    """Return one piece around all in each cell of a grid, where there are more than cells."""
+    """Merge many pieces: a piece around those of each cell of a grid."""
     if len(pieces) <= CELLS**3:
         return pieces
     columns = _columns(pieces)
@@ -206,7 +202,7 @@ def _fewer(pieces: Floats) -> Floats:
 
 
 class _Cluster:
-    """Some pieces, the sphere around them, and the clusters that they are cut into."""
+    """Some pieces, the sphere around them, and the clusters into which they are cut."""
 
     def __init__(self, columns: Floats):
         self.sphere = _around(columns)
@@ -215,12 +211,12 @@ class _Cluster:
         self.parts: list[_Cluster] = []
 
     def cut(self) -> list[_Cluster]:
-        """Return the parts, none of a single piece."""
+        """Return the two parts; a single piece has none."""
         self.parts, self.halves = [_Cluster(half) for half in self.halves], ()
         return self.parts
 
     def cover(self, price: float) -> tuple[float, list[NDArray[np.float64]]]:
-        """The cheapest spheres around all pieces; each costs its area and a price."""
+        """Return the cheapest spheres around all pieces; each costs its area and a price."""
         whole = self.area + price
         if self.parts:
             costs, spheres = zip(*(part.cover(price) for part in self.parts), strict=True)
@@ -230,17 +226,17 @@ class _Cluster:
 
 
 def _spheres(pieces: Floats) -> NDArray[np.float64]:
-    """Spheres (k, 4) around pieces, at most MOST, whose disks have little area together."""
+    """Return at most MOST spheres (k, 4) around pieces, whose disks have little area together."""
     root, number = _Cluster(_columns(pieces)), count()
     leaves: list[tuple[bool, float, int, _Cluster]] = []
     cut = [root]
     while cut or leaves:
-        for one in cut:  # those with a gap come first, then the largest, then the earliest
-            heapq.heappush(leaves, (not one.gap, -one.area, next(number), one))
+        for cluster in cut:  # a gap comes first, then the largest, then the earliest
+            heapq.heappush(leaves, (not cluster.gap, -cluster.area, next(number), cluster))
         if len(leaves) >= CLUSTERS:
             break
         cut = heapq.heappop(leaves)[-1].cut()
     price = PRICE * root.cover(0.0)[0]
-    while len(found := root.cover(price)[1]) > MOST:
+    while len(spheres := root.cover(price)[1]) > MOST:
         price *= 2.0
-    return np.array(found)
+    return np.array(spheres)

@@ -2,13 +2,13 @@
 
 A grid of cells is cut into blocks, in bands of rows and in strips of columns. For each of many sets
 of normals (parts of the octahedron) there are the chances of all blocks: their weight times the
-cosine. Within a block cells are chosen by weight alone. See kernels/core/grid.cl.
-"""
+cosine. Within a block cells are chosen by weight alone. See kernels/core/grid.cl."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,12 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Array, Floats
 from clpt.records import GRID_SIZES
+from clpt.render.materials.encoder import Encoder
 
 Directions = Callable[[ArrayLike, ArrayLike], Floats]  # unit (..., 3) of rows and columns 0 to 1
 
 SIDE = GRID_SIZES["side"]  # of the square of parts of the octahedron
 DOWN, ACROSS = 8, 16  # blocks of a grid, at most; of several grids a fourth of a face's side each
-FINER = 4  # parts of a block's side, of each of which the cosine is taken
+FINER = 4  # parts of a block's side; each has a cosine
 NORMALS = 5  # of a part, along each axis
 DULL, LEAST = 0.5, 0.05  # see `_beyond`
 ROWS = 256  # of an image that are worked on at a time
@@ -30,9 +31,9 @@ ROWS = 256  # of an image that are worked on at a time
 class BlockGrid(NamedTuple):
     """Tables to choose a block of cells of a grid, and then a cell in it.
 
-    marginal (strips, rows): sums over the rows of each block; conditional (rows, columns): over
-    its columns; blocks (parts + 1, words): chances, of the last one by weight alone; block_rows,
-    block_columns: cells of a block; total: sum of all weights.
+    marginal (strips, rows): cumulative sums over the rows of each block; conditional (rows,
+    columns): over its columns; blocks (parts + 1, words): chances for each set of normals, the last
+    row by weight alone; block_rows, block_columns: cells of a block; total: sum of all weights.
     """
 
     marginal: NDArray[np.float32]
@@ -49,10 +50,10 @@ def of(
     angles: tuple[float, float] | None = None,
     even: NDArray[Any] | None = None,
 ) -> BlockGrid:
-    """Return the blocks of grids (k, r + 1, c + 1) of weights at corners, one below the other.
+    """Return the blocks of k grids (k, r + 1, c + 1) of weights at corners, stacked vertically.
 
-    angles: of a row and of a column [rad]; by default those of a sphere, or of a cube's faces.
-    even: the weights of a light that is 1 everywhere: blocks are chosen for what is `_beyond`.
+    angles: of a row and of a column [rad]; by default as of a sphere, or of a cube's faces. even:
+    the weights of a light of radiance 1: with them, blocks are chosen for the light `_beyond`.
     """
     grids, per, columns = corners.shape[0], corners.shape[1] - 1, corners.shape[2] - 1
     rows = grids * per
@@ -68,8 +69,8 @@ def of(
         cells = _cells(corners, np.arange(part.start, part.stop))
         fine[part] = np.add.reduceat(cells, fine_columns, axis=1)
         for strip, start in enumerate(range(0, columns, block_columns)):
-            own = slice(start, start + block_columns)
-            conditional[part, own], sums[part, strip] = _cumulative(cells[:, own])
+            inside = slice(start, start + block_columns)
+            conditional[part, inside], sums[part, strip] = _cumulative(cells[:, inside])
     marginal, weights = _in_bands(sums, block_rows)
     fine = np.add.reduceat(fine, fine_rows, axis=0).ravel()
     places = [(at + np.append(at[1:], n)) / (2.0 * n) for at, n in (
@@ -88,11 +89,11 @@ def of(
 def _lit(
     toward: Floats, owner: Array, fine: Floats, weights: Floats, step: float, area: Floats | None
 ) -> Floats:
-    """Return what each block sends to surfaces of each normal, and at last to all of space.
+    """Return the light of each block on surfaces of each normal, and in the last row on all space.
 
-    toward (n, 3), owner and fine (n,): of parts of blocks, where they are, in which block, and how
-    much they send; step: their size [rad]; area (n,): what they would send if all were 1, None to
-    choose them for all that they send.
+    toward (n, 3), owner, fine (n,): direction, block and weight of each part of a block; step: size
+    of a part [rad]; area (n,): weights if the radiance were 1; None: blocks are chosen for all
+    their light.
     """
     lit = np.empty((SIDE * SIDE + 1, weights.size))
     for index in range(SIDE * SIDE):
@@ -104,20 +105,21 @@ def _lit(
 
 
 def _beyond(fine: Floats, area: Floats, cosine: Floats) -> Floats:
-    """Return what parts send beyond DULL of the mean of what a surface receives, (n,).
+    """Return the weights of parts beyond DULL of the mean that a surface receives, (n,).
 
-    The material's own directions find the rest (Karlik et al. 2019, "MIS Compensation"). No part
-    has less than LEAST of its chance, so that nothing is lost where only the light's are drawn.
+    Directions sampled by the material find the remaining light (Karlik et al. 2019, "MIS
+    Compensation"). Each part keeps LEAST of its weight, so that no light is lost where only the
+    light is sampled.
     """
     mean = float(fine @ cosine) / max(float(area @ cosine), 1e-300)
     return np.maximum(fine - DULL * mean * area, LEAST * fine)
 
 
 def _in_bands(sums: Floats, block_rows: int) -> tuple[NDArray[np.float32], Floats]:
-    """Cumulative sums (strips, rows) of rows (rows, strips) in each band, and the bands' sums."""
+    """Return cumulative sums (strips, rows) within each band of rows, and the bands' sums."""
     firsts = range(0, len(sums), block_rows)
-    found = [_cumulative(sums[first : first + block_rows].T) for first in firsts]
-    return np.hstack([made for made, _ in found]), np.stack([total for _, total in found])
+    bands = [_cumulative(sums[first : first + block_rows].T) for first in firsts]
+    return np.hstack([rising for rising, _ in bands]), np.stack([total for _, total in bands])
 
 
 def _in_parts(corners: NDArray[Any], rows: Array, columns: Array) -> Floats:
@@ -127,14 +129,14 @@ def _in_parts(corners: NDArray[Any], rows: Array, columns: Array) -> Floats:
 
 
 def _cells(corners: NDArray[Any], rows: NDArray[np.int64]) -> Floats:
-    """The mean weights of rows of cells (n, c)."""
+    """Return the mean weights (n, c) of the cells of n rows."""
     grid, row = np.divmod(rows, corners.shape[1] - 1)
     wide = corners[grid, row].astype(np.float64) + corners[grid, row + 1]
     return 0.25 * (wide[:, 1:] + wide[:, :-1])
 
 
 def _cumulative(weights: Floats) -> tuple[NDArray[np.float32], Floats]:
-    """Sums along the last axis up to 1, and what they were divided by."""
+    """Return cumulative sums along the last axis, normalised to end at 1, and the totals."""
     sums = np.cumsum(weights, axis=-1)
     total = sums[..., -1].copy()
     sums /= np.where(total > 0.0, total, 1.0)[..., None]
@@ -143,10 +145,10 @@ def _cumulative(weights: Floats) -> tuple[NDArray[np.float32], Floats]:
 
 
 def _cosines(index: int, toward: Floats, radius: float) -> Floats:
-    """Cosines (n,) of a part's normals to directions (n, 3), each perhaps `radius` [rad] nearer.
+    """Return cosines (n,) between a part's normals and directions (n, 3) of a radius [rad].
 
-    Half their mean and half the largest, so that no direction is much rarer than it matters for any
-    of the normals.
+    Half is the mean over the normals and half is the largest, so that each direction stays likely
+    enough for every normal of the part.
     """
     at = np.linspace(0.0, 1.0, NORMALS)
     u, v = np.meshgrid((index % SIDE + at) / SIDE, (index // SIDE + at) / SIDE)
@@ -167,9 +169,9 @@ def _octahedral(u: Floats, v: Floats) -> Floats:
 
 
 def _chances(lit: Floats, weights: Floats) -> NDArray[np.float32]:
-    """Sums over bands, sums over the strips of each, and chances over those by weight alone.
+    """Return sums over bands, sums over each band's strips, and chances over those by weight alone.
 
-    The chances are those of the sums as float32 has them. Where nothing is lit weights alone count.
+    The chances follow the sums as rounded to float32. Where nothing is lit, weights alone count.
     """
     lit = lit if lit.sum() > 0.0 else weights
     if not lit.sum() > 0.0:
@@ -179,6 +181,24 @@ def _chances(lit: Floats, weights: Floats) -> NDArray[np.float32]:
     chance = np.diff(down.astype(np.float64), prepend=0.0)[:, None] * np.diff(
         across.astype(np.float64), axis=1, prepend=0.0
     )
-    own = weights / max(weights.sum(), 1e-300)
-    ratio = np.divide(chance, own, out=np.zeros_like(chance), where=own > 0.0)
+    alone = weights / max(weights.sum(), 1e-300)
+    ratio = np.divide(chance, alone, out=np.zeros_like(chance), where=alone > 0.0)
     return np.concatenate([down, across.ravel(), ratio.ravel().astype(np.float32)])
+
+
+def grid_members(corners: NDArray[Any], grid: BlockGrid, encoder: Encoder) -> dict[str, ArrayLike]:
+    """Put a grid and the weights at its corners into the tables; return the members of a record.
+
+    A power of two scales the largest weight to about 1, so that squares of weights fit float32.
+    """
+    append = partial(encoder.store.append_floats, "distributions")
+    unit = 2.0 ** math.frexp(float(corners.max()))[1]
+    return {
+        "corners": append(corners / unit),
+        "marginal": append(grid.marginal),
+        "conditional": append(grid.conditional),
+        "blocks": append(grid.blocks),
+        "block_rows": grid.block_rows,
+        "block_columns": grid.block_columns,
+        "norm": unit / grid.total if grid.total > 0.0 else 0.0,
+    }

@@ -1,4 +1,4 @@
-"""Bounds of where lights are and shine: boxes and cones, of which a tree over lights is built."""
+"""Bounds of lights in space and direction: the boxes and cones of a light tree."""
 
 from __future__ import annotations
 
@@ -11,21 +11,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Faces, Floats, Points
 from clpt.geometry import analytic
-from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.shapes import Shape
-
-NARROW = 0.02  # [rad] around a cone of directions that is known to hold all light
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds of n lights: boxes, and cones as Conty Estevez and Kulla 2018 (4.1) have them.
+    """Bounds of n lights: boxes, and cones as in Conty Estevez and Kulla 2018 (4.1).
 
-    low, high (n, 3) [m]; center (n, 3): in the plane of what is flat [m]; axis (n, 3) unit length;
-    theta_o (n,): how far normals lean from it [rad]; theta_e (n,): how far light leans from a
-    normal [rad], up to pi / 2; both (n,) bool: light leaves against the normals too; placed (n,)
-    bool: False for what shines on the whole scene.
+    low, high (n, 3) [m]; center (n, 3): in the plane of a flat light [m]; axis (n, 3) unit length;
+    theta_o (n,): largest angle of a normal to the axis [rad]; theta_e (n,): largest angle of light
+    to a normal [rad], up to pi / 2; both (n,) bool: light leaves against the normals too; placed
+    (n,) bool: False for a light that shines on the whole scene.
     """
 
     low: Floats
@@ -62,21 +59,10 @@ def concatenated(parts: Sequence[Bounds]) -> Bounds:
 
 def of_lamp(lamp: Light) -> Bounds:
     """Return the bounds (1) of a light that is not on a shape."""
-    if isinstance(lamp, lights.Point) and lamp.falloff:
-        return _one(np.asarray(lamp.position, np.float64))
-    if isinstance(lamp, (lights.Spot, lights.Projector, lights.Goniometric)):
-        matrix = np.asarray(lamp.to_world, np.float64)
-        place, axis = matrix[:3, 3], matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
-        if isinstance(lamp, lights.Spot):
-            return _one(place, axis, np.radians(lamp.cutoff), NARROW)
-        if isinstance(lamp, lights.Projector):
-            return _one(place, axis, np.pi / 2.0, NARROW)
-        return _one(place)
-    if lamp.reach == "placed" and not isinstance(lamp, lights.Point):
-        own: Any = lamp
-        position = own.to_world[:3, 3] if hasattr(lamp, "to_world") else own.position
-        return _one(np.asarray(position, np.float64))
-    return _one(np.zeros(3), placed=False)
+    bounds = lamp.bounds()
+    if bounds is None:
+        return _one(np.zeros(3), placed=False)
+    return _one(bounds.low, bounds.axis, bounds.theta_o, bounds.theta_e, high=bounds.high)
 
 
 def of_shape(shape: Shape, two_sided: bool) -> Bounds:
@@ -109,9 +95,15 @@ def of_triangles(vertices: Points, faces: Faces, two_sided: bool) -> Bounds:
 def of_balls(balls: NDArray[np.float32]) -> Bounds:
     """Return the bounds (n) of spheres (n, 4): centre and radius."""
     center, radius = balls[:, :3].astype(np.float64), balls[:, 3:].astype(np.float64)
-    count = len(balls)
+    return replace(all_around(center - radius, center + radius), center=center)
+
+
+def all_around(low: Floats, high: Floats) -> Bounds:
+    """Return the bounds (n) of lights that shine in all directions, in boxes (n, 3)."""
+    count = len(low)
     return Bounds(
-        center - radius, center + radius, center, np.tile([0.0, 0.0, 1.0], (count, 1)),
+        low, high, 0.5 * (low + high),
+        np.tile([0.0, 0.0, 1.0], (count, 1)),
         np.full(count, np.pi), np.full(count, np.pi / 2.0), np.full(count, False),
         np.full(count, True),
     )  # fmt: skip

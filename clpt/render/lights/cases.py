@@ -18,6 +18,7 @@ from clpt.render.records.light_rows import (
     KINDS,
     LINE,
     RECORDS,
+    UNSEEN,
     VALUES,
     VOLUMES,
     WIDTH,
@@ -122,6 +123,11 @@ def point_text(kind: str, uv: str) -> list[str]:
     ]
 
 
+def mode_text(bit: int) -> str:
+    """Return the test whether the light `l` has a bit of LightRow.emission_mode."""
+    return f"((l.emission_mode & {bit}) != 0)"
+
+
 def _tree_text() -> list[str]:
     """Nodes of the tree over lights, and how one goes down in it."""
     node = light_records.NODE
@@ -136,11 +142,11 @@ def _tree_text() -> list[str]:
 
 def _sides_text(features: Features) -> str:
     """Whether the side of a shape that a ray met emits; most scenes need not look at the row."""
-    if not features.lights.two_sided:
+    if not (features.lights.two_sided or features.lights.unseen):
         return "#define light_shows(scene, row, front) (front)"
-    mode = "light_at(scene, max_i(row, (integer)(0))).emission_mode"
     head = "mask light_shows(Scene scene, integer row, mask front)"
-    return function(head, f"return front | ({mode} == {BOTH});")
+    row = "LightRow l = light_at(scene, max_i(row, (integer)(0)));"
+    return function(head, row, f"return (front | {mode_text(BOTH)}) & !{mode_text(UNSEEN)};")
 
 
 def _pick_text(features: Features) -> list[str]:
@@ -154,14 +160,13 @@ def _pick_text(features: Features) -> list[str]:
 
 def _hemisphere(moving: bool) -> str:
     """The hemisphere by which an infinite light is sampled, which turns with one that moves."""
-    return "hemisphere" if moving else "receiver_hemisphere(receiver)"
+    return "hemisphere" if moving else "receiver.hemisphere"
 
 
 def _sample_text(features: Features) -> str:
     """`light_sample`: a light that is chosen by `pick`, and a direction to it."""
     others, surfaces = others_of(features), surfaces_of(features)
     kinds, moving = [*others, *surfaces], features.motion.lights
-    weighed = features.transport.balanced
     head = (
         "LightSample light_sample(Scene scene, vec3 p, Receiver receiver, real pick, vec2 u, "
         "Wavelengths lambdas)"
@@ -178,7 +183,7 @@ def _sample_text(features: Features) -> str:
             "Motion motion = motion_of_light(scene, row, l);",
             "vec3 seen_from = p;",
             "p = motion_point_back(motion, p);",
-            "vec3 hemisphere = motion_back_unit(motion, receiver_hemisphere(receiver));",
+            "vec3 hemisphere = motion_back_unit(motion, receiver.hemisphere);",
         ]
     for kind in others:
         seen = _hemisphere(moving) if kind in INFINITE else "p"
@@ -197,22 +202,29 @@ def _sample_text(features: Features) -> str:
         rows.append("s = light_moved(motion, s);")
         rows += ["q = area_moved(motion, q);", "p = seen_from;"] if surfaces else []
     if features.lights.two_sided:
-        rows.append(f"q = area_turned(q, l.emission_mode == {BOTH});")
+        rows.append(f"q = area_turned(q, {mode_text(BOTH)});")
     if surfaces:
         rows += [
             "point.p = madd3(q.wi, q.t, p);",
             "Spectrum le = emission_load(scene, l.radiance, point, lambdas);",
             "s = light_sample_sel(l.shape >= 0, area_sample(q, point.p, le), s);",
         ]
-    pmf = "pmf" if features.lights.tree else "l.pmf"
-    rows.append(f"s = light_chosen(s, {pmf});")
-    if weighed or features.film.layers.light_groups or features.lights.volumes:
-        rows.append("s.row = row;")
-    if weighed:
-        rows.append(f"s.chance = {pmf};")
+    return function(head, *rows, *_chosen_text(features), "return s;")
+
+
+def _chosen_text(features: Features) -> list[str]:
+    """Return lines by which the sample `s` of the light `l` in row `row` keeps its choice."""
+    lights, weighed = features.lights, features.transport.balanced
+    pmf = "pmf" if lights.tree else "l.pmf"
+    chance = f"sel({mode_text(UNSEEN)}, fabs(s.pdf), {pmf})" if lights.unseen else pmf
+    kept = weighed or features.film.layers.light_groups or lights.volumes or lights.unseen
+    rows = [f"s = light_chosen(s, {pmf});"]
+    rows += [f"s = area_unseen(s, {mode_text(UNSEEN)});"] * lights.unseen
+    rows += ["s.row = row;"] if kept else []
+    rows += [f"s.chance = {chance};"] if weighed else []
     if features.transport.aimed:
-        rows.append(f"s.n = {'q.n' if surfaces else NOWHERE};")
-    return function(head, *rows, "return s;")
+        rows.append(f"s.n = {'q.n' if surfaces_of(features) else NOWHERE};")
+    return rows
 
 
 def _pdf_text(features: Features) -> str:
@@ -283,7 +295,7 @@ def _infinite_text(features: Features) -> list[str]:
         rows += [
             "Motion motion = motion_of_light(scene, (integer)(row), l);",
             "d = motion_back_unit(motion, d);",
-            "vec3 hemisphere = motion_back_unit(motion, receiver_hemisphere(receiver));",
+            "vec3 hemisphere = motion_back_unit(motion, receiver.hemisphere);",
         ]
     for kind in kinds:
         rows += masked(

@@ -1,62 +1,118 @@
-"""Rules of lights that are no shapes."""
+"""Rules of lights off all shapes, and their positions and axes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from clpt import transforms
+from clpt.arrays import fits_single
 from clpt.errors import SceneError
-from clpt.render.lights import images as image_lights
-from clpt.render.lights import power as light_power
-from clpt.render.records.light_rows import RECORDS
+from clpt.render.records.light_rows import IMAGE_RECORDS, INFINITE, PROJECTED_RECORDS, RECORDS
 from clpt.render.textures.check import check_image, check_textures
 from clpt.scene import roles
-from clpt.scene.lights import (
-    CubeMap,
-    Envmap,
-    Goniometric,
-    Light,
-    Projector,
-    Sky,
-    Spot,
-    with_emission,
-)
+from clpt.scene.lights import Light, with_emission
 from clpt.scene.params import Texture, fields_of, params
 from clpt.scene.roles import Role
 
+SHEAR = 1e-5  # largest cosine between axes that are at right angles
+
 
 def check_light(lamp: Light) -> None:
-    """Raise SceneError for a light of shapes, or one without a place, direction or power."""
+    """Raise SceneError for a light of shapes, or a light without a place, direction or power."""
     if lamp.kind not in RECORDS:
         raise SceneError(f"a light of kind {lamp.kind!r} is a shape's `emission`", where="lights")
     check_textures(lamp)
-    with_emission(lamp)  # it refuses a light that is 0 whatever its power
-    if isinstance(lamp, (Envmap, CubeMap)) and lamp.image is None:
+    values = fields_of(lamp)
+    with_emission(lamp)  # refuses a light that is 0 whatever its power
+    if lamp.kind in IMAGE_RECORDS and values["image"] is None:
         message = "an image is needed: a path, or an array (h, w, 3)"
         raise SceneError(message, where=f"{lamp.kind}.image")
-    if isinstance(lamp, Envmap):
-        check_image(lamp.image, "envmap.image", emissive=True)
-    given = fields_of(lamp)
+    if lamp.kind == "envmap":
+        check_image(values["image"], "envmap.image", emissive=True)
     for name, param in params(type(lamp)).items():
         if param.role in PLACES:
-            PLACES[param.role](lamp, given[name], f"{lamp.kind}.{name}")
+            PLACES[param.role](lamp, values[name], f"{lamp.kind}.{name}")
+
+
+def record_of(lamp: Light) -> str:
+    """Return the name of a lamp's record: a spot with an image has a record of its own."""
+    throws = lamp.kind == "spot" and isinstance(fields_of(lamp)["image"], Texture)
+    return "image_spot" if throws else lamp.kind
 
 
 def _check_matrix(lamp: Light, value: ArrayLike, where: str) -> None:
-    throws = isinstance(lamp, Spot) and isinstance(lamp.image, Texture)
-    if isinstance(lamp, (Envmap, CubeMap, Sky)):
-        image_lights.axes_of(lamp)
-    elif throws or isinstance(lamp, (Projector, Goniometric)):
-        light_power.unsheared(value, where)
+    if lamp.kind in INFINITE:
+        rotation(lamp)
+    elif record_of(lamp) in PROJECTED_RECORDS:
+        unsheared(value, where)
     else:
-        light_power.placement(value, where)
+        placement(value, where)
 
 
-# the rules of where a light is and shines to, by the role of the parameter
+def invertible(to_world: ArrayLike, where: str) -> NDArray[np.float64]:
+    """Return a light's transform. Raises SceneError for a matrix without an inverse."""
+    matrix = np.asarray(to_world, np.float64)
+    if matrix.shape != (4, 4) or transforms.is_singular(matrix) or not fits_single(matrix):
+        raise SceneError("must be an invertible (4, 4) matrix", where=where)
+    return matrix
+
+
+def placement(to_world: ArrayLike, where: str) -> dict[str, ArrayLike]:
+    """Return a light's position and unit axes. Raises SceneError as `invertible` and `unit` do."""
+    matrix = invertible(to_world, where)
+    axes = {axis: unit(matrix[:3, i], where) for i, axis in enumerate("xyz")}
+    return {"position": matrix[:3, 3], **axes}
+
+
+def rotation(lamp: Light) -> NDArray[np.float64]:
+    """Return the axes of an infinite light in the world, the columns of (3, 3).
+
+    Raises SceneError for a matrix that is no rotation, but for its scale.
+    """
+    where = f"{lamp.kind}.to_world"
+    matrix = invertible(fields_of(lamp)["to_world"], where)
+    axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+    if np.abs(axes.T @ axes - np.eye(3)).max() > SHEAR:
+        raise SceneError("must be a rotation: this one shears", where=where)
+    return axes
+
+
+def unsheared(to_world: ArrayLike, where: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return a light's position (3,) and unit axes, the columns of (3, 3).
+
+    Raises SceneError for a matrix that shears, or without an inverse.
+    """
+    matrix = invertible(to_world, where)
+    axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+    if np.abs(axes.T @ axes - np.eye(3)).max() > SHEAR:
+        raise SceneError("must not shear", where=where)
+    return matrix[:3, 3], axes
+
+
+def unit(value: ArrayLike, where: str) -> NDArray[np.float64]:
+    """Return a vector of length 1. Raises SceneError for a vector of length 0."""
+    vector = three(value, where)
+    length = transforms.length(vector)
+    if not length > 0.0:
+        raise SceneError("has no length", where=where)
+    return vector / length
+
+
+def three(value: ArrayLike, where: str) -> NDArray[np.float64]:
+    """Return a vector (3,). Raises SceneError unless it has three finite numbers."""
+    values = np.asarray(value, np.float64)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        raise SceneError(f"must be three finite numbers, found {value!r}", where=where)
+    return values
+
+
+# rules of a light's place and direction, by the role of the parameter
 PLACES: dict[Role, Callable[[Light, Any, str], object]] = {
     roles.host("matrix4"): _check_matrix,
-    roles.host("direction"): lambda _, value, where: light_power.unit(value, where),
-    roles.host("vector"): lambda _, value, where: light_power.three(value, where),
+    roles.host("direction"): lambda _, value, where: unit(value, where),
+    roles.host("vector"): lambda _, value, where: three(value, where),
 }

@@ -7,6 +7,7 @@ from clpt.render.lights.cases import (
     NOWHERE,
     kind_test,
     kinds_of,
+    mode_text,
     others_of,
     pmf_text,
     point_text,
@@ -16,7 +17,7 @@ from clpt.render.lights.cases import (
 )
 from clpt.render.records import Features
 from clpt.render.records.dispatch import Case, Function, choose, function
-from clpt.render.records.light_rows import ALONG, BASES, BOTH, INFINITE, KINDS, PLACED
+from clpt.render.records.light_rows import ALONG, BASES, BOTH, INFINITE, KINDS, PLACED, UNSEEN
 
 
 def dispatch_text(features: Features) -> str:
@@ -56,16 +57,16 @@ def dispatch_text(features: Features) -> str:
 
 
 def densities_text(features: Features) -> str:
-    """Return what kernels/transport/rivals.cl asks of the light in a row, seen along wi.
+    """Return what kernels/transport/mis_ratio.cl asks of the light in a row, seen along wi.
 
     light_emit_pdf(scene, row, wi, t): how densely light_emit sends rays against wi to a surface
     across it at distance t; over the cosine at a light on a shape. Of that, what is left where
     squared distances cancel: [1/(m^2 sr)], and of a light at a point per t^2 [1/m^2], in units of
-    Settings.rival_area.
+    Settings.mis_area_unit.
     light_found_pdf(scene, row, p, receiver, wi, t, n): the density with which next-event
     estimation at p finds that point of the light [1/sr]; n: the normal there. Of a delta light it
     is the chance of its row. Where the tree asks for gloss it is without that chance, which is
-    known later, see kernels/transport/rival_chosen.cl.
+    known later, see kernels/transport/mis_ratio_chosen.cl.
     light_path_pdf(scene, row, p, wi, t, n): light_emit_pdf of light that is aimed, too.
     """
     present, moving = kinds_of(features), features.motion.lights
@@ -80,7 +81,7 @@ def densities_text(features: Features) -> str:
             *motion,
             *("wi = motion_back_unit(motion, wi);",) * moving,
         ),
-        "value * l.pmf * scene.settings->rival_area",
+        "value * l.pmf * scene.settings->mis_area_unit",
     )
     found = Function(
         "real light_found_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 wi, "
@@ -113,7 +114,7 @@ def _emit_pdf(features: Features, kind: str) -> str:
     """The density of a kind in light_emit_pdf, but for its row's chance."""
     row = row_text(features, kind)
     if kind in shape_records.RECORDS:
-        sides = f" * sel(l.emission_mode == {BOTH}, (real)(0.5f), (real)(1.0f))"
+        sides = f" * sel({mode_text(BOTH)}, (real)(0.5f), (real)(1.0f))"
         sides *= features.lights.two_sided
         point = f"{kind}_point({row}, (vec2){{0.5f, 0.5f}})"
         if features.motion.lights:
@@ -140,7 +141,7 @@ def _start_pdf_text(features: Features) -> str:
             along = "motion_back_unit(motion, d)" if moving else "d"
             density = f"{kind}_emit_pdf({row_text(features, kind)}, {along})"
         elif kind in shape_records.RECORDS:
-            even = f"(l.emission_mode != {ALONG}) & (dot3(n, d) > 0.0f)"
+            even = f"!{mode_text(ALONG)} & (dot3(n, d) > 0.0f)"
             density = f"sel({even}, max_r(dot3(n, d), (real)(1e-6f)) * INV_PI, (real)(0.0f))"
         cases.append(Case(kind_test(kind, present), density))
     head = "real light_start_pdf(Scene scene, integer row, LightRow l, vec3 n, vec3 d)"
@@ -155,7 +156,7 @@ def _aimed_text(features: Features) -> list[str]:
     if surfaces_of(features):
         rows += [
             "n = sel3(l.shape >= 0, r.n, n);",
-            f"chosen = sel_i(l.emission_mode == {ALONG}, (integer)(-1), chosen);",
+            f"chosen = sel_i({mode_text(ALONG)}, (integer)(-1), chosen);",
         ]
     rows.append("r = aim_turn(scene, chosen, r, n, v, &turned);")
     placed = [kind for kind in present if kind in PLACED]
@@ -179,7 +180,7 @@ def _aimed_text(features: Features) -> list[str]:
 _BACK = (
     "vec3 rest = motion_point_back(motion, p), along = motion_back_unit(motion, wi);",
     "vec3 front = motion_front_back(motion, n);",
-    "vec3 side = motion_back_unit(motion, receiver_hemisphere(receiver));",
+    "vec3 side = motion_back_unit(motion, receiver.hemisphere);",
     "real far = t * motion_length_back(motion, wi);",
 )
 
@@ -189,7 +190,7 @@ def _pdf_arguments(kind: str, moving: bool) -> str:
     if kind in shape_records.RECORDS:
         return "rest, along, far, front" if moving else "p, wi, t, n"
     if kind in INFINITE:
-        return "scene, side, along" if moving else "scene, receiver_hemisphere(receiver), wi"
+        return "scene, side, along" if moving else "scene, receiver.hemisphere, wi"
     return ""
 
 
@@ -219,11 +220,13 @@ def _surfaces_text(features: Features) -> list[str]:
     if features.motion.lights:
         rows.append("q = surface_point_moved(motion, q);")
     if features.lights.two_sided:
-        rows.append(f"q = surface_point_turned(q, l.emission_mode == {BOTH}, &v);")
+        rows.append(f"q = surface_point_turned(q, {mode_text(BOTH)}, &v);")
     return [
         *rows,
         "point.p = q.p;",
         "Spectrum value = emission_load(scene, l.radiance, point, lambdas);",
-        f"LightRay s = surface_emit(q, l.emission_mode == {ALONG}, value, v);",
+        f"LightRay s = surface_emit(q, {mode_text(ALONG)}, value, v);",
+        *(f"s.seen = spectrum_sel({mode_text(UNSEEN)}, spectrum_of(0.0f), s.seen);",)
+        * features.lights.unseen,
         "r = light_ray_sel(l.shape >= 0, s, r);",
     ]

@@ -1,7 +1,7 @@
-"""Lights on their way to the device: their rows, how often each is chosen, and the dispatch text.
+"""Lights on their way to the device: their rows, the alias table and the light tree.
 
-What is chosen is a row of `lights`: a lamp, a shape that is sampled as a whole, or one triangle of
-an emissive mesh or cube. Infinite lights come first, for the rays that leave the scene.
+A row of `lights` is a lamp, a shape that is sampled as a whole, a triangle of an emissive mesh or
+cube, or a part of a medium. Infinite lights come first, for the rays that leave the scene.
 """
 
 from __future__ import annotations
@@ -19,32 +19,34 @@ from clpt.records import LIGHT
 from clpt.render.geometry.find import Emitter
 from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights import tree as light_tree
-from clpt.render.lights.encode_bodies import BodyLight
-from clpt.render.lights.encode_bricks import BrickLights
-from clpt.render.lights.encode_placed import blank_row, lower_lamp
+from clpt.render.lights.bodies import BodyLight
+from clpt.render.lights.bricks import BrickLights
+from clpt.render.lights.encode_lamps import blank_row, lower_lamp
 from clpt.render.lights.find import Source, Sources, is_whole
+from clpt.render.lights.power import brightness
 from clpt.render.materials.encoder import Encoder
-from clpt.render.records.light_rows import ALONG, BOTH, FRONT, KINDS
+from clpt.render.records.light_rows import ALONG, BOTH, FRONT, KINDS, UNSEEN
 from clpt.render.records.lowering_cache import content
-from clpt.scene.lights import Area, DirectionalArea, Light
+from clpt.render.scene_index import SceneIndex
+from clpt.render.spectra.look import Look
+from clpt.scene.lights import Light, PoweredLamp
+from clpt.scene.params import fields_of
 
-PLACED_LIGHT_WEIGHT = (
-    6  # triangles that a light at a place of its own counts as, where a tree is thought of
-)
-INFINITE_SHARE = 0.5  # of the choices, where there are other lights too
+PLACED_LIGHT_WEIGHT = 6  # rows of a light at a separate place, to decide on a light tree
+INFINITE_SHARE = 0.5  # of the choices, beside other lights
 
 
 @dataclass(frozen=True)
 class LightRows:
-    """The table `lights` and what follows from it.
+    """The table `lights`, and what features and settings need to know of it.
 
-    rows: structured (n,) of LIGHT.dtype; power: (n,) float64, what each sends into the scene, in a
-    unit of all of them; radiance: the largest mean one of a shape [W m^-2 sr^-1 nm^-1]; infinite:
-    how many of the rows, the first ones, are infinite; kinds: those that occur, for
-    `dispatch_text`; first: per emitter, its first row; whole: per emitter, whether that one row
-    stands for all of it; visible: whether one is no delta light; two_sided: whether one shines from
-    the back of its shape too; bounds: of the rows of each lamp and emitter; tree: the words of the
-    tree that stand behind the rows, None where the alias table chooses.
+    rows: structured (n,) of LIGHT.dtype; power: (n,) float64 [W/nm]; radiance: the largest mean
+    radiance of a shape [W m^-2 sr^-1 nm^-1]; infinite: the number of infinite rows, the first of
+    all; kinds: present kinds, for `dispatch_text`; first: per emitter, its first row; whole: per
+    emitter, whether a single row stands for it; visible: whether rays see any; two_sided: whether
+    any shines from the back of its shape too; unseen: whether any shines from a shape, but no ray
+    sees it; bounds: of the rows of each source; tree: words of the light tree behind the rows, None
+    where the alias table chooses.
     """
 
     rows: np.ndarray
@@ -56,6 +58,7 @@ class LightRows:
     whole: tuple[bool, ...]
     visible: bool
     two_sided: bool
+    unseen: bool
     bounds: tuple[light_bounds.Bounds, ...]
     tree: NDArray[np.uint32] | None
 
@@ -66,57 +69,58 @@ def light_rows(
     encoder: Encoder,
     sources: Sources,
     tree_from: int | None = None,
-    volumes: Sequence[BrickLights | BodyLight] = (),
+    volumes: Sequence[tuple[int, BrickLights | BodyLight]] = (),
 ) -> LightRows:
     """Put the parameters of all lights into the tables, and make the rows of `lights`.
 
-    sources: what they send; tree_from: the number of rows from which a tree chooses among them, or
-    1 / PLACED_LIGHT_WEIGHT of it of lights at places; volumes: parts of media, whose rows follow
-    those of the lamps. Raises SceneError for a light that has no place.
+    tree_from: the least number of rows, or of separate lights times PLACED_LIGHT_WEIGHT, for a
+    light tree; volumes: lights of media with their medium's word; their rows follow the lamps'.
+    Raises SceneError for a light without a place.
     """
     if encoder.store.append("light_params", blank_row()) != 0:
         raise ValueError("`light_params` must be empty before the lights are put in")
     blocks = [_lamp_rows(lamps[i], encoder) for i in sources.order]
-    blocks += [_volume_rows(part, encoder) for part in volumes]
+    blocks += [_volume_rows(word, part, encoder) for word, part in volumes]
     blocks += [_emitter_rows(emitter, encoder) for emitter in emitters]
     every, infinite, power = sources.every, sources.infinite, sources.power
     rows = np.concatenate([np.zeros(0, LIGHT.dtype), *blocks])
     tree = None
     if len(rows):
         weights = _shared(power, infinite)
-        same = content(weights)
-        rows["pmf"], rows["keep"], rows["alias"] = encoder.cache(alias_table, weights, by=(same,))
+        by = content(weights)
+        rows["pmf"], rows["keep"], rows["alias"] = encoder.cache(alias_table, weights, by=(by,))
         if tree_from is not None and has_tree(every, tree_from):
             tree = _tree(every, encoder)
-    shine = (rows["shape"] >= 0) & (rows["emission_mode"] != ALONG)
+    shine = (rows["shape"] >= 0) & (rows["emission_mode"] & (ALONG | UNSEEN) == 0)
     return LightRows(
         rows=rows,
         power=power,
-        radiance=max((one.radiance for one in every), default=0.0),
+        radiance=max((source.radiance for source in every), default=0.0),
         infinite=infinite,
         kinds=tuple(KINDS[i] for i in sorted({*rows["kind"].tolist()})),
         first=sources.first,
         whole=tuple(is_whole(emitter.shape) for emitter in emitters),
         visible=infinite > 0 or bool(shine.any()),
-        two_sided=bool((rows["emission_mode"] == BOTH).any()),
-        bounds=tuple(one.bounds for one in every),
+        two_sided=bool((rows["emission_mode"] & BOTH).any()),
+        unseen=bool((rows["emission_mode"] & UNSEEN).any()),
+        bounds=tuple(source.bounds for source in every),
         tree=tree,
     )
 
 
 def has_tree(every: Sequence[Source], tree_from: int) -> bool:
-    """Whether there are so many lights; each at a place of its own counts for several."""
-    apart = sum(bool(one.bounds.placed.any()) for one in every)
-    return max(sum(len(one.power) for one in every), PLACED_LIGHT_WEIGHT * apart) >= tree_from
+    """Whether a light tree pays: for many rows, or for fewer separate lights with a place."""
+    separate = sum(bool(source.bounds.placed.any()) for source in every)
+    rows = sum(len(source.power) for source in every)
+    return max(rows, PLACED_LIGHT_WEIGHT * separate) >= tree_from
 
 
 def _tree(every: Sequence[Source], encoder: Encoder) -> NDArray[np.uint32]:
-    """The words of the tree over all lights."""
-    bounds = light_bounds.concatenated([one.bounds for one in every])
-    importance = np.concatenate([one.importance for one in every])
+    bounds = light_bounds.concatenated([source.bounds for source in every])
+    importance = np.concatenate([source.importance for source in every])
     by = content(importance, *bounds.arrays)
-    made: NDArray[np.uint32] = encoder.cache(_tree_words, bounds, importance, by=(by,))
-    return made
+    words: NDArray[np.uint32] = encoder.cache(_tree_words, bounds, importance, by=(by,))
+    return words
 
 
 def _tree_words(bounds: light_bounds.Bounds, importance: np.ndarray) -> NDArray[np.uint32]:
@@ -131,24 +135,20 @@ def _block(count: int, kind: str, params: ArrayLike, radiance: int, shape_row: i
 
 
 def _lamp_rows(lamp: Light, encoder: Encoder) -> np.ndarray:
-    """The row of a light that is not on a shape."""
-    made = lower_lamp(lamp, encoder)
-    return _block(1, made.kind, made.row, made.radiance, -1)
+    lowered = lower_lamp(lamp, encoder)
+    return _block(1, lowered.kind, lowered.row, lowered.radiance, -1)
 
 
-def _volume_rows(part: BrickLights | BodyLight, encoder: Encoder) -> np.ndarray:
-    """The rows of a medium that emits."""
-    at = part.rows(encoder)
+def _volume_rows(word: int, part: BrickLights | BodyLight, encoder: Encoder) -> np.ndarray:
+    at = part.rows(encoder, word)
     return _block(len(at), part.kind, at, 0, -1)
 
 
 def _emitter_rows(emitter: Emitter, encoder: Encoder) -> np.ndarray:
-    """The rows of a shape that emits."""
     shape = emitter.shape
     emission = shape.emission
-    assert isinstance(emission, (Area, DirectionalArea))
-    along = isinstance(emission, DirectionalArea)
-    value = emission.radiance if isinstance(emission, Area) else emission.irradiance
+    assert isinstance(emission, PoweredLamp)
+    value = fields_of(emission)[emission.emission_name]
     radiance = encoder.store.append("light_params", encoder.emission_words(value))
     kind = "triangle"
     if is_whole(shape):
@@ -163,18 +163,20 @@ def _emitter_rows(emitter: Emitter, encoder: Encoder) -> np.ndarray:
     count, words = geometry.shape
     at = encoder.store.append("geometry", geometry) + words * np.arange(count)
     rows = _block(count, kind, at, radiance, emitter.shape_row)
-    rows["emission_mode"] = ALONG if along else BOTH if emission.two_sided else FRONT
+    along = emission.kind == "directional_area"
+    mode = ALONG if along else BOTH if emission.two_sided else FRONT
+    rows["emission_mode"] = mode | (0 if emission.visible else UNSEEN)
     return rows
 
 
 def _triangle_rows(vertices: Points, faces: Faces, keys: int) -> NDArray[np.uint32]:
-    """Rows of `Triangle` (m, 10 k) uint32 of faces: one for each of k keys, side by side."""
+    """Return rows of `Triangle` (m, 10 k) uint32 of faces: k keys side by side."""
     rows = [triangles.triangle_rows(vertices, faces + np.uint32(i)) for i in range(keys)]
     return np.ascontiguousarray(np.hstack(rows))
 
 
 def _shared(weights: np.ndarray, infinite: int) -> np.ndarray:
-    """Weights with the infinite lights' share fixed where there are others; even if all are 0."""
+    """Return weights with INFINITE_SHARE for infinite lights beside others; even if all are 0."""
     ours, others = weights[:infinite].sum(), weights[infinite:].sum()
     if not ours + others > 0.0:
         return np.ones_like(weights)
@@ -190,7 +192,7 @@ def alias_table(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
     """Return pmf, keep and alias (n,) to choose a row by its weight (Vose 1991).
 
-    Row i of n, chosen evenly, is kept with probability keep[i], else alias[i] is taken.
+    A uniform row i of n is kept with probability keep[i], else alias[i] is taken.
     """
     weights = np.asarray(weights, np.float64)
     pmf = weights / weights.sum()
@@ -205,3 +207,27 @@ def alias_table(
         if left[j] < 1.0:
             small.append(large.pop())
     return pmf.astype(np.float32), np.array(keep, np.float32), np.array(alias, np.int32)
+
+
+def light_level(
+    index: SceneIndex, lights: LightRows, sphere: tuple[NDArray[np.float64], float]
+) -> float:
+    """Estimate the largest radiance that the camera may see [W m^-2 sr^-1 nm^-1].
+
+    The largest of the radiance of emitting shapes and media, and of the light of all lights spread
+    evenly over the scene. sphere: centre and radius around the scene [m]. 0 where nothing emits,
+    or nothing whose values the host knows.
+    """
+    centre, radius = sphere
+    arrives = 0.0
+    if lights.bounds:
+        bounds = light_bounds.concatenated(list(lights.bounds))
+        away = np.square((bounds.low + bounds.high) / 2.0 - centre).sum(axis=1)
+        square = np.where(bounds.placed, np.maximum(away, radius**2), radius**2)
+        arrives = float((lights.power / (4.0 * np.pi * square)).sum())
+    look = Look.of(index.film)
+    media = [medium.light for medium in index.emitting if medium.light is not None]
+    glow = [brightness(light, look) * radius for light in media]
+    ambient = index.integrator.ambient
+    around = 0.0 if ambient is None else brightness(ambient, look)
+    return max(lights.radiance, arrives, around, *glow)

@@ -1,4 +1,4 @@
-"""Power and place of each light of a scene, before it has a row in the tables."""
+"""All lights of a scene: power, bounds and importance, before they have rows in the tables."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights import images as image_lights
 from clpt.render.lights import power as light_power
 from clpt.render.lights import sky as sky_light
+from clpt.render.lights.bodies import BodyLight, volume_lights
 from clpt.render.lights.bounds import Bounds
-from clpt.render.lights.bricks import Glow
-from clpt.render.lights.glow import GlowingBody, glows
-from clpt.render.lights.triangle_means import triangle_means
+from clpt.render.lights.bricks import BrickLights
+from clpt.render.lights.power import triangle_means
 from clpt.render.records.light_rows import INFINITE
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
 from clpt.scene import lights
-from clpt.scene.lights import Area, DirectionalArea, Light
+from clpt.scene.lights import Light, PoweredLamp
 from clpt.scene.media import Medium
 from clpt.scene.params import fields_of, params
 from clpt.scene.roles import EMISSION
@@ -39,10 +39,10 @@ Around: TypeAlias = Callable[[int | Emitter, light_bounds.Bounds], light_bounds.
 
 @dataclass(frozen=True)
 class Source:
-    """The light that the rows of a lamp, of a medium or of a shape send.
+    """The light of the rows of a lamp, a medium or a shape.
 
-    power (n,) [W/nm]; bounds (n): where rows are and shine; importance (n,): how much they count in
-    a tree; radiance: of a shape, the largest mean one [W m^-2 sr^-1 nm^-1].
+    power (n,) [W/nm]; bounds (n); importance (n,): weight in a light tree; radiance: the largest
+    mean radiance of a shape [W m^-2 sr^-1 nm^-1].
     """
 
     power: NDArray[np.float64]
@@ -55,14 +55,15 @@ class Source:
 class Sources:
     """All lights of a scene.
 
-    order: as `row_order`; lamps: in that order; glows: the lights that each medium is that
-    emits; media: of these; emitters: shapes. Their rows follow one another.
+    order: as `row_order`; infinite: number of infinite lamps; lamps: in that order; volumes: the
+    lights of each emitting medium; media: their sources; emitters: shapes. Rows stand in this
+    order.
     """
 
     order: tuple[int, ...]
     infinite: int
     lamps: tuple[Source, ...]
-    glows: dict[Medium, Glow | GlowingBody]
+    volumes: dict[Medium, BrickLights | BodyLight]
     media: tuple[Source, ...]
     emitters: tuple[Source, ...]
 
@@ -73,32 +74,32 @@ class Sources:
 
     @cached_property
     def power(self) -> NDArray[np.float64]:
-        """The power that each row sends (n,) [W/nm]."""
-        return np.concatenate([np.zeros(0), *(one.power for one in self.every)])
+        """The power of each row (n,) [W/nm]."""
+        return np.concatenate([np.zeros(0), *(source.power for source in self.every)])
 
     @cached_property
     def first(self) -> tuple[int, ...]:
         """The first row of each emitter."""
-        ends = np.cumsum([0, *(len(one.power) for one in self.every)])
+        ends = np.cumsum([0, *(len(source.power) for source in self.every)])
         return tuple(int(i) for i in ends[len(self.lamps) + len(self.media) : -1])
 
 
 def row_order(lamps: Sequence[Light]) -> list[int]:
-    """Return the index of each light that is no shape, in the order of their rows: infinite first.
+    """Return the indices of lights off all shapes in the order of their rows: infinite first.
 
-    Each of them has one row; those of emitters follow.
+    Each has a single row; the rows of emitters follow.
     """
     return sorted(range(len(lamps)), key=lambda i: lamps[i].kind not in INFINITE)
 
 
 def sources_of(index: SceneIndex, geometry: Geometry, scene_radius: float, look: Look) -> Sources:
-    """Return what the lights of a scene send; scene_radius: of a sphere around it [m].
+    """Return the sources of a scene; scene_radius: of a sphere around it [m].
 
-    Raises SceneError for a light that has no place, and for an image that is none.
+    Raises SceneError for a light without a place, and for an image that cannot be read.
     """
-    found = glows(index, look)
+    volumes = volume_lights(index, look)
     around = _around(index, geometry) if index.motions else None
-    return measured(index.lights, geometry.emitters, scene_radius, look, found, around)
+    return measured(index.lights, geometry.emitters, scene_radius, look, volumes, around)
 
 
 def measured(
@@ -106,48 +107,48 @@ def measured(
     emitters: Sequence[Emitter],
     scene_radius: float,
     look: Look,
-    glows: dict[Medium, Glow | GlowingBody] | None = None,
+    volumes: dict[Medium, BrickLights | BodyLight] | None = None,
     around: Around = None,
 ) -> Sources:
-    """Return what lamps, shapes and media send.
+    """Return the sources of lamps, shapes and media.
 
-    glows: the lights that media are; around: makes bounds of a lamp (by its index) or emitter hold
+    volumes: the lights of media; around: widens bounds of a lamp (by its index) or emitter to hold
     while it moves.
     """
     order = row_order(lamps)
-    glows = glows or {}
-    made = [_of_lamp(lamps[i], scene_radius, look) for i in order]
-    media = [_of_medium(glow) for glow in glows.values()]
-    shining = [_of_emitter(emitter, look) for emitter in emitters]
+    volumes = volumes or {}
+    of_lamps = [_of_lamp(lamps[i], scene_radius, look) for i in order]
+    media = [_of_volume(part) for part in volumes.values()]
+    of_emitters = [_of_emitter(emitter, look) for emitter in emitters]
     if around is not None:
-        made = [_moved(one, around(i, one.bounds)) for i, one in zip(order, made, strict=True)]
-        shining = [
-            _moved(one, around(light, one.bounds))
-            for light, one in zip(emitters, shining, strict=True)
+        of_lamps = [
+            replace(source, bounds=around(i, source.bounds))
+            for i, source in zip(order, of_lamps, strict=True)
+        ]
+        of_emitters = [
+            replace(source, bounds=around(emitter, source.bounds))
+            for emitter, source in zip(emitters, of_emitters, strict=True)
         ]
     infinite = sum(lamps[i].kind in INFINITE for i in order)
-    return Sources(tuple(order), infinite, tuple(made), glows, tuple(media), tuple(shining))
-
-
-def _moved(one: Source, bounds: Bounds) -> Source:
-    return replace(one, bounds=bounds)
+    return Sources(
+        tuple(order), infinite, tuple(of_lamps), volumes, tuple(media), tuple(of_emitters)
+    )
 
 
 def is_whole(shape: Shape) -> bool:
-    """Return whether a shape is sampled as one light; a mesh and a cube are many."""
+    """Return whether a shape is sampled as a single light; a mesh and a cube have many rows."""
     return shape.kind in shape_records.RECORDS
 
 
 def emissions_of(lamp: Light) -> dict[str, Any]:
     """Return the values of a light's emission parameters."""
-    given, declared = fields_of(lamp), params(type(lamp)).items()
-    return {name: given[name] for name, param in declared if param.role is EMISSION}
+    values, declared = fields_of(lamp), params(type(lamp)).items()
+    return {name: values[name] for name, param in declared if param.role is EMISSION}
 
 
 def _of_lamp(lamp: Light, scene_radius: float, look: Look) -> Source:
-    """Return the source of a light that is not on a shape."""
     if isinstance(lamp, (lights.Envmap, lights.CubeMap)):
-        strength = image_lights.mean_radiance(lamp, image_lights.content(lamp, look))
+        strength = image_lights.mean_radiance(image_lights.content(lamp, look))
     elif isinstance(lamp, lights.Sky):
         strength = sky_light.content(lamp, look).strength
     else:
@@ -158,36 +159,18 @@ def _of_lamp(lamp: Light, scene_radius: float, look: Look) -> Source:
     return Source(np.array([power]), light_bounds.of_lamp(lamp), np.array([counts]))
 
 
-def _of_medium(glow: Glow | GlowingBody) -> Source:
-    """Return the source of the bricks of a medium, or of a whole one."""
-    if isinstance(glow, GlowingBody):
-        power, middle, reach = np.array([glow.power]), glow.matrix[:, 3], glow.reach
-        return Source(power, _all_around((middle - reach)[None], (middle + reach)[None]), power)
-    low = glow.corners + np.minimum(glow.edges, 0.0).sum(axis=1)
-    high = glow.corners + np.maximum(glow.edges, 0.0).sum(axis=1)
-    return Source(glow.power, _all_around(low, high), glow.power)
-
-
-def _all_around(low: NDArray[np.float64], high: NDArray[np.float64]) -> Bounds:
-    """Boxes (n, 3) of what shines in all directions."""
-    count = len(low)
-    return Bounds(
-        low, high, 0.5 * (low + high),
-        np.tile([0.0, 0.0, 1.0], (count, 1)),
-        np.full(count, np.pi), np.full(count, np.pi / 2.0), np.full(count, False),
-        np.full(count, True),
-    )  # fmt: skip
+def _of_volume(part: BrickLights | BodyLight) -> Source:
+    power = np.atleast_1d(part.power)
+    return Source(power, part.bounds, power)
 
 
 def _of_emitter(emitter: Emitter, look: Look) -> Source:
-    """Return the source of a shape that emits."""
     shape, cache = emitter.shape, look.cache
     emission = shape.emission
-    assert isinstance(emission, (Area, DirectionalArea))
-    along = isinstance(emission, DirectionalArea)
-    both = not along and emission.two_sided
-    value = emission.radiance if isinstance(emission, Area) else emission.irradiance
-    strength = 1.0 if along else 2.0 * np.pi if both else np.pi
+    assert isinstance(emission, PoweredLamp)
+    both = emission.two_sided
+    value = fields_of(emission)[emission.emission_name]
+    strength = emission.extent(1.0)  # power of a square metre whose emission is 1
     if is_whole(shape):
         bright = light_power.brightness(value, look)
         power = np.array([strength * analytic.area(shape) * bright])
@@ -199,40 +182,40 @@ def _of_emitter(emitter: Emitter, look: Look) -> Source:
         return Source(power, light_bounds.of_balls(emitter.vertices), power, bright)
     if emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
-    given = emitter.vertices, emitter.faces, emitter.keys
+    mesh = emitter.vertices, emitter.faces, emitter.keys
     by_face = _face_attributes(shape, value)
     if by_face:
         means = triangle_means(value, look, emitter.uvs, emitter.faces, by_face)
     else:
-        own = value, emitter.uvs, emitter.faces
+        textured = value, emitter.uvs, emitter.faces
         seen = look.spectral, look.lo, look.hi, look.unseen
-        means = cache(triangle_means, value, look, *own[1:], by=(*own, *seen))
-    power = strength * cache(_triangle_areas, *given) * means
-    bounds = cache(_triangle_bounds, *given, both)
+        means = cache(triangle_means, value, look, *textured[1:], by=(*textured, *seen))
+    power = strength * cache(_triangle_areas, *mesh) * means
+    bounds = cache(_triangle_bounds, *mesh, both)
     return Source(power, bounds, power, float(means.max(initial=0.0)))
 
 
 def _face_attributes(shape: Shape, value: object) -> dict[str, NDArray[np.float32]]:
-    """Return the attributes of a shape's triangles that its emission reads, by their names."""
-    names = {one.name for one in textures_in(value) if isinstance(one, MeshAttribute)}
+    """Return the attributes that an emission reads at a shape's triangles, by their names."""
+    names = {texture.name for texture in textures_in(value) if isinstance(texture, MeshAttribute)}
     return {name: triangles.attribute(shape, name) for name in names if triangles.per_face(name)}
 
 
 def _triangle_areas(vertices: Points, faces: Faces, keys: int) -> NDArray[np.float64]:
-    """The mean area over all keys (m,) [m^2]: by it triangles are chosen, at any time alike."""
+    """Return the mean area over all keys (m,) [m^2]: triangles are chosen alike at any time."""
     areas = (triangles.triangle_areas(vertices, faces + np.uint32(i)) for i in range(keys))
     return np.asarray(sum(areas) / keys)
 
 
 def _triangle_bounds(vertices: Points, faces: Faces, keys: int, two_sided: bool) -> Bounds:
-    """Bounds (m) that hold at all times: between two keys a triangle is in the box around both."""
+    """Return bounds (m) for all times: between two keys a triangle is in the box around both."""
     first, *others = (
         light_bounds.of_triangles(vertices, faces + np.uint32(i), two_sided) for i in range(keys)
     )
     if not others:
         return first
-    low = np.minimum.reduce([first.low, *(one.low for one in others)])
-    return first.within(low, np.maximum.reduce([first.high, *(one.high for one in others)]))
+    low = np.minimum.reduce([first.low, *(bounds.low for bounds in others)])
+    return first.within(low, np.maximum.reduce([first.high, *(bounds.high for bounds in others)]))
 
 
 def _around(index: SceneIndex, geometry: Geometry) -> Around:

@@ -1,9 +1,8 @@
 """Images around the scene: texels, and a grid to choose directions by.
 
-A grid has a weight at every corner of its cells and is bilinear inside them; it follows radiance
-times solid angle. Cells are chosen by blocks, see clpt.render.lights.block_grids, points
-in a cell by the bilinear function itself (kernels/core/grid.cl).
-"""
+A grid has a weight, radiance times solid angle, at every corner of its cells and is bilinear inside
+them. Cells are chosen by blocks, see clpt.render.lights.block_grids; points in a cell by the
+bilinear function itself (kernels/core/grid.cl)."""
 
 from __future__ import annotations
 
@@ -15,24 +14,27 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import images, transforms
-from clpt.arrays import Floats32, fits_single
+from clpt import images
+from clpt.arrays import Floats32
 from clpt.errors import SceneError
 from clpt.images import spectral_exr
 from clpt.images.spectral_exr import SpectralImage
 from clpt.render.lights import block_grids
+from clpt.render.lights.block_grids import grid_members
+from clpt.render.lights.check import rotation
+from clpt.render.materials.encoder import Encoder
 from clpt.render.records.lowering_cache import version
 from clpt.render.spectra.look import Look
 from clpt.render.textures.texels import bands, texels
-from clpt.scene.lights import CubeMap, Envmap, Sky
+from clpt.scene.lights import CubeMap, Envmap
 from clpt.scene.roles import EMISSION
 from clpt.spectra import Tabulated, luminance
 
-PARTS = 128  # of an image's side, in which bright directions are told from dark ones
-UNSEEN = 0.1  # share of the mean over bands in the weight of a texel: light of no colour counts too
+PARTS = 128  # of an image's side: resolution at which bright and dark directions are separated
+UNSEEN = 0.1  # share of the mean over bands in a texel's weight: invisible light counts too
 
 FACES = "+x -x +y -y +z -z"
-# Columns and rows of the faces in crosses of 4x3 and 3x4; the last one stands on its head.
+# Columns and rows of the faces in crosses of 4x3 and 3x4; the last face is upside down.
 _WIDE = ((2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (3, 1))
 _TALL = ((2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (1, 3))
 
@@ -40,9 +42,8 @@ _TALL = ((2, 1), (0, 1), (1, 0), (1, 2), (1, 1), (1, 3))
 class Content(NamedTuple):
     """An image light as texels, and cells to choose among by their mean weights.
 
-    grid: how blocks of cells and the cells in them are chosen; bands, number: of texels that are
-    spectra, how many values they have, and which one by wavelength; notes: warnings of parts of
-    files that are left out.
+    grid: chooses blocks of cells and cells in them; bands: values of a spectral texel;
+    number: of the band by wavelength; notes: warnings of ignored parts of files.
     """
 
     width: int
@@ -56,17 +57,17 @@ class Content(NamedTuple):
 
 
 def extent(lamp: Envmap | CubeMap, look: Look, share: float) -> float:
-    """Return the part of the sphere, 0 to 1, that sends a share of an image light's power.
+    """Return the fraction of the sphere, 0 to 1, whose light is a share of an image light's power.
 
-    It has the brightest directions, and is 1 of a black image. It is counted in blocks, PARTS
-    along each side of an image.
+    The brightest directions count first, in blocks, PARTS along each side of an image. 1 for a
+    black image.
     """
-    made = content(lamp, look)
-    if isinstance(lamp, Envmap):
-        even = _even(made.corners)
+    image = content(lamp, look)
+    if len(image.corners) == 1:
+        even = _even(image.corners)
     else:
-        even = _cube_weights(np.ones((6, made.height + 2, made.width + 2), np.float32))
-    power, angle = _in_parts(made.corners), _in_parts(even)
+        even = _cube_weights(np.ones((6, image.height + 2, image.width + 2), np.float32))
+    power, angle = _in_parts(image.corners), _in_parts(even)
     brightest = np.argsort(-power / angle)
     sums = np.cumsum(power[brightest])
     if not sums[-1] > 0.0:
@@ -76,7 +77,7 @@ def extent(lamp: Envmap | CubeMap, look: Look, share: float) -> float:
 
 
 def _in_parts(weights: NDArray[Any]) -> NDArray[np.float64]:
-    """Sums (n,) over the blocks of grids (k, rows, columns)."""
+    """Return sums (n,) over the blocks of grids (k, rows, columns)."""
     sums = weights
     for axis in (2, 1):
         length = weights.shape[axis]
@@ -85,38 +86,38 @@ def _in_parts(weights: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def content(lamp: Envmap | CubeMap, look: Look) -> Content:
-    """Return what an image light is made of, found once. Raises SceneError for what is no image."""
-    given = lamp.image, lamp.scale, look.spectral
-    by = version(lamp.image), *given[1:]
+    """Return an image light's content, cached. Raises SceneError for an unreadable image."""
+    source = lamp.image, lamp.scale, look.spectral
+    by = version(lamp.image), *source[1:]
     if isinstance(lamp, CubeMap):
-        return look.cache(_cube, *given, by=by)
+        return look.cache(_cube, *source, by=by)
     ends = look.lo, look.hi, lamp.mis_compensation
-    return look.cache(_sphere, *given, *ends, by=(*by, *ends))
+    return look.cache(_sphere, *source, *ends, by=(*by, *ends))
 
 
-def mean_radiance(lamp: Envmap | CubeMap, made: Content) -> float:
+def mean_radiance(image: Content) -> float:
     """Return the mean over all directions of an image light's radiance."""
-    if isinstance(lamp, Envmap):
-        cell = np.pi / (made.height - 1) * 2.0 * np.pi / made.width
+    if len(image.corners) == 1:
+        cell = np.pi / (image.height - 1) * 2.0 * np.pi / image.width
     else:
-        cell = made.width**-2.0
-    return made.grid.total * cell / (4.0 * np.pi)
+        cell = image.width**-2.0
+    return image.grid.total * cell / (4.0 * np.pi)
 
 
 def _sphere(
-    given: object, scale: float, spectral: bool, lo: float, hi: float, compensated: bool
+    source: object, scale: float, spectral: bool, lo: float, hi: float, compensated: bool
 ) -> Content:
-    """An image in latitude and longitude, its spectra from lo to hi [nm].
+    """Return an image in latitude and longitude, with spectra from lo to hi [nm].
 
-    compensated: its directions are chosen for what a material's own do not find.
+    compensated: directions are chosen for light that sampling of materials misses.
     """
     where = "envmap.image"
-    found = spectral_exr.find(given, emissive=True, where=where)
+    spectra = spectral_exr.find(source, emissive=True, where=where)
     notes: list[str] = []
-    image = _loaded(given if found is None else found.to_rgb(), where, notes)
+    image = _loaded(source if spectra is None else spectra.to_rgb(), where, notes)
     image = _at_least_two_rows(image * np.float32(scale))
     height, width, _ = image.shape
-    if found is None or not spectral:
+    if spectra is None or not spectral:
         corners = _latitude_weights(_brightness(image))[None]
         values = texels(image.reshape(1, -1, 3), EMISSION, spectral)
         return Content(
@@ -127,29 +128,28 @@ def _sphere(
             _sphere_blocks(corners, compensated),
             notes=tuple(notes),
         )
-    found = _scaled(found, scale, where)
-    corners = _latitude_weights(luminance(image) + UNSEEN * _brightness(found.values))[None]
-    values, number = bands(found, lo, hi)
+    spectra = _scaled(spectra, scale, where)
+    corners = _latitude_weights(luminance(image) + UNSEEN * _brightness(spectra.values))[None]
+    values, number = bands(spectra, lo, hi)
     grid = _sphere_blocks(corners, compensated)
     return Content(width, height, values, corners, grid, values.shape[1], number)
 
 
 def _sphere_blocks(corners: NDArray[Any], compensated: bool) -> block_grids.BlockGrid:
-    """The blocks of weights (1, h, w + 1); compensated: as of `_sphere`."""
     directions = partial(sphere_directions, corners.shape[2] - 1)
     return block_grids.of(corners, directions, even=_even(corners) if compensated else None)
 
 
 def _even(corners: NDArray[Any]) -> NDArray[Any]:
-    """The weights of a light that is 1 everywhere, of the shape of those of an image."""
+    """Return the weights of a light of radiance 1, in the shape of an image's weights."""
     column = _latitude_weights(np.ones((corners.shape[1], 1), np.float32))[None, :, :1]
     return np.broadcast_to(column, corners.shape)
 
 
-def _cube(given: object, scale: float, spectral: bool) -> Content:
-    """The faces of a cube, with their borders."""
+def _cube(source: object, scale: float, spectral: bool) -> Content:
+    """Return the faces of a cube, with their borders."""
     notes: list[str] = []
-    faces = _faces(given, "cube_map.image", notes) * np.float32(scale)
+    faces = _faces(source, "cube_map.image", notes) * np.float32(scale)
     image, size = _bordered(faces), faces.shape[1]
     corners = _cube_weights(_brightness(image))
     values = texels(image.reshape(1, -1, 3), EMISSION, spectral)
@@ -157,25 +157,13 @@ def _cube(given: object, scale: float, spectral: bool) -> Content:
     return Content(size, size, values, corners, grid, notes=tuple(notes))
 
 
-def axes_of(lamp: Envmap | CubeMap | Sky) -> NDArray[np.float64]:
-    """Return where the light's own axes point, the columns of (3, 3)."""
-    matrix = np.asarray(lamp.to_world, np.float64)
-    where = f"{lamp.kind}.to_world"
-    if matrix.shape != (4, 4) or transforms.is_singular(matrix) or not fits_single(matrix):
-        raise SceneError("must be an invertible (4, 4) matrix", where=where)
-    axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
-    if np.abs(axes.T @ axes - np.eye(3)).max() > 1e-5:
-        raise SceneError("must be a rotation: this one shears", where=where)
-    return axes
-
-
 def _at_least_two_rows(values: Floats32) -> Floats32:
-    """An image (h, w, n) with a row for each pole."""
+    """Return an image (h, w, n) with a row for each pole."""
     return np.repeat(values, 2, axis=0) if len(values) == 1 else values
 
 
 def _scaled(image: SpectralImage, scale: float, where: str) -> SpectralImage:
-    """An image of spectra as a light's texels. Raises SceneError if a value is not finite."""
+    """Return an image of spectra times a scale. Raises SceneError if a value is not finite."""
     values = _at_least_two_rows(image.values * np.float32(scale))
     if not np.isfinite(values).all():
         raise SceneError("has a texel that is not finite", where=where)
@@ -183,9 +171,9 @@ def _scaled(image: SpectralImage, scale: float, where: str) -> SpectralImage:
 
 
 def _loaded(image: object, where: str, notes: list[str]) -> Floats32:
-    """An image as (h, w, 3) float32 without negative values. Raises SceneError.
+    """Return an image as (h, w, 3) float32 without negative values. Raises SceneError.
 
-    notes: gets what its file says that is left out.
+    notes: warnings of ignored parts of its file are appended.
     """
     if spectral_exr.find(image, emissive=True, where=where) is not None:
         raise SceneError("spectral images can be an envmap only", where=where)
@@ -203,7 +191,7 @@ def _loaded(image: object, where: str, notes: list[str]) -> Floats32:
 
 
 def _faces(image: object, where: str, notes: list[str]) -> Floats32:
-    """The six faces of a cube map (6, n, n, 3), in the order of FACES; notes: as of `_loaded`."""
+    """Return the faces of a cube map (6, n, n, 3), in the order of FACES; notes: see `_loaded`."""
     if isinstance(image, (list, tuple)) or (isinstance(image, np.ndarray) and image.ndim == 4):
         if len(image) != 6:
             raise SceneError(f"six faces are needed ({FACES}), found {len(image)}", where=where)
@@ -229,18 +217,22 @@ def _faces(image: object, where: str, notes: list[str]) -> Floats32:
 
 
 def face_directions(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
-    """Directions (6, ..., 3), not normalised, at face coordinates: a to the right, b down, [-1, 1].
+    """Return directions (6, ..., 3), not normalised, at face coordinates in [-1, 1].
+
+    a runs to the right, b down.
 
     OpenGL's cube map (OpenGL 4.6 core, table 8.19).
     """
     a, b = np.broadcast_arrays(np.asarray(a, np.float64), np.asarray(b, np.float64))
-    one = np.ones_like(a)
-    rows = [(one, -b, -a), (-one, -b, a), (a, one, b), (a, -one, -b), (a, -b, one), (-a, -b, -one)]
+    unit = np.ones_like(a)
+    rows = [
+        (unit, -b, -a), (-unit, -b, a), (a, unit, b), (a, -unit, -b), (a, -b, unit), (-a, -b, -unit)
+    ]  # fmt: skip
     return np.stack([np.stack(row, axis=-1) for row in rows])
 
 
 def sphere_directions(width: int, row: ArrayLike, column: ArrayLike) -> NDArray[np.float64]:
-    """Directions (..., 3) at places of a grid in latitude and longitude, rows and columns 0 to 1.
+    """Return directions (..., 3) at points of a latitude-longitude grid, rows and columns 0 to 1.
 
     The grid begins in the middle of the first of `width` texels.
     """
@@ -251,7 +243,7 @@ def sphere_directions(width: int, row: ArrayLike, column: ArrayLike) -> NDArray[
 
 
 def cube_directions(row: ArrayLike, column: ArrayLike) -> NDArray[np.float64]:
-    """Directions (..., 3) at places of six faces, one below the other, rows and columns 0 to 1."""
+    """Return directions (..., 3) at points of six stacked faces, rows and columns 0 to 1."""
     within, face = np.modf(np.minimum(6.0 * np.asarray(row, np.float64), 5.999999))
     d = face_directions(2.0 * np.asarray(column) - 1.0, 2.0 * within - 1.0)
     d = np.take_along_axis(d, face.astype(np.int64)[None, ..., None], axis=0)[0]
@@ -259,7 +251,7 @@ def cube_directions(row: ArrayLike, column: ArrayLike) -> NDArray[np.float64]:
 
 
 def face_coordinates(d: ArrayLike) -> tuple[NDArray[np.int64], Any, Any]:
-    """The face that a direction (..., 3) meets, and a and b there."""
+    """Return the face that a direction (..., 3) meets, and the coordinates a and b there."""
     x, y, z = np.moveaxis(np.asarray(d, np.float64), -1, 0)
     major = np.argmax(np.abs([x, y, z]), axis=0)
     size = np.choose(major, np.abs([x, y, z]))
@@ -271,7 +263,7 @@ def face_coordinates(d: ArrayLike) -> tuple[NDArray[np.int64], Any, Any]:
 
 
 def _bordered(faces: Floats32) -> Floats32:
-    """The faces (6, n + 2, n + 2, 3) with the nearest texels of their neighbours around them."""
+    """Return faces (6, n + 2, n + 2, 3), bordered by the nearest texels of their neighbours."""
     n = faces.shape[1]
     centers = (np.arange(-1, n + 1) + 0.5) / n * 2.0 - 1.0
     around = np.ones((n + 2, n + 2), bool)
@@ -286,13 +278,13 @@ def _bordered(faces: Floats32) -> Floats32:
 
 
 def _brightness(image: Floats32) -> Floats32:
-    """The mean over the last axis; a product is many times faster than a sum over few."""
+    """Return the mean over the last axis; a product is faster than a sum over few values."""
     count = image.shape[-1]
     return image @ np.full(count, 1.0 / count, np.float32)
 
 
 def _latitude_weights(bright: Floats32) -> Floats32:
-    """Weights (h, w + 1) at the texels' centres; the first column comes again at the end."""
+    """Return weights (h, w + 1) at texels' centres; the last column repeats the first."""
     height, width = bright.shape
     rows = np.arange(height, dtype=np.float64)
     rows[0], rows[-1] = 0.25, height - 1.25  # the poles have no area, but light comes from there
@@ -304,7 +296,7 @@ def _latitude_weights(bright: Floats32) -> Floats32:
 
 
 def _cube_weights(bright: Floats32) -> NDArray[np.float64]:
-    """Weights (6, 2n + 1, 2n + 1) at the texels' edges and centres, of bordered faces."""
+    """Return weights (6, 2n + 1, 2n + 1) of bordered faces at texels' edges and centres."""
     n = bright.shape[1] - 2
     wide = np.empty((6, 2 * n + 1, n + 2))
     wide[:, 1::2], wide[:, ::2] = bright[:, 1:-1], 0.5 * (bright[:, 1:] + bright[:, :-1])
@@ -315,8 +307,28 @@ def _cube_weights(bright: Floats32) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=2)
 def _cube_angles(n: int) -> NDArray[np.float64]:
-    """Solid angles (2n + 1, 2n + 1) of equal areas at the places of `_cube_weights`, on a scale."""
+    """Return relative solid angles (2n + 1, 2n + 1) of equal areas at points of `_cube_weights`."""
     at = np.linspace(-1.0, 1.0, 2 * n + 1)
     angles = (1.0 + at[None, :] ** 2 + at[:, None] ** 2) ** -1.5
     angles.flags.writeable = False
     return np.asarray(angles, np.float64)
+
+
+def lower_image(lamp: Envmap | CubeMap, encoder: Encoder) -> dict[str, ArrayLike]:
+    """Put an image light's texels and grid into the tables; return its members.
+
+    A spectral image has the member `bands`. Raises SceneError for an image that cannot be read, or
+    a transform that is no rotation.
+    """
+    axes, image = rotation(lamp), content(lamp, encoder.look)
+    encoder.warnings.update(image.notes)
+    members: dict[str, ArrayLike] = {name: axes[:, i] for i, name in enumerate("xyz")}
+    members |= {
+        "width": image.width,
+        "height": image.height,
+        "texels": encoder.store.append_floats("texels", image.texels),
+        **grid_members(image.corners, image.grid, encoder),
+    }
+    if image.number is not None:
+        members |= {"bands": image.bands, "number": encoder.spectra.row(image.number)}
+    return members

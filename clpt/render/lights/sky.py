@@ -1,4 +1,4 @@
-"""The sky as a light: its images as texels, and grids to choose directions by."""
+"""The sky as a light: its images as texels, grids to choose directions by, and its record."""
 
 from __future__ import annotations
 
@@ -7,13 +7,16 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats
 from clpt.device import kept_arrays
 from clpt.images.spectral_exr import SpectralImage
 from clpt.render.lights import block_grids
 from clpt.render.lights import images as image_lights
+from clpt.render.lights.block_grids import grid_members
+from clpt.render.lights.check import rotation
+from clpt.render.materials.encoder import Encoder
 from clpt.render.spectra.look import Look
 from clpt.render.textures.texels import bands, texels
 from clpt.scene.lights import Sky
@@ -36,7 +39,11 @@ MOST = 0.75  # share of samples that the sun may take
 
 
 class Content(NamedTuple):
-    """The radiance of a sky: texels (n, bands or 4), the disc's too, and the grid to choose by."""
+    """The radiance of a sky.
+
+    texels, sun (n, bands or 4): of the dome and of the sun's disc; number: band by wavelength of
+    spectra; corners, grid: to choose directions by; sun_share: of samples; strength: mean radiance.
+    """
 
     texels: NDArray[np.float32]
     sun: NDArray[np.float32]
@@ -48,18 +55,18 @@ class Content(NamedTuple):
 
 
 def sun_share(lamp: Sky, look: Look) -> float:
-    """Return the share of a sky's samples that its disc gets, 0 where the sun has set."""
+    """Return the share of a sky's samples at the sun's disc, 0 after sunset."""
     return content(lamp, look).sun_share
 
 
 def content(lamp: Sky, look: Look) -> Content:
-    """Return the radiance of a sky, found once."""
-    given = *dome.numbers(lamp), look.spectral, look.lo, look.hi
-    return look.cache(_content, *given, by=(repr(given),))
+    """Return the radiance of a sky, cached."""
+    source = *dome.numbers(lamp), look.spectral, look.lo, look.hi
+    return look.cache(_content, *source, by=(repr(source),))
 
 
 def kept(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats, Floats]:
-    """Return what `dome.unscaled` does, from the cache folder where it is there."""
+    """Return the arrays of `dome.unscaled`, from the cache folder if possible."""
     code = *Path(dome.__file__).parent.glob("*.py"), Path(air.__file__)
     tables = (data.ROOT / name for name in ("sky.csv", "air.csv"))
     around, disc = kept_arrays.kept(dome.unscaled, numbers, ground, files=(*code, *tables))
@@ -69,7 +76,7 @@ def kept(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats,
 def _content(
     numbers: tuple[float, ...], ground: tuple[float, ...], spectral: bool, lo: float, hi: float
 ) -> Content:
-    """The tables of a sky; its spectra from lo to hi [nm]."""
+    """Return the content of a sky, with spectra from lo to hi [nm]."""
     around, sun = dome.images(kept, numbers, ground)
     at = horizon(numbers[1])
     flat = (f.reshape(1, -1, f.shape[-1]) for f in (around, sun))
@@ -80,9 +87,9 @@ def _content(
         for colour, image in zip(colours, images, strict=True)
     ]
     if spectral:
-        (found, number), (disc, _) = bands(images[0], lo, hi), bands(images[1], lo, hi)
+        (dome_texels, number), (disc, _) = bands(images[0], lo, hi), bands(images[1], lo, hi)
     else:
-        found, disc = (texels(colour, EMISSION, False) for colour in colours)
+        dome_texels, disc = (texels(colour, EMISSION, False) for colour in colours)
     half = seen[0].reshape(2, ROWS + 1, -1)
     weights = np.concatenate([half, half[..., -2::-1]], axis=2).astype(np.float64)
     rows = np.clip(np.arange(ROWS + 1), 0.25, ROWS - 0.25) / ROWS
@@ -97,17 +104,46 @@ def _content(
     total = grid.total + shining
     share = min(shining / total, MOST) if total > 0.0 else 0.0
     return Content(
-        found, disc, number if spectral else None, corners, grid, share, total / (4.0 * np.pi)
+        dome_texels, disc, number if spectral else None, corners, grid, share, total / (4.0 * np.pi)
     )
 
 
 def _sun_power(bright: NDArray[Any]) -> float:
-    """A disc's brightness times solid angle, of its image (rows, columns)."""
+    """Return brightness times solid angle of the sun's disc, from its image (rows, columns)."""
     at = np.linspace(-1.0, 1.0, 101)
     a, b = np.meshgrid(at, at)
     inside = 1.0 - a * a - b * b
     keep = inside > 0.0
     row = (0.5 + 0.5 * b[keep]) * (SUN_ROWS - 1)
     column = np.sqrt(inside[keep]) * (SUN_COLUMNS - 1)
-    found = bright[np.rint(row).astype(int), np.rint(column).astype(int)]
-    return float(found.mean() * np.pi * np.sin(SUN_RADIUS) ** 2)
+    radiance = bright[np.rint(row).astype(int), np.rint(column).astype(int)]
+    return float(radiance.mean() * np.pi * np.sin(SUN_RADIUS) ** 2)
+
+
+def lower_sky(lamp: Sky, encoder: Encoder) -> tuple[str, dict[str, ArrayLike]]:
+    """Put a sky into the tables; return its record's name and its members.
+
+    Raises SceneError for a transform that is no rotation.
+    """
+    axes, sky = rotation(lamp), content(lamp, encoder.look)
+    x, y, z = axes.T
+    turn, up = np.radians(lamp.sun_azimuth), np.radians(lamp.sun_elevation)
+    members: dict[str, ArrayLike] = {
+        "x": np.cos(turn) * x - np.sin(turn) * z,
+        "y": y,
+        "z": np.sin(turn) * x + np.cos(turn) * z,
+        "width": COLUMNS,
+        "height": ROWS,
+        "texels": encoder.store.append_floats("texels", sky.texels),
+        "sun_texels": encoder.store.append_floats("texels", sky.sun),
+        **grid_members(sky.corners, sky.grid, encoder),
+        "horizon": horizon(lamp.altitude),
+        "sun_cos": np.cos(up),
+        "sun_sin": np.sin(up),
+        "sun_radius": np.sin(SUN_RADIUS),
+        "sun_share": sky.sun_share,
+    }
+    if sky.number is None:
+        return "sky", members
+    members |= {"bands": sky.texels.shape[1], "number": encoder.spectra.row(sky.number)}
+    return "spectral_sky", members

@@ -1,10 +1,10 @@
-"""A tree over lights, to choose one in proportion to what it sends to a point.
+"""The light tree: chooses a light about in proportion to its light at a point.
 
-Conty Estevez and Kulla 2018: a node bounds where its lights are, and sums their power. What they
-send to each side it knows in the mean (light_lobes.py), where theirs knows a bound of it. It is
-built from the top by their surface area orientation heuristic, over bins as in pbrt-v4 (12.6.3),
-all nodes of a level at once. Every second level is then left out: a point looks at up to WIDTH
-nodes at once, which are neighbours.
+Conty Estevez and Kulla 2018: a node bounds the places of its lights, and sums their power. It knows
+the mean of their light in each direction (tree_nodes.py), where theirs knows a bound. It is built
+from the top by their surface area orientation heuristic, over bins as in pbrt-v4 (12.6.3), a level
+at a time. Every second level is then dropped: a point looks at up to WIDTH neighbouring nodes at
+once.
 """
 
 from __future__ import annotations
@@ -16,38 +16,37 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats
 from clpt.render.lights.bounds import Bounds
-from clpt.render.lights.cones import Cones, around, measure, merged
-from clpt.render.lights.lobes import Lobes, reach
+from clpt.render.lights.tree_nodes import Cones, Lobes, around, measure, merged, reach
 from clpt.render.records.light_rows import LINE, NODE, WIDTH
 
-BINS = 12  # places along an axis where a node may be split
-DEEPEST = 31  # levels below the root, half of which are left: two bits each of a trail
+BINS = 12  # along an axis, between which a node may be split
+DEEPEST = 31  # levels below the root; half remain, with two bits of a trail each
 
 
 @dataclass(frozen=True)
 class Tree:
     """A tree over lights, as kernels read it.
 
-    nodes (k, WIDTH) structured as NODE, a group each, the root's first; groups that are not full
-    have nodes of power 0 behind. trails (n,) uint32: which nodes lead to a light, from the root.
+    nodes (k, WIDTH) structured as NODE, a group each, the root's first, padded with nodes of power
+    0. trails (n,) uint32: the nodes on the way from the root to each light.
     """
 
     nodes: np.ndarray
     trails: NDArray[np.uint32]
 
     def words(self, before: int) -> NDArray[np.uint32]:
-        """Return the words behind the rows in `lights`, which have so many words.
+        """Return the words that follow the rows in `lights`: trails, then the aligned groups.
 
-        They are a trail for every row, and then the groups, aligned.
+        before: the number of words of the rows.
         """
         gap = np.zeros(-(before + len(self.trails)) % LINE, np.uint32)
         return np.concatenate([self.trails, gap, self.nodes.ravel().view(np.uint32)])
 
 
 def build(bounds: Bounds, power: Floats) -> Tree:
-    """Build the tree over lights with these bounds; power (n,): of each, in any unit.
+    """Build a light tree; power (n,): of each light, in any unit.
 
-    Lights that are not placed count the same whatever the point; they have a branch of their own.
+    Lights that are not placed have the same weight at every point; they have a separate branch.
     """
     power = np.asarray(power, np.float64)
     builder = _Builder(bounds, power / max(power.sum(), 1e-300))
@@ -60,13 +59,13 @@ def build(bounds: Bounds, power: Floats) -> Tree:
     else:
         order, starts, depth = rows, np.array([0]), 0
     builder.run(order, starts, depth)
-    return _widened(builder.nodes[: builder.count], apart=depth == 1)
+    return _widened(builder.nodes[: builder.count], split_root=depth == 1)
 
 
-def _widened(nodes: np.ndarray, apart: bool) -> Tree:
-    """The groups of a tree of two children a node (k,) structured as NODE.
+def _widened(nodes: np.ndarray, split_root: bool) -> Tree:
+    """Return the groups of a binary tree (k,) structured as NODE.
 
-    apart: keep the root's two children as a group of their own.
+    split_root: the root's two children become a separate group.
     """
     empty = np.zeros(1, NODE.dtype)
     empty["child"] = -1
@@ -75,11 +74,11 @@ def _widened(nodes: np.ndarray, apart: bool) -> Tree:
     if nodes["child"][0] < 0:
         return Tree(nodes[[[0] + [-1] * (WIDTH - 1)]], trails)
     groups, inner, trail = [], np.array([0]), np.zeros(1, np.uint32)
-    made, depth = 1, 0
+    count, depth = 1, 0
     while len(inner):
         pairs = nodes["child"][inner][:, None] + [0, 1]
         down = nodes["child"][pairs]
-        split = (down >= 0) & (depth > 0 or not apart)
+        split = (down >= 0) & (depth > 0 or not split_root)
         first, second = np.where(split, down, pairs), np.where(split, down + 1, -1)
         slots = np.stack([first, second], axis=2).reshape(-1, WIDTH)
         group = nodes[slots]
@@ -87,15 +86,15 @@ def _widened(nodes: np.ndarray, apart: bool) -> Tree:
         leaf, more = (group["child"] < 0) & (slots >= 0), group["child"] >= 0
         trails[-1 - group["child"][leaf]] = trail[leaf]
         inner, trail = slots[more], trail[more]
-        group["child"][more] = made + np.arange(len(inner))
+        group["child"][more] = count + np.arange(len(inner))
         groups.append(group)
-        made, depth = made + len(inner), depth + 1
+        count, depth = count + len(inner), depth + 1
     return Tree(np.concatenate(groups), trails)
 
 
 @dataclass
 class _Level:
-    """The sums and bounds (k,) that the nodes of a level hold, over segments of lights."""
+    """Sums and bounds (k,) of the nodes of a level, over segments of lights."""
 
     low: Floats
     high: Floats
@@ -108,7 +107,7 @@ def _counts(starts: NDArray[np.int64], n: int) -> NDArray[np.int64]:
 
 
 class _Builder:
-    """The nodes of a tree of two children a node, so far."""
+    """The nodes of an unfinished binary tree."""
 
     def __init__(self, bounds: Bounds, power: Floats):
         self.bounds, self.power, self.lobes = bounds, power, Lobes.of(bounds, power)
@@ -116,17 +115,17 @@ class _Builder:
         self.count = 1
 
     def summed(self, order: NDArray[np.int64], starts: NDArray[np.int64]) -> _Level:
-        """Bounds and power over the segments of `order` that begin at `starts`."""
-        own = self.bounds[order]
+        """Return bounds and power over the segments of `order` that begin at `starts`."""
+        bounds = self.bounds[order]
         return _Level(
-            np.minimum.reduceat(own.low, starts),
-            np.maximum.reduceat(own.high, starts),
-            around(Cones.of(own), starts),
+            np.minimum.reduceat(bounds.low, starts),
+            np.maximum.reduceat(bounds.high, starts),
+            around(Cones.of(bounds), starts),
             self.lobes.summed(order, starts),
         )
 
     def node(self, at: NDArray[np.int64], level: _Level, child: NDArray[np.int64]) -> None:
-        """Fill in nodes; those that are not placed get their radius afterwards."""
+        """Fill in nodes; nodes of lights without a place get their radius afterwards."""
         nodes = np.zeros(len(at), NODE.dtype)
         mean, second, center = level.lobes.means()
         far = np.maximum(center - level.low, level.high - center)
@@ -140,7 +139,7 @@ class _Builder:
         self.count = max(self.count, int(at.max()) + 1)
 
     def run(self, order: NDArray[np.int64], starts: NDArray[np.int64], depth: int) -> None:
-        """Make the nodes of a level, which are those of segments of `order`, and all below."""
+        """Make the nodes of a level, for segments of `order`, and all levels below."""
         at = depth + np.arange(len(starts))
         free = int(at[-1]) + 1
         while len(order):
@@ -172,7 +171,7 @@ class _Builder:
         inner: NDArray[np.bool_],
         depth: int,
     ) -> NDArray[np.int64]:
-        """Which child (n,) each light goes to: 0 or 1, neither of them empty."""
+        """Return the child (n,) of each light, 0 or 1; both get some."""
         segment = np.repeat(np.arange(len(counts)), counts)
         place = np.arange(len(order)) - starts[segment]
         side = (2 * place >= counts[segment]).astype(np.int64)
@@ -183,17 +182,17 @@ class _Builder:
         chosen = large[segment]
         number = np.cumsum(large) - 1
         size = (level.high - level.low)[inner][large]
-        found, split = self._splits(order[chosen], number[segment[chosen]], size)
-        side[chosen] = np.where(split[number[segment[chosen]]], found, side[chosen])
+        best, split = self._splits(order[chosen], number[segment[chosen]], size)
+        side[chosen] = np.where(split[number[segment[chosen]]], best, side[chosen])
         return side
 
     def _splits(
         self, order: NDArray[np.int64], segment: NDArray[np.int64], size: Floats
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """The best side of each light (n,), and the segments (k,) in which there is a split."""
-        own, power, k = self.bounds[order], self.power[order], len(size)
+        """Return the best side of each light (n,), and whether each segment (k,) can be split."""
+        bounds, power, k = self.bounds[order], self.power[order], len(size)
         starts = np.searchsorted(segment, np.arange(k))
-        centers = 0.5 * (own.low + own.high)
+        centers = 0.5 * (bounds.low + bounds.high)
         lo, hi = np.minimum.reduceat(centers, starts), np.maximum.reduceat(centers, starts)
         best = np.full(k, np.inf)
         side = np.zeros(len(order), np.int64)
@@ -203,7 +202,7 @@ class _Builder:
             scale = np.where(extent > 0.0, BINS / np.where(extent > 0.0, extent, 1.0), 0.0)
             bins = np.minimum((centers[:, axis] - lo[segment, axis]) * scale[segment], BINS - 1)
             bins = bins.astype(np.int64)
-            costs = _costs(own, power, segment * BINS + bins, k)
+            costs = _costs(bounds, power, segment * BINS + bins, k)
             costs *= (longest / np.maximum(size[:, axis], 1e-3 * longest))[:, None]
             costs[extent <= 0.0] = np.inf
             at = np.argmin(costs, axis=1)
@@ -214,11 +213,11 @@ class _Builder:
         return side, np.isfinite(best)
 
 
-def _costs(own: Bounds, power: Floats, key: NDArray[np.int64], k: int) -> Floats:
-    """Costs (k, BINS - 1) of splitting behind each bin; infinite where a side is empty.
+def _costs(bounds: Bounds, power: Floats, key: NDArray[np.int64], k: int) -> Floats:
+    """Return costs (k, BINS - 1) of splitting behind each bin; infinite where a side is empty.
 
-    The heuristic of Conty Estevez and Kulla 2018 eq. 1: power times surface area times the measure
-    of the directions, of both sides. A little area is added to what is flat or a point.
+    Conty Estevez and Kulla 2018 eq. 1: the sum over both sides of power times surface area times
+    measure of directions. Flat boxes and points get a little more area.
     """
     sort = np.argsort(key, kind="stable")
     ordered = key[sort]
@@ -226,10 +225,10 @@ def _costs(own: Bounds, power: Floats, key: NDArray[np.int64], k: int) -> Floats
     present = ordered[starts]
     shape = (k, BINS)
     low, high = np.full((k * BINS, 3), np.inf), np.full((k * BINS, 3), -np.inf)
-    low[present] = np.minimum.reduceat(own.low[sort], starts)
-    high[present] = np.maximum.reduceat(own.high[sort], starts)
+    low[present] = np.minimum.reduceat(bounds.low[sort], starts)
+    high[present] = np.maximum.reduceat(bounds.high[sort], starts)
     cones = Cones.none(k * BINS)
-    cones[present] = around(Cones.of(own[sort]), starts)
+    cones[present] = around(Cones.of(bounds[sort]), starts)
     sums = np.bincount(key, power, k * BINS).reshape(shape)
     number = np.bincount(key, minlength=k * BINS).reshape(shape)
     boxes = low.reshape(*shape, 3), high.reshape(*shape, 3)
@@ -251,11 +250,11 @@ def _costs(own: Bounds, power: Floats, key: NDArray[np.int64], k: int) -> Floats
 
 
 def _measures(cones: Cones, shape: tuple[int, int], step: int) -> Floats:
-    """Measures (k, BINS) of the cones around the bins up to each one; of those behind for -1."""
+    """Return measures (k, BINS) of cones around all bins up to each; step -1: from the last."""
     at = np.arange(shape[0] * shape[1]).reshape(shape)[:, ::step]
-    made = np.empty(shape)
+    measures = np.empty(shape)
     sofar = cones[at[:, 0]]
     for i in range(shape[1]):
         sofar = sofar if i == 0 else merged(sofar, cones[at[:, i]])
-        made[:, i] = measure(sofar)
-    return made
+        measures[:, i] = measure(sofar)
+    return measures

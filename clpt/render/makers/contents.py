@@ -1,9 +1,9 @@
-"""Contents of a film with what its renderer says of it: one value, which changes at one point.
+"""The contents of a renderer's film as a single value, which a single assignment replaces.
 
-An exception can come at any line: Ctrl-C raises one wherever the main thread is. So while a film
-changes, a `Change` stands in the place of its `Contents`. The new ones take its place by one
-assignment, the last thing of all. What ends before that leaves the film as it was, or brings it to
-a state with a name; where neither works the change stays, and the renderer says that it is broken.
+An exception can come at any line: Ctrl-C raises it wherever the main thread is. So while a film
+changes, a `Change` replaces its `Contents`. The last assignment of a change sets the new contents.
+An error before that leaves the film as it was, or `finish` brings it to a known state. If that
+fails too, the change stays, and the renderer says that it is broken.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from clpt.render.wavefront.adaptive import Adaptive
 
 log = logging.getLogger(__name__)
 
-LONGEST = 120  # letters of an error that another one quotes
+LONGEST = 120  # letters of an error within the message of another error
 
 
 def _now() -> str:
@@ -33,10 +33,10 @@ def _now() -> str:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """The contents of a film: which samples it holds, and how they came to be.
+    """The contents of a film: its samples, and the sessions that rendered them.
 
-    taken: first and end of each range of its samples' numbers; adaptive: which pixels get more;
-    sessions: of those who rendered it before; began: when it was empty, or was gone on with.
+    taken: first and end of each range of numbers of samples; adaptive: state of adaptive sampling;
+    sessions: former sessions; began: when this session began, ISO 8601 in UTC.
     """
 
     taken: Ranges = ()
@@ -46,29 +46,29 @@ class Contents:
 
 
 class Change:
-    """A change of a film that is not over, for a `with`; see `FilmOwner.change`."""
+    """A change of a film, as a context manager; see `FilmOwner._change`."""
 
     def __init__(
         self,
         owner: FilmOwner,
-        what: str,
+        name: str,
         former: Contents,
         finish: Callable[[BaseException], Contents] | None,
         heals: bool,
     ):
-        self._owner, self._what, self.former = owner, what, former
+        self._owner, self._name, self.former = owner, name, former
         self.heals, self._finish = heals, finish
         self._began = finish is not None
-        self._cause = ""  # no exception: that would keep all that its traceback refers to
+        self._cause = ""  # a text: an exception would keep all objects of its traceback
         self.over = False
 
     def begin(self) -> None:
-        """Note that from now on the film is not what it was."""
+        """Note that the film differs from its former contents from now on."""
         self._began = True
 
     @contextmanager
     def beginning_unless(self, *refusals: type[BaseException]) -> Iterator[None]:
-        """Begin with what is inside, unless one of these ends it: nothing has changed then."""
+        """Begin, but not if one of these errors ends the block: then nothing has changed."""
         self.begin()
         try:
             yield
@@ -103,22 +103,22 @@ class Change:
             log.warning("%s: %s", self.failure(), other)
 
     def failure(self) -> DeviceError:
-        """The error of every use after a change that did not end."""
-        name = type(self._owner).__name__
+        """Return the error for every use after a change that did not end."""
+        owner = type(self._owner).__name__
         advice = "reset it or make another one" if self.heals else "make another one"
         return DeviceError(
-            f"this {name} is broken: its {self._what} was stopped{self._cause}; {advice}"
+            f"this {owner} is broken: its {self._name} was stopped{self._cause}; {advice}"
         )
 
     def unfinished(self) -> DeviceError:
-        """The error of who is called by a change, and asks what it will bring."""
+        """Return the error for a callback within a change that reads the new contents."""
         return DeviceError(
-            f"the film changes: {self._what} calls this; end it first, as by returning False"
+            f"the film changes: {self._name} calls this; end it first, as by returning False"
         )
 
 
 class FilmOwner(DeviceOwner):
-    """Base of renderers: what their film holds."""
+    """Base of renderers, which own the contents of a film."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -133,7 +133,7 @@ class FilmOwner(DeviceOwner):
 
     @property
     def _known(self) -> Contents:
-        """The contents of the film; while they change, those before."""
+        """The contents of the film; during a change, the former contents."""
         now = self._contents
         if not isinstance(now, Change):
             return now
@@ -143,24 +143,24 @@ class FilmOwner(DeviceOwner):
 
     def _change(
         self,
-        what: str,
+        name: str,
         finish: Callable[[BaseException], Contents] | None = None,
         *,
         heals: bool = True,
     ) -> Change:
-        """Return what stands for the contents, in a `with` whose last line gives them new ones.
+        """Return a change for a `with` block, whose last line sets the new contents.
 
-        what: changes, for people. finish: makes the film whole after an error, which it is told,
-        and returns what it then holds; without it the film is as it was until `Change.begin`.
-        heals: whether `reset` makes it whole where that fails. Raises DeviceError within another.
+        name: of the change, for people. finish: makes the film whole after an error, its argument,
+        and returns the contents; without it the film is unchanged until `Change.begin`. heals:
+        whether `reset` repairs the renderer if `finish` fails. Raises DeviceError within a change.
         """
-        return Change(self, what, self._settled, finish, heals)
+        return Change(self, name, self._settled, finish, heals)
 
-    def _healing(self, what: str, finish: Callable[[BaseException], Contents]) -> Change:
-        """Return a change as `change` does, also of what is broken."""
+    def _healing(self, name: str, finish: Callable[[BaseException], Contents]) -> Change:
+        """Return a change as `_change` does, also for a broken renderer."""
         now = self._contents
         former = now.former if isinstance(now, Change) else now
-        return Change(self, what, former, finish, heals=True)
+        return Change(self, name, former, finish, heals=True)
 
     def _check_healing(self, inside: bool) -> None:
         super()._check_healing(inside)

@@ -33,7 +33,7 @@ from clpt.render.edit.scene_edit import (
 )
 from clpt.render.film.developed import Developed
 from clpt.render.film.layers import white_paper
-from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.pictures import PictureForm
 from clpt.render.film.saved_film import Origin
 from clpt.render.film.state import DIMENSIONS, FilmState, Ranges
 from clpt.render.flow.scene_to_tables import Lowered, lower
@@ -80,7 +80,7 @@ class Changes:
 
     @property
     def by_key(self) -> dict[str, Mapping[Any, Any]]:
-        """The changes of parts of the scene, by what of them changes."""
+        """The changes of parts of the scene that are not empty, by name."""
         parts = {
             "materials": self.materials, "transforms": self.transforms, "vertices": self.vertices
         }  # fmt: skip
@@ -88,14 +88,13 @@ class Changes:
 
 
 class DeviceFilm:
-    """A film on a device, with the scene that it is of.
+    """A film on a device, with its scene.
 
-    scene: as it is rendered; denoise: the denoiser that the film is for; warnings: of the scene as
-    it was lowered; start: when it was begun to be made [s of time.perf_counter];
-    built: how many programs were built, and how many of them came from clpt's cache; seconds: of
-    each part of that. options: see `RenderOptions`. share: makes things once for several devices,
-    by a key and a function; without it the scene may have arrays in the memory of the device.
-    former: a lowered scene that has much in common with this one.
+    scene: as it is rendered; denoise: the denoiser for the film; warnings: of the lowered scene;
+    start: of its construction [s of time.perf_counter]; built: numbers of programs that were built,
+    and of programs from clpt's cache; seconds: of each part of the construction. options: see
+    `RenderOptions`. share: calls a function once for several devices, by a key; without it the
+    scene may have arrays in the memory of the device. former: a similar lowered scene.
 
     Raises as `Renderer` does.
     """
@@ -164,9 +163,9 @@ class DeviceFilm:
     # ---- the film
 
     def denoised_noise(self, words: Callable[..., FilmState]) -> Measure | None:
-        """Return what measures the noise that is left after denoising, None with light paths.
+        """Return a function that measures the noise after denoising; None with light paths.
 
-        words: returns the film. Raises SceneError where halves are not kept.
+        words: returns the film. Raises SceneError if the film has no halves.
         """
         if self.denoise is None or self.wavefront.features.transport.weighed:
             return None
@@ -180,9 +179,9 @@ class DeviceFilm:
         return DenoisedNoise(lambda: Developed(words(), form), self.device, self.denoise).measure
 
     def words(self, *names: str, held: bool = False, taken: Ranges = ()) -> FilmState:
-        """Return the film, or the one that is held, on the host; wait for it.
+        """Wait for the film or, if `held`, for its copy; return it on the host.
 
-        names: of the arrays that are wanted, by default all; taken: the samples that it has.
+        names: of the arrays to read, by default all; taken: its samples.
         """
         scale = float(self.wavefront.paths.settings["film_scale"])
         arrays: Any = self.wavefront.film.words(*(names or DIMENSIONS), held=held)
@@ -196,11 +195,11 @@ class DeviceFilm:
         return replace(film, **arrays)
 
     def put(self, state: FilmState) -> None:
-        """Enqueue that the film holds the words of another one of its form."""
+        """Enqueue the words of another film of the same form."""
         self.wavefront.set_words(state.arrays)
 
     def empty(self, *, seed: int | None = None, recover: bool = False) -> None:
-        """Enqueue that the film is empty; seed: of later samples; recover: from any error."""
+        """Enqueue the emptying of the film; seed: of later samples; recover: from any error."""
         wavefront = self.wavefront
         if seed is not None:
             self.scene = replace(self.scene, seed=seed)
@@ -222,8 +221,8 @@ class DeviceFilm:
     ) -> None:
         """Render another scene from now on, in the first way that is possible; see `Renderer`.
 
-        events: that arrays of the changes wait for. apply: calls what writes a change, see
-        `FilmRenderer._apply`. share: as of the class.
+        events: to wait for before arrays of the changes are read. apply: calls the function that
+        writes a change, see `FilmRenderer._apply`. share: see the class.
         """
         moves = bool(changes.transforms or changes.vertices)
         quick = changes.scene is None and not (changes.motion or self._blurred)
@@ -248,10 +247,10 @@ class DeviceFilm:
         self, scene: Scene, share: Share | None, former: Lowered | None = None, *,
         anew: bool = False,
     ) -> Lowered:  # fmt: skip
-        """Return the tables of a scene, for the way that is best; former: of the scene before it.
+        """Return the tables of a scene for the best integrator; former: of the former scene.
 
-        anew: choose the way anew. A trial may decide, but not for pictures that people steer: they
-        want to see something soon, and what is chosen stays.
+        anew: choose the integrator anew. A trial may decide, but not for interactive pictures,
+        which must come soon and keep their integrator.
         """
         steered = self._ground.tuning.cancel_seconds is not None
         chooses = anew and not (steered and self.is_open)
@@ -275,7 +274,7 @@ class DeviceFilm:
         return lowered
 
     def _edited(self, changes: Changes, share: Share | None) -> tuple[Scene, Replacements]:
-        """Return the scene, or another one, with changes, and what stands for what."""
+        """Return the changed scene, and the replacements of its parts."""
         new = self.scene if changes.scene is None else changes.scene
         replaced = {} if changes.scene is None else match_replacements(self.scene, new)
         if changes.by_key:
@@ -310,17 +309,17 @@ class DeviceFilm:
         return True
 
     def _patch(self, scene: Scene) -> Callable[[], None] | None:
-        """Return what writes the words of parameters that differ, None if more does."""
+        """Return a function that writes differing words of parameters; None if more differs."""
         if self._enters_a_medium(scene):
             return None
-        found = parameter_patch.patch(self.wavefront.scene, self.scene, scene)
-        if isinstance(found, str):
-            log.debug("words alone do not change the scene: %s", found)
+        patch = parameter_patch.patch(self.wavefront.scene, self.scene, scene)
+        if isinstance(patch, str):
+            log.debug("words alone do not change the scene: %s", patch)
             return None
-        return found
+        return patch
 
     def _enters_a_medium(self, scene: Scene) -> bool:
-        """Whether the camera or a light of a changed scene may be in other media than before."""
+        """Return whether the camera or a light of a changed scene may be in other media."""
         lowered = self.wavefront.scene.lowered
         if not lowered.features.media.present:
             return scene.camera.medium is not self.scene.camera.medium
@@ -334,10 +333,10 @@ class DeviceFilm:
     def _rebuild(
         self, scene: Scene, events: dev.Events, changes: Changes, share: Share | None
     ) -> tuple[Callable[[], None], list[str]]:
-        """Lower a scene; return what lets it be rendered, see `rebuild.prepare`, and its warnings.
+        """Lower a scene; return the function from `rebuild.prepare`, and warnings.
 
-        events: that arrays on the device wait for, which may be read. With motion things move
-        to it from where they are in the present scene.
+        events: to wait for before arrays on the device are read. With motion, shapes, lights and
+        the camera move from the present scene to this scene.
         """
         for event in events or ():
             dev.wait(event)
@@ -357,26 +356,26 @@ class DeviceFilm:
         return write, [*lowered.warnings, *remarks]
 
     def other_way(self, origin: Origin) -> Integrator | None:
-        """Return the integrator that made a film of the scene, if no more was chosen otherwise."""
-        own = self.origin()
-        if not self.scene.integrator.leaves_choice or own.settings == origin.settings:
+        """Return the integrator of a film of the scene; None if anything else differs."""
+        present = self.origin()
+        if not self.scene.integrator.leaves_choice or present.settings == origin.settings:
             return None
         chosen = {name: origin.settings.get(name) for name in WAY}
-        alike = replace(own, settings={**own.settings, **chosen})
-        return None if alike.differences(origin) else origin.way
+        alike = replace(present, settings={**present.settings, **chosen})
+        return None if alike.differences(origin) else origin.chosen_integrator
 
     def follow(self, way: Integrator, apply: Apply, share: Share | None = None) -> None:
-        """Render in another way, if its film has another form; see `update`."""
+        """Render with another integrator if its film has another form; see `update`."""
         former = self.wavefront.scene.lowered
         lowered = self._lower(self.scene, share, replace(former, integrator=way))
         if rebuild.has_other_paths(former, lowered):
             apply(self._exchanged(lowered), again=True)
 
     def _exchanged(self, lowered: Lowered) -> Callable[[], None]:
-        """Return what puts a wavefront whose film has another form in the place of this one.
+        """Return a function that replaces the wavefront by another, whose film has another form.
 
-        The memory of the picture stays. Raises as `Wavefront.create`, and SceneError for a film
-        of another size; nothing has changed then.
+        The memory of the picture stays. Raises as `Wavefront.create` does, and SceneError for a
+        film of another size; nothing has changed then.
         """
         first = self.wavefront
         refused = rebuild.refusal(first.scene.lowered, lowered)
@@ -391,10 +390,10 @@ class DeviceFilm:
 
         return take
 
-    # ---- what the film is of
+    # ---- origin and form
 
     def origin(self) -> Origin:
-        """Return what the samples are of. Raises SceneError for a scene that cannot be read."""
+        """Return the origin of the samples. Raises SceneError for a scene that cannot be read."""
         first = self.wavefront
         lowered, features = first.scene.lowered, first.features
         read = self._scene_read
@@ -410,7 +409,7 @@ class DeviceFilm:
             "chosen.texels": int(lowered.tables["texels"].size),
             "halves": first.film.halves == 2,
         }
-        if type(self.scene.sampler) not in PIXELWISE:  # their points are for some number of samples
+        if type(self.scene.sampler) not in PIXELWISE:  # their points depend on its size
             settings["sampler.points"] = 1 << int(lowered.settings["sample_bits"])
         outside = [cls for cls in features.materials.leaves if cls.source is not None]
         texts = [custom_materials.text(cls).text for cls in outside]
@@ -418,7 +417,7 @@ class DeviceFilm:
         return Origin(read[2], settings, digest, VERSION)
 
     def device_class(self) -> dict[str, Plain]:
-        """Return what decides the last bits of samples: equal classes give equal films."""
+        """Return the class of the device; equal classes give films equal to the bit."""
         first, info = self.wavefront, self.device.info
         return {
             "device": info.label,
@@ -430,7 +429,7 @@ class DeviceFilm:
 
     @property
     def form(self) -> PictureForm:
-        """The way from the film's words to a picture."""
+        """The form of the picture."""
         first, film = self.wavefront, self.scene.film
         settings, features = first.paths.settings, first.features
         return PictureForm(
@@ -464,9 +463,10 @@ def kernels_digest() -> str:
 
 
 def _lights_moved(former: Scene, scene: Scene) -> bool:
-    """Whether lights, or boundaries of their media, may have other places."""
+    """Return whether lights, or boundaries of their media, may have moved."""
     places = [
-        [*map(shapes.geometry, one.shapes), *map(_placement, one.lights)] for one in (former, scene)
+        [*map(shapes.geometry, each.shapes), *map(_placement, each.lights)]
+        for each in (former, scene)
     ]
     return len(places[0]) != len(places[1]) or any(
         old is not new
@@ -476,13 +476,13 @@ def _lights_moved(former: Scene, scene: Scene) -> bool:
 
 
 def _placement(light: Light) -> tuple[Any, ...]:
-    """Return the parameters of a light that say where it is."""
+    """Return the parameters of a light that place it."""
     values = fields_of(light)
     return tuple(values[n] for n, p in params(type(light)).items() if p.role.place == "host")
 
 
 def texture_budget_of(device: dev.Device) -> int:
-    """Return what bitmaps may take on a device [bytes]: half of what is free, in one buffer."""
+    """Return the budget of bitmaps on a device [bytes]: half of the free memory, in a buffer."""
     return min(int(TEXTURE_SHARE * device.free_memory()), device.info.max_alloc)
 
 

@@ -1,4 +1,4 @@
-"""A device that takes the samples of a film in its own memory."""
+"""The maker that takes samples on a device, into a film in its memory."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ class DeviceMaker(Maker):
     # ---- samples
 
     def begin(self, call: Call, now: Contents, more: Contents) -> Settle:
-        """Return what makes the film whole; see `Maker`.
+        """Return the function that ends a call; see `Maker`.
 
-        After an error at any line the film holds `more`, though some pixels may lack some of these
-        samples, or `now` if none has begun. An error of the device makes nothing whole.
+        After an error at any line the film has the contents `more`, although some pixels may lack
+        some of the samples, or `now` if no sample has begun. After an error of the device the
+        function raises that error if samples have begun.
         """
         wavefront = self._home.wavefront
         wavefront.begun = False
@@ -67,16 +68,16 @@ class DeviceMaker(Maker):
             return goes_on
 
         wavefront = self._home.wavefront
-        wavefront.leave.lower()  # that a `leave` raised which came too late for another call
+        wavefront.leave.lower()  # a late `leave` for a former call may have raised it
         if call.noise is not None and adaptive is not None:
             return adaptive.run(call.end, call.noise, on_batch)
         finished = wavefront.render_samples(call.first, call.end, on_batch)
         if adaptive is not None:
-            adaptive.skip(call.end)  # after a stop too: numbers are not used again
+            adaptive.skip(call.end)  # also after a stop: numbers of samples are used once
         return finished
 
     def enqueue(self, call: Call, adaptive: Adaptive | None) -> None:
-        """Enqueue that all pixels get samples; wait for nothing."""
+        """Enqueue samples of all pixels; wait for nothing."""
         wavefront = self._home.wavefront
         wavefront.enqueue(call.first, call.end)
         wavefront.stream.flush()
@@ -84,20 +85,20 @@ class DeviceMaker(Maker):
             adaptive.skip(call.end)
 
     def leave(self, film: bool) -> None:
-        """Say whether a call that is told to stop may leave paths in flight as they are."""
-        if film and self._home.is_open:  # who sees the flag finds the reason soon
+        """Set whether a call that stops may abandon paths in flight."""
+        if film and self._home.is_open:  # `run` sees the reason soon after the flag
             self._home.wavefront.leave.raise_()
         self._discards = film
 
     # ---- the film
 
     def put(self, state: FilmState, counts: Counts | None = None) -> None:
-        """Enqueue that the film is another one."""
+        """Enqueue the words of another film."""
         if counts is not None:
             self._home.wavefront.counts = counts
         self._home.put(state)
 
     def hold(self, taken: Ranges) -> Held:
-        """Keep a copy of the film on the device, one at a time. Raises MemoryBudgetError."""
+        """Copy the film on the device, over a former copy. Raises MemoryBudgetError."""
         self._home.wavefront.film.hold()
         return Held(partial(self._home.words, held=True, taken=taken), self.counts, taken)

@@ -1,4 +1,4 @@
-"""Objects on a device that one thread at a time may use, and none once they are closed."""
+"""Objects on a device: their methods exclude each other, and raise DeviceError after `close`."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class DeviceOwner:
 
     @property
     def _inside(self) -> bool:
-        """Whether this thread is in a method: who asks is called by it."""
+        """Whether this thread is within a method of the object."""
         return bool(self._lock._is_owned())  # type: ignore[attr-defined]
 
     def _check_open(self) -> None:
@@ -42,19 +42,21 @@ class DeviceOwner:
         return DeviceError(f"this {type(self).__name__} is closed; make another one")
 
     def _check(self, inside: bool) -> None:
-        """Raise DeviceError where it cannot be used; inside: by what one of its methods calls."""
+        """Raise DeviceError if it cannot be used; inside: within a method of the object."""
         self._check_open()
 
     def _check_healing(self, inside: bool) -> None:
-        """Raise DeviceError where it cannot be made whole."""
+        """Raise DeviceError if `reset` cannot repair it."""
         self._check_open()
 
 
 def synchronized(
     method: Callable[Concatenate[_S, _P], _R], *, heals: bool = False
 ) -> Callable[Concatenate[_S, _P], _R]:
-    """Return a method for one thread at a time; it raises DeviceError after `close`, and where the
-    object is broken, unless it heals that."""
+    """Return a method that excludes other threads.
+
+    It raises DeviceError after `close`, and for a broken object unless `heals`.
+    """
 
     def locked(self: _S, /, *args: _P.args, **named: _P.kwargs) -> _R:
         inside = self._inside
@@ -67,28 +69,28 @@ def synchronized(
 
 
 def healing(method: Callable[Concatenate[_S, _P], _R]) -> Callable[Concatenate[_S, _P], _R]:
-    """Return a method as `synchronized` does, which makes what is broken whole again."""
+    """Return a synchronized method that repairs a broken object."""
     return synchronized(method, heals=True)
 
 
 class Stop:
-    """Whether what is being done is to stop.
+    """A request to stop a run.
 
-    As threading.Event, but without a lock: a signal's handler would wait for ever where it has
-    interrupted who holds it.
+    It is a threading.Event without a lock: the handler of a signal that interrupted the holder of
+    the lock would wait for ever.
     """
 
     def __init__(self) -> None:
         self._wanted = False
 
     def set(self) -> None:
-        """Let it stop."""
+        """Request a stop."""
         self._wanted = True
 
     def clear(self) -> None:
-        """Let it go on."""
+        """Withdraw the request."""
         self._wanted = False
 
     def is_set(self) -> bool:
-        """Return whether a stop is wanted."""
+        """Return whether a stop is requested."""
         return self._wanted

@@ -1,7 +1,7 @@
 """Makers take the samples of a film: a device, several devices, or the workers of a cluster.
 
-A renderer asks its maker for samples, for their sums, and for another scene. What the film then is,
-how it is developed, saved and gone on with is the renderer's, and the same for all makers.
+A renderer asks its maker for samples, for their sums, and for another scene. The renderer develops,
+saves and continues the film, in the same way for all makers.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ Settle = Callable[[BaseException | None], Contents]
 
 
 class Discarded(Exception):
-    """A call ends at once, and the film is of no use."""
+    """A call ended at once, and the film has no meaning."""
 
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """A film that is held where it is; read: brings it to the host."""
+    """A copy of a film on its device; read: brings it to the host."""
 
     read: Callable[[], FilmState]
     counts: Counts
@@ -43,7 +43,7 @@ class Held:
 
 @dataclass(frozen=True)
 class Call:
-    """Samples that are asked for: first to end - 1 of all pixels; noise: of those with more."""
+    """A request for samples first to end - 1 of all pixels, or of pixels with more than `noise`."""
 
     first: int
     end: int
@@ -51,22 +51,22 @@ class Call:
 
 
 class Maker(ABC):
-    """Takes samples of a scene, and has their film; what is not said otherwise is asked of `home`.
+    """Base of makers: they take samples of a scene into a film; by default `home` does the work.
 
-    start: when it was begun to be made [s of time.perf_counter]. shows_meanwhile: whether the film
-    can be shown while samples are taken; adds_films: whether it is a sum of films, which can be
-    saved meanwhile, and lacks samples before others, which the next call takes first.
+    start: of its construction [s of time.perf_counter]. shows_meanwhile: whether the film can be
+    shown during a run; adds_films: whether the film is a sum of films. Such a film can be saved
+    during a run, and the next call first takes samples that it lacks.
     """
 
     start: float
     shows_meanwhile = adds_films = False
 
-    # ---- what there is
+    # ---- properties
 
     @property
     @abstractmethod
     def home(self) -> DeviceFilm:
-        """The film on the device where it is shown, and its noise is measured."""
+        """The film on the device that shows it and measures its noise."""
 
     @property
     def scene(self) -> Scene:
@@ -80,62 +80,62 @@ class Maker(ABC):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of the scene, and of who takes the samples, for people."""
+        """Warnings of the scene and of its workers, for people."""
         return self.home.warnings
 
     @property
     def counts(self) -> Counts:
-        """Counts of what has happened since the film was empty."""
+        """Counts of paths and rays since the film was empty."""
         return self.home.wavefront.counts
 
     @property
     def classes(self) -> tuple[Mapping[str, Plain], ...]:
-        """The classes of the devices that took samples; equal ones give equal films."""
+        """The classes of the devices that took samples; equal classes give equal films."""
         return (self.home.device_class(),)
 
     # ---- samples
 
     def after(self, events: dev.Events) -> None:
-        """Let what follows come after events of the caller."""
+        """Let later commands wait for events of the caller."""
         self.home.wavefront.stream.after(events)
 
     @property
     def last(self) -> Any:
-        """The event of the last command, None where that has been waited for."""
+        """The event of the last command; None once it has ended."""
         return self.home.wavefront.stream.last
 
     def prepare(self) -> None:
-        """Get ready, so that the first samples come at once."""
+        """Run all kernels once, so that the first samples come at once."""
         self.home.wavefront.render_samples(0, 0)
 
     @abstractmethod
     def begin(self, call: Call, now: Contents, more: Contents) -> Settle:
-        """Return what makes the film whole after a call of `run`, and tells what it then holds.
+        """Return a function that makes the film whole after `run`, and returns its contents.
 
-        now: what it holds; more: with the samples of the call. It is told the error that ended the
-        call, if one did, and raises one where the film cannot be trusted.
+        now: the present contents; more: with the samples of the call. The argument of the function
+        is the error that ended the call, or None. It raises an error if the film is invalid.
         """
 
     @abstractmethod
     def run(self, call: Call, adaptive: Adaptive | None, tick: Callable[[], bool]) -> bool:
         """Add samples to the film; return whether all were added.
 
-        tick: is called all the while; if it returns False the call ends soon.
+        tick: called repeatedly; if it returns False the call ends soon.
         """
 
     def leave(self, film: bool) -> None:  # noqa: B027
-        """Say whether a call that is told to stop may leave its film as it is, unfinished."""
+        """Set whether a call that stops may leave its film unfinished."""
 
     def tracer(self) -> Tracer:
-        """Return what adds selections of samples to the film."""
+        """Return the tracer that adds selections of samples to the film."""
         return Tracer(self.home.wavefront)
 
     def adaptively(self, arrays: Mapping[str, NDArray[Any]], first: int) -> Adaptive:
-        """Return adaptive sampling of the film, which begins, or goes on from a state.
+        """Return adaptive sampling of the film from its beginning or from a state.
 
-        arrays: the state, empty at the beginning; first: the first sample that is missing then.
-        The film stays as it is, and so does its own state. Raises SceneError where halves are
-        wanted and not kept, and for a state of another film.
+        arrays: the state, empty at the beginning; first: the first missing sample at the beginning.
+        The film and its present state do not change. Raises SceneError if halves are needed and
+        absent, and for a state of another film.
         """
         home = self.home
         begun = Adaptive(home.wavefront, self.tracer(), home.denoised_noise(self.words))
@@ -160,37 +160,37 @@ class Maker(ABC):
         """Bring the parts of the film together."""
 
     def words(self, *names: str) -> FilmState:
-        """Return the film on the host; names: of the arrays that are wanted, by default all."""
+        """Return the film on the host; names: of the arrays to read, by default all."""
         return self.home.words(*names)
 
     @abstractmethod
     def put(self, state: FilmState, counts: Counts | None = None) -> None:
-        """Let the film be another one, and with `counts` have these; that can be done again."""
+        """Replace the film and, unless None, its counts; after an error it may be called again."""
 
     def shown(self) -> DeviceFilm:
-        """Return the home, whose film is now the whole one; its parts are together before."""
+        """Return the home, which has the whole film; `gather` must come before."""
         return self.home
 
     @abstractmethod
     def hold(self, taken: Ranges) -> Held:
-        """Keep a copy of the film as it is, of these samples. Raises MemoryBudgetError."""
+        """Copy the present film, which has these samples. Raises MemoryBudgetError."""
 
     def empty(self, *, seed: int | None = None, recover: bool = False) -> None:
-        """Let the film be empty; seed: of later samples; recover: from an error at any line."""
+        """Empty the film; seed: of later samples; recover: after an error at any line."""
         self.home.empty(seed=seed, recover=recover)
 
     def update(self, changes: Changes, events: dev.Events, apply: Apply) -> None:
         """Render another scene from now on.
 
-        events: that arrays of the changes wait for; apply: calls what writes a change, see
-        `FilmRenderer._apply`.
+        events: to wait for before arrays of the changes are read; apply: calls the function that
+        writes a change, see `FilmRenderer._apply`.
         """
         self.home.update(changes, events, apply)
 
     def follow(self, way: Integrator, apply: Apply) -> None:
-        """Render in another way, which made a film that is gone on with; see `update`."""
+        """Render with another integrator, which made a saved film; see `update`."""
         self.home.follow(way, apply)
 
     def close(self) -> None:
-        """Give back what it holds."""
+        """Release the devices' memory."""
         self.home.close()

@@ -1,8 +1,8 @@
 """Kernel text of the parameters of kinds: structs, and the loaders that fill them.
 
-A parameter's sources are where its values in a scene come from: "none" (0, which leaves a lobe
-out), "constant", "grey" (the same at all wavelengths: an index), "table" (a tabulated spectrum),
-"texture", "layers"; of a flag or a choice, its number. A loader reads from those that occur, and
+A parameter's values in a scene come from sources: "none" (0, which leaves a lobe out), "constant",
+"grey" (an index that is the same at all wavelengths), "table" (a tabulated spectrum), "texture",
+"layers"; the source of a flag or a choice is its number. A loader reads the sources that occur. It
 holds a flag or a choice that is the same in the whole scene.
 """
 
@@ -25,15 +25,15 @@ from clpt.scene import roles
 from clpt.scene.params import Kind, device_params
 from clpt.scene.roles import Param, Role
 
-CONSTANT = frozenset({"constant"})  # where nothing is known of a scene
+CONSTANT = frozenset({"constant"})  # for a scene that is not known
 _LOADED = "(Scene scene, integer at, TexturePoint point, Wavelengths lambdas)"
 
 
 def struct_text(cls: type[Kind], sources: Mapping[str, frozenset[str]] | None = None) -> str:
-    """Return `typedef struct {...} Kind;` with one member per device parameter.
+    """Return `typedef struct {...} Kind;` with a member for each device parameter.
 
-    Before it, for a lobe that a parameter of 0 leaves out, `USES_KIND_PARAMETER`: whether the scene
-    has it. sources: of each parameter; without, there are all lobes.
+    For a lobe that a parameter of 0 leaves out, `USES_KIND_PARAMETER` before it says whether the
+    scene has the lobe. sources: of each parameter; without them every lobe is used.
     """
     rows, uses = [], []
     for name, param in device_params(cls).items():
@@ -51,9 +51,10 @@ def struct_text(cls: type[Kind], sources: Mapping[str, frozenset[str]] | None = 
 
 
 def word_before(cls: type[Kind], name: str) -> int:
-    """Return where in a kind's row its parameter `name` begins."""
+    """Return the first word of the parameter `name` in a kind's row."""
     declared = device_params(cls)
-    return sum(words(declared[one]) for one in [*declared][: [*declared].index(name)])
+    names = [*declared]
+    return sum(words(declared[before]) for before in names[: names.index(name)])
 
 
 def load_text(
@@ -64,20 +65,20 @@ def load_text(
 ) -> str:
     """Return `kind_load(scene, row, point, lambdas)`, which reads a row at the path's wavelengths.
 
-    sources: of each parameter; of one that is not there, "constant"; stochastic: a random texel
-    stands for what is linear.
+    sources: of each parameter, by default "constant"; stochastic: a random texel stands for a
+    filtered texture in linear parameters.
     """
     declared = device_params(cls)
-    read, given = row_words(f"scene.{table}", "row", sum(map(words, declared.values())))
+    read, loaded = row_words(f"scene.{table}", "row", sum(map(words, declared.values())))
     rows = [f"{cls.__name__} r;", *read]
     for name, param in declared.items():
         first = word_before(cls, name)
-        own = given[first : first + words(param)]
+        of_param = loaded[first : first + words(param)]
         if array_size(param) > 1:
-            rows += [f"r.{name}[{i}] = {word};" for i, word in enumerate(own)]
+            rows += [f"r.{name}[{i}] = {word};" for i, word in enumerate(of_param)]
         else:
             present, texel = sources.get(name) or CONSTANT, stochastic and param.linear
-            rows += _member(f"r.{name}", _Read(param, own, f"row + {first}", present, texel))
+            rows += _member(f"r.{name}", _Read(param, of_param, f"row + {first}", present, texel))
     before = ""
     if cls.tints:
         before = value_text(
@@ -96,7 +97,7 @@ def load_text(
 
 
 def _luminance(cls: type[Kind]) -> list[str]:
-    """Set `luminance`: of base_color, at wavelengths of its own, where a lane has a tint."""
+    """Return the lines that set `luminance`, of base_color, where a lane has a tint."""
     each = (" & ".join(f"(r.{name} > 0.0f)" for name in names) for names in cls.tints)
     tests = " | ".join(f"({test})" for test in each)
     row = f"row + {word_before(cls, 'base_color')}"
@@ -110,9 +111,9 @@ def _luminance(cls: type[Kind]) -> list[str]:
 
 @dataclass(frozen=True)
 class _Read:
-    """A member to be read: its parameter, the words of its row, and where they are.
+    """A member to be read: its parameter, and its words in the row.
 
-    sources: those that occur; texel: of an image a random texel is read.
+    at: the first word; sources: those that occur; texel: read a random texel of an image.
     """
 
     param: Param
@@ -129,8 +130,8 @@ def _number(read: _Read) -> str:
 
 
 def _layers(read: _Read) -> str:
-    there = "layers" in read.sources
-    return f"layers_load(scene, {read.at}, point, lambdas)" if there else "layers_none()"
+    layered = "layers" in read.sources
+    return f"layers_load(scene, {read.at}, point, lambdas)" if layered else "layers_none()"
 
 
 def _table(read: _Read) -> str:
@@ -141,7 +142,7 @@ def _table(read: _Read) -> str:
 class Table:
     """A table that a member refers to: the function that finds it, and the files that read it.
 
-    counted: where all tables of a scene have the same counts at their heads, texts have them.
+    counted: texts hold the counts at the tables' heads if all tables of a scene have the same.
     """
 
     load: str
@@ -159,7 +160,7 @@ TABLES: dict[Role, Table] = {
     ),
     roles.MERL: Table("merl_load_table", "materials/merl_table.cl", "materials/merl_load.cl"),
 }
-# how a member is read that is neither a spectrum nor a number
+# the loads of members that are neither spectra nor numbers
 LOADS: dict[Role, Callable[[_Read], str]] = {
     roles.FLAG: _number,
     roles.CHOICE: _number,
@@ -169,19 +170,22 @@ LOADS: dict[Role, Callable[[_Read], str]] = {
 
 
 def _member(target: str, read: _Read) -> list[str]:
-    """Set a member from the sources that occur."""
+    """Return the lines that set a member from the sources that occur."""
     if read.param.role in LOADS:
         return [f"{target} = {LOADS[read.param.role](read)};"]
     return _value(target, read)
 
 
 def _value(target: str, read: _Read) -> list[str]:
-    """Set a spectrum or a number; a lane's word after the value says from which source."""
+    """Return the lines that set a spectrum or a number.
+
+    The word after the value says the source of a lane.
+    """
     form, present = lane_type(read.param), read.sources
     if present == {"none"}:
         return [f"{target} = {'spectrum_of(0.0f)' if form == 'Spectrum' else '(real)(0.0f)'};"]
-    *own, source = read.words
-    whole = f"v4({', '.join(own)})" if form == "Spectrum" else own[0]
+    *values, source = read.words
+    whole = f"v4({', '.join(values)})" if form == "Spectrum" else values[0]
     if present == {"grey"}:
         return [f"{target} = spectrum_grey({whole});"]
     if present & {"none", "grey"}:
@@ -204,8 +208,8 @@ def value_text(
 ) -> str:
     """Return `name(scene, at, point, lambdas)`, which loads a single parameter from `table`."""
     form = lane_type(param)
-    read, given = row_words(f"scene.{table}", "at", words(param))
-    member = _Read(param, given, "at", sources or CONSTANT)
+    read, loaded = row_words(f"scene.{table}", "at", words(param))
+    member = _Read(param, loaded, "at", sources or CONSTANT)
     rows = [*read, f"{form} value;", *_member("value", member)]
     return function(f"{form} {name}{_LOADED}", *rows, "return value;")
 
@@ -226,29 +230,30 @@ def factor_text(sources: frozenset[str]) -> str:
 def medium_text(sources: Mapping[str, frozenset[str]]) -> str:
     """Return `medium_absorption(scene, at, point, lambdas)`: five words of `materials`.
 
-    sources: of "absorption"; where there is "scattering", `medium_scattering` reads what stands
-    MEDIUM_SCATTERING words behind it, where there is "light" `medium_light` what stands
-    MEDIUM_LIGHT words before it.
+    sources: of "absorption". With "scattering", `medium_scattering` reads the words
+    MEDIUM_SCATTERING behind it. With "light", `medium_light` reads those MEDIUM_LIGHT before it.
     """
     coefficient = Param(roles.COEFFICIENT)
     head = f"#define MEDIUM_SCATTERING {SPECTRUM_WORDS}\n" if "scattering" in sources else ""
     head += f"#define MEDIUM_LIGHT {1 + SPECTRUM_WORDS}\n" if "light" in sources else ""
     return head + "".join(
-        value_text(f"medium_{name}", coefficient, own) for name, own in sources.items()
+        value_text(f"medium_{name}", coefficient, of_name) for name, of_name in sources.items()
     )
 
 
 def _medium_sources(features: Features) -> dict[str, frozenset[str]]:
     names = ("absorption", "scattering") if features.media.present else ("absorption",)
     loaded = features.materials.sources
-    found = {name: frozenset(s for _, own, s in loaded if own == name) for name in names}
+    sources = {
+        name: frozenset(source for _, param, source in loaded if param == name) for name in names
+    }
     if features.media.emissive:
-        found["light"] = features.materials.sources_of("medium")["light"]
-    return found
+        sources["light"] = features.materials.sources_of("medium")["light"]
+    return sources
 
 
 def virtual_files(features: Features) -> dict[str, str]:
-    """Return the loaders of what surfaces have besides their materials' own parameters."""
+    """Return the loaders of values that belong to no kind: of media, mixtures and normal maps."""
     weights = features.materials.sources_of("mixture").get("weight")
     bodies = features.materials.sources_of("body").get("index")
     maps = features.materials.sources_of("perturbation").get("value")

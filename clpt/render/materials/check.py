@@ -15,14 +15,14 @@ Maps = tuple[tuple[type[Material], bool], ...]
 
 
 def check_material(material: Material, film: Film) -> None:
-    """Raise SceneError for a material whose parts do not go together, or not with a film."""
-    made = list(parts(material))
-    for part in made:
+    """Raise SceneError for a material whose parts do not fit each other, or the film."""
+    listed = list(parts(material))
+    for part in listed:
         _check_held(part)
-    if len(made) > 1:
-        _check_sides(made)
+    if len(listed) > 1:
+        _check_sides(listed)
         _check_maps(material, (), False)
-    for part in made:
+    for part in listed:
         check_textures(part)
         check_indices((part, *part.layers), film)
         if part.layers and film.mode == "rgb":
@@ -30,25 +30,26 @@ def check_material(material: Material, film: Film) -> None:
 
 
 def _check_held(material: Material) -> None:
-    """Raise SceneError for a material in which another is missing that it cannot do without."""
-    own = fields_of(material)
+    """Raise SceneError for a composite without one of its materials."""
+    values = fields_of(material)
     for field in dataclasses.fields(material):
-        if field.type == "Material" and own[field.name] is None:
+        if field.type == "Material" and values[field.name] is None:
             raise SceneError(f"{material.kind} needs a material as its {field.name!r}, not none")
 
 
-def _check_sides(made: list[Material]) -> None:
-    """Raise SceneError for light that is let through beside a two_sided material."""
-    passing = next((part for part in made if part.transmits), None)
-    if passing is not None and any(isinstance(part, TwoSided) for part in made):
+def _check_sides(listed: list[Material]) -> None:
+    """Raise SceneError for a part that transmits light beside a two_sided material."""
+    passing = next((part for part in listed if part.transmits), None)
+    if passing is not None and any(isinstance(part, TwoSided) for part in listed):
         message = f"{passing.kind} lets light through, so it cannot be a part of two_sided"
         raise SceneError(f"{message}, or be mixed with it")
 
 
 def _check_maps(material: Material | None, outer: Maps, inside: bool) -> None:
-    """Raise SceneError for two maps of a kind in one another, or on both sides of a two_sided.
+    """Raise SceneError for nested maps of the same kind, or maps inside and around a two_sided.
 
-    outer: the maps around, and whether each is inside of a two_sided material, as this may be.
+    outer: the kinds of the maps around, and whether each is inside of a two_sided material;
+    inside: whether this material is.
     """
     if isinstance(material, TwoSided):
         for side in (material.front, material.back):
@@ -76,6 +77,7 @@ def _check_layers(material: Material, layers: tuple[Layer, ...]) -> None:
         if isinstance(fields_of(material).get(name), Texture):
             message = f"{material.kind}.{name} cannot be a texture below layers in RGB mode; "
             raise SceneError(f"{message}give a spectrum, {instead}")
-    if len({id(one.profile) for one in layers if isinstance(one.profile, Texture)}) > 1:
+    textures = {id(layer.profile) for layer in layers if isinstance(layer.profile, Texture)}
+    if len(textures) > 1:
         message = f"one texture can vary the layers of {material.kind} in RGB mode, not several; "
         raise SceneError(f"{message}give them the same one, {instead}")

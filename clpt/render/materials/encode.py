@@ -1,4 +1,4 @@
-"""Material words: what a hit finds its material by, for each side of a shape.
+"""Material words: a hit finds the material of each side of a shape by them.
 
 The upper 8 bits of a word are the number of a leaf kind, or MIXTURE; the lower 24 bits are the
 first word of a row in `materials`, or in `mixtures`.
@@ -7,13 +7,13 @@ first word of a row in `materials`, or in `mixtures`.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.render.materials import gloss
 from clpt.render.materials.encoder import Encoder
 from clpt.render.materials.normal_maps import NormalPerturbation
 from clpt.render.records.parameter_words import MIXTURE, NORMAL_MAP_WORDS
@@ -25,15 +25,25 @@ from clpt.scene.phases import Blend, Phase
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 from clpt.scene.textures import Texture
+from clpt.spectra import RGB, RGBUnbounded, Spectrum
 
 _NULL, _BLACK = mt.Null(), mt.Diffuse(reflectance=0.0)
+
+STRAIGHT = 0.04  # reflectance of a dielectric at normal incidence
+TEXTURED = 0.2  # a typical albedo, for textures
+ROUGHLY = 0.5  # a typical roughness, for textures
+EXPONENT = 30.0  # a typical exponent, for textures
+SEEN = np.linspace(420.0, 680.0, 14)  # wavelengths of a mean albedo [nm]
+
+Values = Mapping[str, object]
 
 
 @dataclass(frozen=True)
 class _Side:
-    """A side of a surface, and what stands around the material that is looked at.
+    """A side of a surface, and the composites around the material in hand.
 
-    two_sided: the back of the surface is shaded like a front; inside: below a TwoSided.
+    two_sided: the back of the surface is shaded like a front; inside: below a TwoSided;
+    perturbation: the maps around the material.
     """
 
     front: bool
@@ -43,16 +53,16 @@ class _Side:
 
     @property
     def key(self) -> tuple[Any, ...]:
-        """A key that is equal for sides which are shaded alike."""
+        """A key that is equal for sides with the same shading."""
         return self.front, self.two_sided, self.inside, self.perturbation.key
 
 
 class MaterialWords:
-    """Makes material words, and notes what the materials that it has met need of the kernels.
+    """The words of materials, and what these materials need of the kernels.
 
-    gloss_before: words before a row where its gloss stands, 0 if nobody asks for it;
-    uvs, tangents, absorption: whether a material needs them; transmitting: kinds of leaves of which
-    some let light through; mixture_depth: how deep masks and blends nest.
+    gloss_before: a row's gloss lies this many words before the row, 0 without gloss;
+    uvs, tangents, absorption: whether a material needs them; transmitting: the kinds of leaves that
+    transmit light in this scene; mixture_depth: how deep masks and blends nest.
     """
 
     def __init__(
@@ -81,7 +91,7 @@ class MaterialWords:
         return front, back, two_sided
 
     def phase(self, phase: Phase) -> int:
-        """Return the word of a phase function, which is found as the material of a side is."""
+        """Return the word of a phase function; kernels find it like a material."""
         if isinstance(phase, Blend):
             children = [self.phase(part) for part in (phase.first, phase.second)]
             return self._mixture_of(phase.weight, children)
@@ -89,11 +99,10 @@ class MaterialWords:
         return self._leaf(phase, _Side(front=True, two_sided=False))
 
     def null(self) -> int:
-        """Return the word of a surface that is not there."""
+        """Return the word of a null surface."""
         return self._leaf(_NULL, _Side(front=True, two_sided=False))
 
     def _word(self, material: mt.Material, side: _Side) -> int:
-        """The word of a material on a side; the same pair has the same word."""
         key = (id(material), side.key)
         if key not in self._words:
             self._words[key] = self._new_word(material, side)
@@ -112,7 +121,7 @@ class MaterialWords:
             return self._mixture(material.weight, material.first, material.second, side)
         one_sided = not side.inside and not isinstance(material, mt.Null)
         if side.two_sided and not side.front and one_sided:
-            material = _BLACK  # the back of a one-sided part of a two-sided surface
+            material = _BLACK  # a part that is not two-sided has a black back there
         if material.no_back and not side.front:
             material = _NULL
         return self._leaf(material, side)
@@ -121,7 +130,7 @@ class MaterialWords:
         before = side.perturbation.words(self._encoder, material) if self._normal_mapped else None
         if self.gloss_before:
             maps = () if before is None else before
-            before = np.array([gloss.word(material), *maps], np.uint32)
+            before = np.array([gloss_word(material), *maps], np.uint32)
         row = self._encoder.row(material, "materials", before)
         if row >= 1 << 24:
             raise SceneError("the scene has more than 16 million words of material parameters")
@@ -135,7 +144,7 @@ class MaterialWords:
         return self._leaves.index(type(material)) << 24 | row
 
     def _mixture(self, weight: object, first: mt.Material, second: mt.Material, side: _Side) -> int:
-        return self._mixture_of(weight, [self._word(one, side) for one in (first, second)])
+        return self._mixture_of(weight, [self._word(part, side) for part in (first, second)])
 
     def _mixture_of(self, weight: object, children: list[int]) -> int:
         words, source = self._encoder.named_words("mixture", "weight", weight, roles.REAL)
@@ -146,6 +155,65 @@ class MaterialWords:
 
 
 def _has_textures(kind: Kind) -> bool:
-    """Whether a parameter of a kind is a texture that kernels read."""
+    """Return whether a parameter that kernels read is a texture."""
     values = fields_of(kind)
     return any(isinstance(values[name], Texture) for name in device_params(type(kind)))
+
+
+def gloss_word(material: Scatterer) -> int:
+    """Return the gloss of a leaf material for the tree over lights, 0 for a dull material.
+
+    The upper 16 bits are the roughness of its microfacets, alpha. The lower 16 bits are the share
+    of the glossy lobe in the albedo at normal incidence. The tree only chooses lights by it: a
+    guess costs noise and no truth (kernels/lights/receiver.cl).
+    """
+    glossy = _GLOSSY.get(material.kind)
+    if glossy is None or material.transmits:
+        return 0
+    alpha, share = glossy(fields_of(material))
+    alpha, share = np.clip((alpha, share), 1e-3, 1.0)
+    return int(alpha * 65535) << 16 | int(share * 65535)
+
+
+def _mean(value: object, unknown: float = TEXTURED) -> float:
+    """Return the mean of a parameter over wavelengths; `unknown` for a texture."""
+    if isinstance(value, (int, float)):
+        return float(value)
+    if isinstance(value, (RGB, RGBUnbounded)):
+        return (value.r + value.g + value.b) / 3.0
+    return float(value.sample(SEEN).mean()) if isinstance(value, Spectrum) else unknown
+
+
+def _metal(values: Values) -> tuple[float, float]:
+    u, v = (_mean(values[name], ROUGHLY**2) for name in ("alpha_u", "alpha_v"))
+    return float(np.sqrt(u * v)), 1.0
+
+
+def _plastic(values: Values) -> tuple[float, float]:
+    share = _share(STRAIGHT, _mean(values["diffuse_reflectance"]))
+    return _mean(values["alpha"], ROUGHLY**2), share
+
+
+def _principled(values: Values) -> tuple[float, float]:
+    metal, albedo = _mean(values["metallic"]), _mean(values["base_color"])
+    straight = metal * albedo + (1.0 - metal) * STRAIGHT
+    return _mean(values["roughness"], ROUGHLY) ** 2, _share(straight, (1.0 - metal) * albedo)
+
+
+def _phong(values: Values) -> tuple[float, float]:
+    share = _share(_mean(values["specular"]), _mean(values["diffuse"]))
+    return float(np.sqrt(2.0 / (4.0 * _mean(values["exponent"], EXPONENT) + 2.0))), share
+
+
+def _share(glossy: float, diffuse: float) -> float:
+    return glossy / max(glossy + diffuse, 1e-6)
+
+
+_GLOSSY: dict[str, Callable[[Values], tuple[float, float]]] = {
+    "rough_conductor": _metal,
+    "coated_conductor": _metal,
+    "rough_plastic": _plastic,
+    "principled": _principled,
+    "gltf_surface": _principled,
+    "phong": _phong,
+}

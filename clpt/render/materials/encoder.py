@@ -1,4 +1,4 @@
-"""The encoder: parameters of materials, lights and layers as the words that kernels read."""
+"""The encoder: parameters of materials, lights and layers become the words that kernels read."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ BLACK = (Constant(0.0), RGB(0.0, 0.0, 0.0))
 
 
 class Encoder:
-    """Encodes parameters, and puts what they refer to into the tables.
+    """Encodes parameters, and appends the data that they refer to.
 
     mode, lambda_min, lambda_max, sensor, density: see `SpectraTable`; texture_budget: [bytes] for
-    images, None for any number; cache: of costly pieces.
+    images, None for any number; cache: of costly parts.
     """
 
     def __init__(
@@ -61,11 +61,11 @@ class Encoder:
         self._sources: dict[str, dict[str, set[str]]] = _no_sources()
         self._rows: dict[tuple[int, str, bytes], tuple[int, Kind]] = {}
         self.warnings: set[str] = set()  # of tables that the film does not reach
-        self._spent = False  # whether it knows of words that no device has
+        self._spent = False  # `replaced` failed: rows hold words that no device has
 
     @property
     def look(self) -> Look:
-        """The way in which the film looks at lights that are images."""
+        """The film's wavelengths, for the brightness of lights that are images."""
         return Look(self.spectra.spectral, *self.spectra.range, self.cache)
 
     @property
@@ -77,7 +77,7 @@ class Encoder:
     def sources(self) -> Sources:
         """The sources of the values of parameters: (kind, parameter, source).
 
-        A source is one of those in clpt.render.materials.cases.
+        clpt.render.materials.cases lists the sources.
         """
         return frozenset(
             (kind, name, source)
@@ -87,10 +87,9 @@ class Encoder:
         )
 
     def row(self, kind: Kind, table: str, before: Words | None = None) -> int:
-        """Append what the kernels read of a kind to a table; return its first word.
+        """Append the words of a kind to a table; return the first word.
 
-        before: words that stand in front of it. The same object after the same words is put in
-        once.
+        before: words in front of it. The same object after the same words is appended once.
         """
         key = (id(kind), table, b"" if before is None else before.tobytes())
         if key not in self._rows:
@@ -100,10 +99,10 @@ class Encoder:
         return self._rows[key][0]
 
     def replaced(self, old: Kind, new: Kind, table: str) -> list[tuple[int, Words]] | None:
-        """Put a kind in the rows of another whose values differ, after the arrays were taken.
+        """Put a kind into the rows of another kind that has other values, after the arrays exist.
 
-        Return the first word of each row and its new words. Return None, from then on for all
-        kinds, where more than values differs: the tables must be made again.
+        Return the first word of each row and its new words. Return None if more than values
+        differs, and then for all later calls: the tables must be made again.
         """
         if self._spent:
             return None
@@ -116,7 +115,7 @@ class Encoder:
         sources = []
         for kind in (old, new):
             self._sources = _no_sources()
-            made = self.kind_words(kind)
+            new_words = self.kind_words(kind)
             sources.append(self._sources)
         self._sources = kept
         if sources[0] != sources[1] or sizes != self.store.sizes:
@@ -125,25 +124,25 @@ class Encoder:
         rows = [self._rows.pop(key)[0] for key in owned]
         for key, row in zip(owned, rows, strict=True):
             self._rows[id(new), key[1], key[2]] = row, new
-        return [(row, made) for row in rows]
+        return [(row, new_words) for row in rows]
 
     def kind_words(self, kind: Kind) -> Words:
-        """Return the words of what the kernels read of a kind."""
-        made: list[Words] = []
+        """Return the words of a kind's parameters that kernels read."""
+        parts: list[Words] = []
         read = {**device_params(type(kind)), **interior_params(type(kind))}
         values = fields_of(kind)
         for name, param in read.items():
-            given = values[name]
-            self._note_reach(given, place_of(kind, name))
-            value, source = self.param_words(given, param, kind)
-            if param.lobe and given in (0.0, *BLACK):
+            value = values[name]
+            self._note_reach(value, place_of(kind, name))
+            encoded, source = self.param_words(value, param, kind)
+            if param.lobe and value in (0.0, *BLACK):
                 source = "none"
-            made.append(value)
+            parts.append(encoded)
             self._sources[kind.kind][name].add(source)
-        return np.concatenate(made) if made else np.zeros(1, np.uint32)
+        return np.concatenate(parts) if parts else np.zeros(1, np.uint32)
 
     def _note_reach(self, value: object, where: str) -> None:
-        """Note a table that the film does not reach."""
+        """Warn of a tabulated spectrum outside of the film's wavelengths."""
         if isinstance(value, Tabulated) and not self.spectra.reaches(value):
             low, high = self.spectra.range
             self.warnings.add(
@@ -154,36 +153,39 @@ class Encoder:
     def param_words(
         self, value: object, param: Param, owner: Kind | None = None
     ) -> tuple[Words, str]:
-        """Return the words of one parameter and where its value comes from.
+        """Return the words of a parameter and its source.
 
-        owner: the kind that it belongs to, if any.
+        owner: the kind with this parameter, if any.
         """
         if isinstance(value, Texture):
             value = self.textures.folded(value, param.role)
         if isinstance(value, Texture):
-            made = np.zeros(words(param), np.uint32)
-            made[-1] = 1 + self.textures.row(value, param.role)
-            return made, "texture"
+            texture_words = np.zeros(words(param), np.uint32)
+            texture_words[-1] = 1 + self.textures.row(value, param.role)
+            return texture_words, "texture"
         return ENCODINGS[param.role](self, value, param, owner)
 
     def named_words(self, kind: str, name: str, value: object, role: Role) -> tuple[Words, str]:
-        """Return the words of a value that belongs to no kind, and note its source by a name."""
-        made, source = self.param_words(value, Param(role))
+        """Return the words and the source of a value that belongs to no kind.
+
+        kind, name: under them `sources` lists the source.
+        """
+        encoded, source = self.param_words(value, Param(role))
         self._sources[kind][name].add(source)
-        return made, source
+        return encoded, source
 
     def emission_words(self, value: object) -> Words:
         """Return the five words that `emission_load` reads: a spectrum or a texture."""
         return self.named_words("emission", "value", value, roles.EMISSION)[0]
 
     def factor_words(self, value: object) -> Words:
-        """Return the five words that `factor_load` reads: a reflectance, perhaps a texture."""
+        """Return the five words that `factor_load` reads: a reflectance or a texture."""
         return self.named_words("factor", "value", value, roles.REFLECTANCE)[0]
 
     def layers_words(self, material: Material) -> tuple[Words, str]:
-        """Return the two words of a material's thin films, and "constant" if there are none.
+        """Return the two words of a material's thin films, and "constant" without films.
 
-        In spectral mode they are a row for each layer; in RGB mode a table of colours.
+        They name a row for each layer in spectral mode, a table of colours in RGB mode.
         """
         if not material.layers:
             return np.zeros(LAYERS_WORDS, np.uint32), "constant"
@@ -214,8 +216,8 @@ def _number(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[
 
 
 def _real(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:
-    plain = value.value if isinstance(value, Constant) else value
-    return np.array([as_words([plain])[0], 0], np.uint32), "constant"
+    number = value.value if isinstance(value, Constant) else value
+    return np.array([as_words([number])[0], 0], np.uint32), "constant"
 
 
 def _orders(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:
@@ -224,7 +226,7 @@ def _orders(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[
 
 
 Encoding = Callable[[Encoder, Any, Param, Any], tuple[Words, str]]
-# how a value that is no texture becomes words
+# the encodings of values other than textures
 ENCODINGS: dict[Role, Encoding] = {
     **dict.fromkeys(roles.SPECTRA, _spectrum),
     roles.REAL: _real,

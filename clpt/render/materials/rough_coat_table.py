@@ -24,8 +24,8 @@ Kept = dict[str, NDArray[Any]]
 FILE = Path(__file__).parent / "data/rough_coat.npz"
 LARGEST = 65535  # of a table's numbers, as they are kept
 ALPHAS, INDICES, COSINES = 16, 14, 16
-STEEPS = 6  # cosines by which light that a coat throws back came, even in their roots
-HIGHEST = 3.0  # index up to which the tables go
+STEEPS = 6  # nodes of the incident cosine for light that a coat throws back, even in the root
+HIGHEST = 3.0  # the largest index of the tables
 BOUNCE = 0.77  # cosine of light within a coat, see kernels/materials/kinds/coated_conductor.cl
 _RADII, _AZIMUTHS = leggauss(40), 48
 
@@ -56,7 +56,7 @@ def indices() -> Floats:
 
 
 def facing(cos_i: Floats, alpha: float) -> Floats:
-    """A cosine that stands for those of the facets which cos_i sees."""
+    """Return a typical cosine between a direction of cosine cos_i and the facets that it sees."""
     return np.sqrt(cos_i**2 + alpha**2 * (1.0 - cos_i**2))
 
 
@@ -99,8 +99,8 @@ def _mean(distribution: str, alpha: float, cos_i: Floats, value: Callable[..., F
     area = np.maximum(cos_i + np.sqrt(1.0 - cos_i**2) * radius * turn, 0.0)
     cosine = np.minimum(area * cos_h, 1.0)
     area = area * (weights * v)[:, None]
-    found = area * value(cos_i, np.maximum(cosine, 1e-12), cos_h)
-    return found.sum((1, 2)) / area.sum((1, 2))
+    weighted = area * value(cos_i, np.maximum(cosine, 1e-12), cos_h)
+    return weighted.sum((1, 2)) / area.sum((1, 2))
 
 
 def transmittance(distribution: str, alpha: float, eta: float, cos_i: Floats) -> Floats:
@@ -143,14 +143,14 @@ def bounce(distribution: str, alpha: float) -> float:
 
 
 def within(cos_i: Floats, eta: float) -> Floats:
-    """Cosines within a smooth coat of light that comes to it at these."""
+    """Return the cosines of refracted light within a smooth coat."""
     return np.sqrt(1.0 - (1.0 - cos_i**2) / eta**2)
 
 
 def thrown_back(distribution: str, alpha: float, eta: float, cos_i: Floats) -> Floats:
-    """Return the share of light from facets below that a smooth coat throws back; they reflect all.
+    """Return the share of light from white facets below that a smooth coat throws back.
 
-    cos_i (n,): the cosines at which the light came to the coat.
+    cos_i (n,): the cosines of the incident light outside of the coat.
     """
 
     def thrown(cos_i: Floats, c: Floats, cos_h: Floats) -> Floats:
@@ -181,7 +181,7 @@ def _thrown(distribution: str, alpha: float, eta: float) -> Floats:
     return 1.0 + thrown_back(distribution, alpha, eta, cos_i) - fresnel(cos_i, eta)
 
 
-def made() -> Kept:
+def computed() -> Kept:
     """Return the tables by name, in the order of DOCS: a minute of work."""
     tables = {
         "passed": _rows(_passed),
@@ -189,12 +189,12 @@ def made() -> Kept:
         "bounce": _bounces(),
         "thrown": _rows(_thrown),
     }
-    found = {}
+    quantised = {}
     for name, table in tables.items():
         most = table.max()
-        found[name] = np.round(table / most * LARGEST).astype(np.uint16)
-        found[f"{name}_most"] = most
-    return found
+        quantised[name] = np.round(table / most * LARGEST).astype(np.uint16)
+        quantised[f"{name}_most"] = most
+    return quantised
 
 
 def kept() -> Kept:
@@ -204,9 +204,9 @@ def kept() -> Kept:
 
 
 def _array(name: str, doc: str, shares: NDArray[np.uint16], most: float) -> str:
-    """The text of a table of 16-bit shares of its largest number, and in upper halves the next's.
+    """Return the text of a table: 16-bit shares of its largest number, two in a word.
 
-    The next: along the last axis, on which the last node has none.
+    The upper half of a word is the next share along the last axis; the last share starts no word.
     """
     words = shares.astype(np.uint32)
     pairs = (words[..., :-1] | words[..., 1:] << np.uint32(16)).reshape(-1).tolist()
@@ -240,5 +240,5 @@ def virtual_files() -> dict[str, str]:
 
 
 if __name__ == "__main__":
-    arrays: dict[str, Any] = made()
+    arrays: dict[str, Any] = computed()
     np.savez_compressed(FILE, **arrays)

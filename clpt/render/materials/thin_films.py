@@ -1,16 +1,16 @@
-"""Thin films in RGB mode: a table of the colours that they reflect and let through.
+"""Thin films on boundaries: their kernel text, and in RGB mode a table of their colours.
 
 In spectral mode the kernels sum the waves themselves (kernels/materials/film_stack.cl). In RGB mode
-there are no waves to sum: the host does it for every angle, and thickness where a texture varies
-it, and integrates what is reflected and what goes through over the wavelengths of D65, as an RGB
-renderer sees all reflectances. Belcour and Barla 2017 integrate on the device, by a Fourier series
-of the observer; a table is exact, and as fast.
+the host sums them for every angle, and for every thickness where a texture varies it. It integrates
+reflectance and transmittance over the wavelengths of D65, as an RGB renderer sees all reflectances.
+Belcour and Barla 2017 integrate on the device, by a Fourier series of the observer; a table is
+exact, and as fast.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from clpt import spectra
 from clpt.arrays import Array
-from clpt.render.records.parameter_words import FILM_COSINES
+from clpt.render.materials.cases import load_text, struct_text, value_text
+from clpt.render.records.parameter_words import FILM_COSINES, row_words
+from clpt.scene import roles
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, params
 from clpt.scene.textures import Texture
@@ -28,15 +30,36 @@ from clpt.spectra.spectrum import d65
 THICKNESS_STEP = 4.0  # [nm] of the table, where a texture varies the thickness
 MOST_ROWS = 1024
 
+Sources = Mapping[str, frozenset[str]]
+_WAVES = '#include "materials/layers_waves.cl"\n#include "materials/boundary_film.cl"\n'
+_TABLE = '#include "materials/layers_table.cl"\n#include "materials/boundary_table.cl"\n'
+
 _ZERO = spectra.Constant(0.0)
 
 
-def film_colours(material: Kind) -> NDArray[np.float32]:
-    """Return what a material's layers reflect and let through under D65, linear Rec. 709.
+def boundary_text(cls: type[Kind], mode: str, sources: Sources, layer: Sources) -> str:
+    """Return the text of a kind's boundary: bare, with layers, or by the table of colours.
 
-    (parts, profiles, FILM_COSINES, 6) float32: r and t; the parts are those of
-    kernels/materials/boundary_table.cl, a metal has only the first. Profiles and cosines are even
-    from 0 to 1; where no texture varies the thickness there is one profile.
+    sources: of the kind's parameters; layer: of the parameters of all layers in the scene.
+    """
+    coated = [name for name, param in params(cls).items() if param.role is roles.LAYERS]
+    if not coated:
+        return ""
+    if not any("layers" in sources.get(name, ()) for name in coated):
+        return '#include "materials/boundary_bare.cl"\n'
+    if mode == "rgb":
+        profile = value_text("film_profile", params(Layer)["profile"], layer["profile"])
+        return f"{profile}#define FILM_COSINES {FILM_COSINES}\n{_TABLE}"
+    loader = load_text(Layer, layer, "materials")
+    return f"{struct_text(Layer)}{loader}#define LAYER_WORDS {row_words(Layer)}\n{_WAVES}"
+
+
+def film_colours(material: Kind) -> NDArray[np.float32]:
+    """Return the reflectance and transmittance of a material's layers, linear Rec. 709 under D65.
+
+    (parts, profiles, FILM_COSINES, 6) float32: r and t. kernels/materials/boundary.cl lists the
+    parts; a metal has only the first. Profiles and cosines are even from 0 to 1. Without a texture
+    of the thickness the table has a single profile.
     """
     layers: tuple[Any, ...] = material.layers  # type: ignore[attr-defined]
     textured = [layer for layer in layers if _textured(layer)]
@@ -46,19 +69,19 @@ def film_colours(material: Kind) -> NDArray[np.float32]:
     weights = _colour_weights(lambdas)
     films = [_complex(layer.eta, layer.k, lambdas) for layer in layers]
     parts = _parts(material, lambdas)
-    made = np.empty((len(parts), count, FILM_COSINES, 6), np.float32)
+    table = np.empty((len(parts), count, FILM_COSINES, 6), np.float32)
     for part, (above, below, tangential) in enumerate(parts):
         step = 1 if above is parts[0][0] else -1  # from inside the layers are met in reverse
         indices = [above, *films[::step], below]
         for row, profile in enumerate(np.linspace(0.0, 1.0, count) if textured else [1.0]):
             thick = [e.thickness * (profile if _textured(e) else e.profile) for e in layers]
             r, t = film_shares(indices, thick[::step], tangential, lambdas)
-            made[part, row] = np.clip(np.hstack([r @ weights, t @ weights]), 0.0, 1.0)
-    return made
+            table[part, row] = np.clip(np.hstack([r @ weights, t @ weights]), 0.0, 1.0)
+    return table
 
 
 def _parts(material: Any, lambdas: Array) -> list[tuple[Array, Array, Array]]:
-    """The parts of a table: the media before and behind the films, and index times sine there."""
+    """Return for each part the index before and behind the films, and index times sine before."""
     even = np.linspace(0.0, 1.0, FILM_COSINES)[:, None] ** 2
     if "int_ior" not in params(type(material)):
         vacuum = np.ones(len(lambdas), complex)
@@ -76,12 +99,12 @@ def _parts(material: Any, lambdas: Array) -> list[tuple[Array, Array, Array]]:
 def film_shares(
     indices: Sequence[Array], thicknesses: Sequence[float], tangential: Array, lambdas: Array
 ) -> tuple[Array, Array]:
-    """Return the shares of unpolarised light that a stack reflects and lets through.
+    """Return the reflectance and transmittance of a stack for unpolarised light.
 
-    indices: complex, (wavelengths,) each, of the medium where light is, of the films, and of the
-    medium behind them; thicknesses [nm] of the films; tangential (angles, wavelengths): the index
-    times the sine where light is; lambdas [nm]. Two arrays (angles, wavelengths) float64.
-    As kernels/materials/film_stack.cl, whose sources these are.
+    indices: complex, (wavelengths,) each, of the incident medium, of the films, and of the medium
+    behind them; thicknesses [nm] of the films; tangential (angles, wavelengths): the index times
+    the sine in the incident medium; lambdas [nm]. Two arrays (angles, wavelengths) float64.
+    kernels/materials/film_stack.cl has the same formulas, and their sources.
     """
     beta = np.minimum(tangential.real, indices[0].real * math.sqrt(1.0 - 1e-12))
     q = [np.sqrt(n**2 - beta**2) for n in indices]
@@ -108,18 +131,17 @@ def _textured(layer: Layer) -> bool:
 
 
 def profile(material: Kind) -> Any:
-    """Return the one texture by which the thickness of a material's layers varies, or 1."""
+    """Return the texture that varies the thickness of a material's layers, 1 without a texture."""
     layers: tuple[Layer, ...] = material.layers  # type: ignore[attr-defined]
     return next((layer.profile for layer in layers if _textured(layer)), 1.0)
 
 
 def _complex(eta: Spectrum | str, k: Spectrum | str, lambdas: Array) -> Array:
-    """A complex index at the wavelengths."""
     n, extinction = (spectra.index(value).sample(lambdas) for value in (eta, k))
     return n + 1j * extinction
 
 
 def _colour_weights(lambdas: Array) -> Array:
-    """(wavelengths, 3): what turns reflectances into linear Rec. 709 under D65; 1 is white."""
+    """Return the weights (wavelengths, 3) that sum reflectances to linear Rec. 709 under D65."""
     weights = cie.xyz_to_rgb(cie.cie_xyz(lambdas) * d65().sample(lambdas)[:, None])
     return weights / weights.sum(axis=0)

@@ -1,4 +1,4 @@
-"""Motion on its way to the device: the tracks of what moves, and its shutter."""
+"""Motion as words: the tracks of moving objects, and the shutter."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STEP = MOTION_SIZES["step"]
 
 
 def track(keys: Keys | None) -> NDArray[np.float32]:
-    """Return the track of keys, or of what does not move: see kernels/motion/motion.cl."""
+    """Return the track of keys, None for a track at rest, see kernels/motion/motion.cl."""
     times: Sequence[float] = (0.0, 1.0) if keys is None else keys.times
     matrices: Any = np.stack([np.eye(4)] * 2) if keys is None else keys.transforms
     words = np.zeros(1 + STEP * (len(times) - 1), np.float32)
@@ -38,8 +38,8 @@ def track(keys: Keys | None) -> NDArray[np.float32]:
 def shutter_words(shutter: Shutter) -> NDArray[np.float32]:
     """Return the words of a shutter.
 
-    They are its number of steps, when it opens and for how long it is open, and for each step the
-    share of light before it and its density at both ends.
+    They are the number of steps, the opening time and the open time [s], then for each step the
+    share of light before it and the density at both ends.
     """
     density = shutter.density()
     shares = (density[1:] + density[:-1]) / 2.0
@@ -51,10 +51,10 @@ def shutter_words(shutter: Shutter) -> NDArray[np.float32]:
 
 
 def lower_motion(motions: Motions, shapes: int, rows: list[int], store: TableStore) -> int:
-    """Append the table of what moves to `distributions`; return where it begins.
+    """Append the table of motion to `distributions`; return its first word.
 
-    shapes: how many the scene has; rows: the index of each light that is no shape, in the order of
-    their rows; -1: one that does not move.
+    shapes: the number of the scene's shapes; rows: the index of each light without a shape, in the
+    order of rows; -1 for a light at rest.
     """
     head = 4 + bool(motions.deforming)
     first = store.size("distributions")
@@ -82,25 +82,25 @@ def lower_motion(motions: Motions, shapes: int, rows: list[int], store: TableSto
         heads.append(first + at + len(maps))
         maps = np.concatenate([maps, _deformations(motions, shapes, heads[-1])])
     parts[0] = np.array(heads, np.int32).view(np.float32)
-    # a kernel reads one step beyond the last
+    # kernels read a step beyond the last
     parts += [maps, np.zeros(STEP + 1, np.float32)]
     return store.append_floats("distributions", np.concatenate(parts))
 
 
 def _deformations(motions: Motions, count: int, first: int) -> NDArray[np.float32]:
-    """Return for each shape the word where its steps begin, and the steps of all shapes.
+    """Return for each shape the first word of its steps, and the steps of all shapes.
 
-    Of a shape: how many steps, and for each when it begins and one over how long it takes; none
-    where it does not deform. See kernels/motion/vertex_keys.cl.
+    The words of a shape are the number of steps, then each step's begin [s] and inverse length
+    [1/s]. A shape that does not deform has no steps. See kernels/motion/vertex_keys.cl.
     """
     places, parts, at = np.full(count, first + count, np.int32), [np.zeros(3, np.float32)], 3
-    made: dict[tuple[float, ...], int] = {}
+    first_words: dict[tuple[float, ...], int] = {}
     for number, times in motions.deforming.items():
-        if times not in made:
-            made[times] = first + count + at
+        if times not in first_words:
+            first_words[times] = first + count + at
             steps = np.array([len(times) - 1], np.int32).view(np.float32)
             rows = np.column_stack([times[:-1], 1.0 / np.diff(times)]).astype(np.float32)
             parts.append(np.concatenate([steps, rows.ravel()]))
             at += len(parts[-1])
-        places[number] = made[times]
+        places[number] = first_words[times]
     return np.concatenate([places.view(np.float32), *parts])

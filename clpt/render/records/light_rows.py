@@ -189,7 +189,7 @@ INFINITE = (
     "spectral_sky",
 )
 PLACED = (*(cls.kind for cls in LIGHTS if cls.reach == "placed"), "image_spot")
-FRONT, ALONG, BOTH = range(3)  # LightRow.emission_mode, see kernels/lights/area.cl
+FRONT, ALONG, BOTH, UNSEEN = 0, 1, 2, 4  # LightRow.emission_mode, see kernels/lights/area.cl
 
 BASES = {
     "spectral_envmap": "envmap",

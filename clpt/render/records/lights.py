@@ -16,6 +16,7 @@ class LightFeatures:
     infinite: bool = False  # some light is met by rays that leave the scene
     visible: bool = False  # some light is no delta light: a camera may see it
     two_sided: bool = False  # some shape emits from its back too
+    unseen: bool = False  # some shape emits, but no ray sees it
     tree: bool = False  # a tree chooses among the lights
     gloss: int = 0  # words before a material's row where its gloss stands; 0: nobody asks for it
     few: bool = flag("FEW_LIGHTS", True)  # the number that chooses one also places the point on it

@@ -9,7 +9,7 @@ from clpt.scene import roles
 from clpt.scene.params import Kind, device_params, interior_params
 from clpt.scene.roles import ORDERS, Param, Role
 
-NORMAL_MAP_WORDS = 23  # before a material's row, see kernels/materials/shading_frame_mapped.cl
+NORMAL_MAP_WORDS = 23  # before a material's row, see kernels/materials/shading_frame.cl
 MIXTURE = MATERIAL_KINDS["mixture"]
 FILM_COSINES = 128  # of the table of a film's colours, from 0 to 1
 RERADIATION_STEP = RERADIATION_SIZES["step"]  # [nm] between the nodes of a matrix

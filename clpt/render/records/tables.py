@@ -24,7 +24,7 @@ class TableStore:
     """The read-only tables of a scene, by the names in clpt.records.TABLES.
 
     device_grids: densities whose bricks kernels put into `images`, see
-    `clpt.render.media.device_grids`.
+    `clpt.render.media.grids`.
     """
 
     def __init__(self) -> None:

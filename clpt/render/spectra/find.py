@@ -1,13 +1,13 @@
-"""Wavelengths of the camera: a density over those to which its film responds.
+"""The density of sampled wavelengths, over the range to which the film responds.
 
-Visible importance, in closed form, is good where lights are smooth and the sensor is an eye. For
-line spectra, cameras beyond the visible and films of bands the density is tabulated instead, from
-the sensor and the scene's lights. All are unbiased; they differ in noise.
+Visible importance, in closed form, suits smooth lights and the sensor of an eye. For line spectra,
+sensors beyond the visible range and films with bands a density is tabulated from the sensor and the
+scene's lights. All densities are unbiased; they differ in noise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,17 +31,17 @@ from clpt.spectra import RGB, RGBIlluminant, Spectrum
 from clpt.spectra.reradiation import Reradiation
 from clpt.spectra.spectrum import d65, gridded
 
-STEP = 1.0  # [nm] at most, between the nodes of a table
-LIGHTS, SENSOR = 0.5, 0.45  # shares of a table; the rest is even, so that nothing is left out
-WORTH = 2.2  # times that the second moment must fall for a table, which costs time, to be taken
+STEP = 1.0  # largest distance of the nodes of a table [nm]
+LIGHTS, SENSOR = 0.5, 0.45  # shares of a table; the remaining share is even over the range
+WORTH = 2.2  # factor by which a table, which costs time, must lower the second moment
 GUIDES = DENSITY_SIZES["guides"]
 
 
 @dataclass(frozen=True)
 class Density:
-    """A density of the camera's wavelengths between lo and hi [nm]; zero outside.
+    """A density of wavelengths between lo and hi [nm]; zero outside.
 
-    values: its nodes (n + 1,) at equal distances, linear between them, whose integral is 1; None
+    values: at nodes (n + 1,) with equal distances, linear between them, with the integral 1; None
     for visible importance, which needs no table.
     """
 
@@ -50,22 +50,22 @@ class Density:
     values: Floats | None = None
 
     def pdf(self, lambdas: ArrayLike) -> Floats:
-        """The density [1/nm] at `lambdas`."""
+        """Return the density [1/nm] at `lambdas` [nm]."""
         if self.values is None:
             return spectra.wavelength_pdf(lambdas, self.lo, self.hi)
         return np.interp(np.asarray(lambdas, np.float64), self.nodes, self.values, 0.0, 0.0)
 
     @property
     def nodes(self) -> Floats:
-        """The wavelengths at which a table's values stand [nm]."""
+        """The wavelengths of a table's values [nm]."""
         count = 2 if self.values is None else len(self.values)
         return np.linspace(self.lo, self.hi, count)
 
     def words(self) -> NDArray[np.float32]:
-        """The table as kernels/spectra/density.cl reads it: n, lo, step, sums, values, guide.
+        """Return the table for kernels/spectra/density.cl: n, lo, step, sums, values, guide.
 
-        A sum (n + 1) is the share of what lies below a node; the guide (GUIDES + 1) the cells in
-        which equal shares begin, so that a search begins near its end.
+        The sums (n + 1) are the cumulative distribution at the nodes. The guide (GUIDES + 1) has
+        the cells in which equal shares begin, at which a search begins.
         """
         if self.values is None:
             raise ValueError("visible importance has no table")
@@ -80,7 +80,7 @@ class Density:
 
 
 def density(index: SceneIndex) -> Density:
-    """The density that suits a scene in spectral mode, or the one that its film asks for."""
+    """Return the density that `Film.wavelengths` names or, by default, that suits the scene."""
     film = index.film
     lo, hi = _support(film)
     visible = Density(lo, hi)
@@ -88,8 +88,11 @@ def density(index: SceneIndex) -> Density:
     if film.wavelengths == "visible":
         return Density(lo, hi, _normalised(visible.pdf(nodes), nodes)) if film.bands else visible
     response = np.ones_like(nodes) if film.bands else np.abs(sensor(film).sample(nodes)).sum(axis=1)
-    glow = _glow(index, nodes)
-    emitted = [(gridded(light, nodes) + glow(light)) * response for light in emissions(index)]
+    glow, absorbed = _glow(index, nodes)
+    emitted = [
+        (gridded(light, nodes) + glow @ gridded(light, absorbed)) * response
+        for light in emissions(index)
+    ]
     emitted = [light for light in emitted if light.any()]
     shares = [(1.0 - LIGHTS - SENSOR, np.ones_like(nodes))]
     shares += [(SENSOR, response)] if response.any() else []
@@ -105,20 +108,22 @@ def density(index: SceneIndex) -> Density:
 
 
 def _support(film: Film) -> tuple[float, float]:
-    """The range [nm] within the film's to which it responds, between whole steps."""
+    """Return the part of the film's range [nm] to which it responds, between whole steps."""
     if film.bands:
         return film.lambda_min, film.lambda_max
     nodes = np.append(np.arange(film.lambda_min, film.lambda_max, STEP), film.lambda_max)
-    seen = np.flatnonzero(sensor(film).sample(nodes).any(axis=1))
-    if not len(seen):
+    responding = np.flatnonzero(sensor(film).sample(nodes).any(axis=1))
+    if not len(responding):
         return film.lambda_min, film.lambda_max
-    return float(nodes[max(seen[0] - 1, 0)]), float(nodes[min(seen[-1] + 1, len(nodes) - 1)])
+    return float(nodes[max(responding[0] - 1, 0)]), float(
+        nodes[min(responding[-1] + 1, len(nodes) - 1)]
+    )
 
 
 def _second_moment(density: Density, nodes: Floats, light: Floats) -> float:
-    """Return the second moment of an estimate of the integral of `light` (n,) from one wavelength.
+    """Return the second moment of an estimate of the integral of `light` from one wavelength.
 
-    nodes (n,): the wavelengths at which light is given [nm].
+    light: (n,) at nodes (n,) [nm].
     """
     return _integral(light**2 / density.pdf(nodes), nodes)
 
@@ -132,20 +137,23 @@ def _normalised(values: Floats, nodes: Floats) -> Floats:
     return values / _integral(values, nodes)
 
 
-def _glow(index: SceneIndex, nodes: Floats) -> Callable[[Spectrum], Floats]:
-    """Return a function of a light: what all fluorescent materials emit under it at nodes [nm]."""
+def _glow(index: SceneIndex, nodes: Floats) -> tuple[Floats, Floats]:
+    """Return the reradiation of all materials and media (n, m), and its absorbed wavelengths (m,).
+
+    The matrix times the light at the absorbed wavelengths [nm] is the emission at the nodes (n,).
+    """
     film = index.film
     cells = int(np.ceil((film.lambda_max - film.lambda_min) / STEP - 1e-9))
-    into = np.linspace(film.lambda_min, film.lambda_max, cells + 1)
-    found = {id(m): m for shape in index.shapes for m in _fluorescent(shape.material)}
-    for medium in (part for one in index.media for part in one.parts):
-        given = [one.reradiation for one in medium.phase.leaves if isinstance(one, Reradiating)]
-        given += [medium.dye] if isinstance(medium, Dyed) else []
-        found |= {id(m): m for m in given if m is not None}
-    whole = np.zeros((len(nodes), len(into)))
-    for matrix in found.values():
-        whole += (into[1] - into[0]) * matrix.sample(nodes[:, None], into[None, :])
-    return lambda light: whole @ gridded(light, into)
+    absorbed = np.linspace(film.lambda_min, film.lambda_max, cells + 1)
+    matrices = {id(m): m for shape in index.shapes for m in _fluorescent(shape.material)}
+    for medium in (part for whole in index.media for part in whole.parts):
+        phases = [leaf.reradiation for leaf in medium.phase.leaves if isinstance(leaf, Reradiating)]
+        phases += [medium.dye] if isinstance(medium, Dyed) else []
+        matrices |= {id(m): m for m in phases if m is not None}
+    total = np.zeros((len(nodes), len(absorbed)))
+    for matrix in matrices.values():
+        total += (absorbed[1] - absorbed[0]) * matrix.sample(nodes[:, None], absorbed[None, :])
+    return total, absorbed
 
 
 def _fluorescent(material: object) -> Iterator[Reradiation]:
@@ -177,15 +185,15 @@ def emissions(index: SceneIndex) -> Iterator[Spectrum]:
 
 
 def _emitted(value: Any) -> Spectrum:
-    """An emission as a spectrum, of a texture its mean."""
+    """Return an emission as a spectrum; a texture's mean."""
     if isinstance(value, Texture):
         return _mean(fields_of(value).get("image"), f"{value.kind}.image")
     return RGBIlluminant(value.r, value.g, value.b) if isinstance(value, RGB) else value
 
 
 def _mean(image: object, where: str) -> Spectrum:
-    """The mean light of an image of spectra; any other stands for D65."""
-    found = spectral_exr.find(image, emissive=True, where=where)
-    if found is None:
+    """Return the mean of an image of spectra; D65 for an image of colours."""
+    spectra_of = spectral_exr.find(image, emissive=True, where=where)
+    if spectra_of is None:
         return d65()
-    return found.spectrum(np.nan_to_num(found.values.mean(axis=(0, 1), dtype=np.float64)))
+    return spectra_of.spectrum(np.nan_to_num(spectra_of.values.mean(axis=(0, 1), dtype=np.float64)))

@@ -1,4 +1,4 @@
-"""The way in which a film looks at lights: in spectra or in colours."""
+"""The importance of lights to a film, from their spectra or their colours."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from clpt.scene.textures import Bitmap
 from clpt.spectra import Spectrum
 from clpt.spectra.spectrum import gridded
 
-UNSEEN = 0.1  # share of the power within the film's range in how much light of the eye's counts
-STEP = 1.0  # of wavelengths at which that power is looked at [nm], about
+UNSEEN = 0.1  # factor of mean power in the film's range, beside the mean of the colour
+STEP = 1.0  # approximate distance of the wavelengths of that mean [nm]
 
 
 @dataclass(frozen=True)
 class Look:
-    """The way in which a film looks at lights.
+    """The weights of lights for a film.
 
-    spectral: whether in spectra, from lo to hi [nm], or in colours; cache: of costly pieces.
-    unseen: how much light counts that has no colour, over what the same power counts that has one.
+    spectral: by spectra from lo to hi [nm], or else by colours; cache: of costly results; unseen:
+    factor of the mean power in that range, which also counts light without a visible colour.
     """
 
     spectral: bool
@@ -35,21 +35,21 @@ class Look:
 
     @classmethod
     def of(cls, film: Film, cache: LoweringCache | None = None) -> Look:
-        """Return that of a film; one of bands, or with a sensor, sees all wavelengths alike."""
+        """Return the look of a film; with bands or a sensor, all wavelengths count equally."""
         unseen = 1.0 if film.bands or film.sensor != "cie1931" else UNSEEN
         range_ = film.lambda_min, film.lambda_max
         return cls(film.mode == "spectral", *range_, cache or LoweringCache(), unseen)
 
     @property
     def grid(self) -> Floats:
-        """The wavelengths (n,) at which power is looked at [nm], even, from lo to hi."""
+        """The wavelengths (n,) of the mean power, evenly spaced from lo to hi [nm]."""
         return np.linspace(self.lo, self.hi, max(round((self.hi - self.lo) / STEP), 1) + 1)
 
     def brightness(self, light: Spectrum) -> float:
-        """Return how much an emission counts: the mean of its colour, and its mean in the range.
+        """Return the weight of an emission: the mean of its colour plus its mean in the range.
 
-        The latter keeps chances of light that no eye sees, which a sensor or a dye may: paint that
-        glows under a lamp of ultraviolet, a film of bands in the infrared.
+        The second term samples invisible light that a sensor or a dye may absorb: paint that glows
+        under an ultraviolet lamp, a film with bands in the infrared.
         """
         seen = float(np.mean(light.to_rgb("emission")))
         if not self.spectral:
@@ -57,12 +57,12 @@ class Look:
         return seen + self.unseen * max(float(gridded(light, self.grid).mean()), 0.0)
 
     def levels(self, image: Bitmap) -> Floats:
-        """Return how much the texels of an emission count (h, w), top row first."""
+        """Return the weights of the texels of an emission (h, w), top row first."""
         seen = np.maximum(pixels(image, EMISSION), 0.0).mean(axis=2, dtype=np.float64)
-        found = spectral_image(image, EMISSION) if self.spectral else None
-        if found is None:
+        spectra = spectral_image(image, EMISSION) if self.spectral else None
+        if spectra is None:
             return seen * (1.0 + self.unseen * self.spectral)
-        within = (found.lambdas >= self.lo) & (found.lambdas <= self.hi)
-        power = np.maximum(found.values[..., within], 0.0)
+        within = (spectra.lambdas >= self.lo) & (spectra.lambdas <= self.hi)
+        power = np.maximum(spectra.values[..., within], 0.0)
         beyond = power.mean(axis=2, dtype=np.float64) if within.any() else 0.0
         return np.asarray(seen + self.unseen * beyond)

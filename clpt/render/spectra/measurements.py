@@ -1,4 +1,4 @@
-"""Measured materials as kernels/materials/measurement.cl reads them."""
+"""Measured materials and warps, for kernels/materials/measurement.cl and warp_table.cl."""
 
 from __future__ import annotations
 
@@ -9,19 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import measured
-from clpt.arrays import Floats32
+from clpt.arrays import Floats, Floats32
 from clpt.measured import Measurement, MerlTable, merl
 from clpt.measured.fit import hemispherical
-from clpt.render.spectra.warp_tables import halves, scaled, warp_words
+from clpt.measured.warp import warp
 from clpt.spectra import cie
 from clpt.spectra.spectrum import d65, primaries
+
+LARGEST = 4096.0  # value of a half
+LEAST = 2.0**-14  # positive value of a half: kernels do not read subnormal halves
 
 
 @dataclass(frozen=True)
 class Rows:
     """The numbers of a measurement.
 
-    counts: those at their head; wavelengths: [nm] of its colours, of rgb none.
+    counts: the first numbers; wavelengths: of its colours [nm], empty for rgb.
     """
 
     values: Floats32
@@ -30,14 +33,14 @@ class Rows:
 
     @property
     def source(self) -> str:
-        """The source of the measurement, by which kernels are made for its counts."""
+        """The source of the measurement in kernel text, which depends on its counts."""
         return "table " + " ".join(map(str, self.counts))
 
 
 def rows(value: Measurement | None, film: tuple[float, float] | None) -> Rows:
-    """Return what stands in `distributions`; film: its range [nm], None in RGB mode."""
-    given = measured.grey() if value is None else value
-    shown = _in_rgb(given) if film is None else _in_range(given, *film)
+    """Return the numbers for `distributions`; film: its range [nm], None in RGB mode."""
+    whole = measured.grey() if value is None else value
+    shown = _in_rgb(whole) if film is None else _in_range(whole, *film)
     theta = shown.theta_i
     vndf, luminance, spectra = shown.vndf, shown.luminance, shown.spectra
     if len(theta) == 1:  # kernels read two neighbours
@@ -49,10 +52,10 @@ def rows(value: Measurement | None, film: tuple[float, float] | None) -> Rows:
     angles = [_guided(nodes) for nodes in (shown.phi_i, theta)]
     counts += [spectra.shape[2], int(shown.jacobian) + 2 * shown.reduction]
     counts += [len(angles[0]) - len(shown.phi_i), len(angles[1]) - len(theta)]
-    (normals, of_normals), (bright, of_bright) = warp_words(vndf), warp_words(luminance)
+    (normals, normal_unit), (bright, bright_unit) = warp_words(vndf), warp_words(luminance)
     light, scale = scaled(spectra)
     parts = [
-        [*counts, scale, of_normals, of_bright], *angles, hemispherical(shown), shown.ndf,
+        [*counts, scale, normal_unit, bright_unit], *angles, hemispherical(shown), shown.ndf,
         shown.sigma, normals, bright, _pairs(light),
     ]  # fmt: skip
     return Rows(_joined(*parts), tuple(counts), np.asarray(shown.wavelengths, np.float64))
@@ -63,7 +66,7 @@ def _joined(*parts: Any) -> Floats32:
 
 
 def _guided(nodes: Floats32) -> Floats32:
-    """Angles as `warp_node` of kernels/materials/warp_table.cl reads them."""
+    """Return angles with their guide, for `warp_node` of kernels/materials/warp_table.cl."""
     if len(nodes) == 1:
         return np.array([0.0, nodes[0]], np.float32)
     whole = float(nodes[-1] - nodes[0])
@@ -74,7 +77,7 @@ def _guided(nodes: Floats32) -> Floats32:
 
 
 def _pairs(spectra: NDArray[Any]) -> Floats32:
-    """Pairs of neighbouring colours (phi, pairs, rows, columns, theta), two halves in a word."""
+    """Return pairs of neighbouring colours (phi, pairs, rows, columns, theta) as words."""
     if spectra.shape[2] == 1:
         spectra = np.repeat(spectra, 2, axis=2)
     last = np.moveaxis(spectra, 1, -1)
@@ -82,9 +85,9 @@ def _pairs(spectra: NDArray[Any]) -> Floats32:
 
 
 def merl_rows(value: MerlTable | None) -> Rows:
-    """Return what stands in `distributions` for a table of MERL, see materials/merl_table.cl.
+    """Return the numbers of a MERL table for `distributions`, see materials/merl_table.cl.
 
-    None is a matt grey.
+    None stands for a diffuse grey.
     """
     f = np.full((2, 2, 2, 3), 0.5 / np.pi) if value is None else merl.filled(value)
     angles, density, share = merl.densities(f)
@@ -96,27 +99,93 @@ def merl_rows(value: MerlTable | None) -> Rows:
     return Rows(_joined(head, words, colours), counts)
 
 
-def _in_rgb(given: Measurement) -> Measurement:
-    """The measurement with red, green and blue, which its spectra have under D65."""
-    if not len(given.wavelengths):
-        return given
-    nodes = np.asarray(given.wavelengths, np.float64)
+def _in_rgb(measurement: Measurement) -> Measurement:
+    """Return a measurement whose spectra are reduced to red, green and blue under D65."""
+    if not len(measurement.wavelengths):
+        return measurement
+    nodes = np.asarray(measurement.wavelengths, np.float64)
     hats = np.stack([np.interp(cie.GRID, nodes, hat) for hat in np.eye(len(nodes))])
     seen = cie.xyz_to_rgb(cie.spectrum_to_xyz(hats * d65().sample(cie.GRID)))
-    colours = np.maximum(np.einsum("ptnyx,nc->ptcyx", given.spectra, seen.astype(np.float32)), 0.0)
-    return replace(given, spectra=colours, wavelengths=np.zeros(0))
+    colours = np.maximum(
+        np.einsum("ptnyx,nc->ptcyx", measurement.spectra, seen.astype(np.float32)), 0.0
+    )
+    return replace(measurement, spectra=colours, wavelengths=np.zeros(0))
 
 
-def _in_range(given: Measurement, low: float, high: float) -> Measurement:
-    """The measurement at those of its wavelengths that a film needs; rgb as three reflectances."""
-    if not len(given.wavelengths):
+def _in_range(measurement: Measurement, low: float, high: float) -> Measurement:
+    """Return a measurement at the wavelengths that a film needs; rgb becomes reflectances."""
+    if not len(measurement.wavelengths):
         basis = primaries()
         nodes = np.array(basis[0].lambdas)
-        curves = np.stack([one.sample(nodes) for one in basis]).astype(np.float32)
-        made = np.einsum("ptcyx,cn->ptnyx", given.spectra, curves)
-        given = replace(given, spectra=made, wavelengths=nodes)
-    nodes = given.wavelengths
+        curves = np.stack([curve.sample(nodes) for curve in basis]).astype(np.float32)
+        reflectances = np.einsum("ptcyx,cn->ptnyx", measurement.spectra, curves)
+        measurement = replace(measurement, spectra=reflectances, wavelengths=nodes)
+    nodes = measurement.wavelengths
     first = max(int(np.searchsorted(nodes, low, "right")) - 1, 0)
     last = min(int(np.searchsorted(nodes, high, "left")), len(nodes) - 1)
     kept = slice(min(first, last), last + 1)
-    return replace(given, spectra=given.spectra[:, :, kept], wavelengths=nodes[kept])
+    return replace(measurement, spectra=measurement.spectra[:, :, kept], wavelengths=nodes[kept])
+
+
+def scaled(numbers: NDArray[Any]) -> tuple[NDArray[Any], float]:
+    """Return numbers >= 0 in the range of halves, and the factor that restores them."""
+    scale = max(float(numbers.max()), 1e-30) / LARGEST
+    return np.where(numbers > 0.0, np.maximum(numbers / scale, LEAST), 0.0), scale
+
+
+def halves(pairs: NDArray[Any]) -> NDArray[np.float32]:
+    """Return pairs (..., 2) as words (...), each of two halves."""
+    return np.ascontiguousarray(pairs.astype("<f2")).view(np.float32)[..., 0]
+
+
+def warp_words(density: NDArray[Any]) -> tuple[NDArray[np.float32], float]:
+    """Return the words of slices (rows of slices, slices, rows, columns), float32, and their unit.
+
+    Each row has at least two slices. unit: factor of the halves after a shift of their bits into a
+    float32. See kernels/materials/warp_table.cl.
+    """
+    rounded = scaled(warp(density).values)[0].astype("<f2")
+    table = warp(rounded)  # integrals must agree with the rounded values that kernels read
+    unit = float(table.values.max() / rounded.max())
+    whole = table.across[..., -1:]
+    even = np.linspace(0.0, 1.0, table.across.shape[-1])
+    shares = np.where(whole > 0.0, table.across / np.where(whole > 0.0, whole, 1.0), even)
+    across, down = _guide(shares), _guide(table.down)
+    parts = [
+        halves(_row_pairs(rounded)), _row_pairs(table.across),
+        _guide_words(0.5 * (across[..., :-1, :, :] + across[..., 1:, :, :])), table.down,
+        _guide_words(down),
+    ]  # fmt: skip
+    flat = [_slices_last(part) for part in parts]
+    return np.concatenate(flat, axis=-1), unit * 2.0**112
+
+
+def _row_pairs(values: NDArray[Any]) -> NDArray[Any]:
+    """Return neighbouring rows of (..., rows, columns) as pairs (..., rows - 1, columns, 2)."""
+    return np.stack([values[..., :-1, :], values[..., 1:, :]], axis=-1)
+
+
+def _slices_last(part: NDArray[Any]) -> NDArray[np.float32]:
+    """Return numbers (rows of slices, slices, nodes ...), flat, with slices as the last axis."""
+    pairs = part.ndim == 5
+    last = np.moveaxis(part, 1, -2 if pairs else -1)
+    return np.asarray(last, np.float32).reshape(len(part), -1)
+
+
+def _guide(sums: Floats) -> Floats:
+    """Return the cell's begin and end (..., n, 2) of n even shares of sums (..., n) in [0, 1]."""
+    n = sums.shape[-1]
+    flat = sums.reshape(-1, n)
+    offsets = 2.0 * np.arange(len(flat))[:, None]  # so that one call interpolates all rows
+    shares, nodes = np.linspace(0.0, 1.0, n + 1), np.linspace(0.0, 1.0, n)
+    nodes_at = np.interp(
+        (shares + offsets).ravel(), (flat + offsets).ravel(), np.tile(nodes, len(flat))
+    )
+    ends = nodes_at.reshape(*sums.shape[:-1], n + 1)
+    return np.stack([ends[..., :-1], ends[..., 1:]], axis=-1)
+
+
+def _guide_words(ends: Floats) -> NDArray[np.float32]:
+    """Return pairs (..., 2) in [0, 1] as words of two 14-bit steps, which are finite floats."""
+    steps = np.round(16383.0 * ends).astype("<u4")
+    return (steps[..., 0] | steps[..., 1] << np.uint32(16)).view(np.float32)

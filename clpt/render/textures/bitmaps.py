@@ -37,18 +37,18 @@ from clpt.scene.textures import Bitmap
 NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectral_read.cl
 LARGEST = 2**31 - 1  # words in `images` that an index reaches
 THREADS = 8
-UNKNOWN, NEW, MADE = range(3)
-CHUNK = 1 << 17  # texels of an image that are looked at at a time
-RUN = 64  # colours that are looked through together for new ones
+UNKNOWN, NEW, PACKED = range(3)
+CHUNK = 1 << 17  # texels of an image that are packed at a time
+RUN = 64  # neighbouring colours with a common row in the table of packed spectra
 
 
 @dataclass
 class _Form:
     """The form of an image, without its pixels.
 
-    shape: (h, w, c); bytes: whether it is of bytes; encoded: see `Stored.encoded`; profiled:
-    whether its colours are floats, of no transfer; notes: warnings when it is taken raw, and when
-    as colours.
+    shape: (h, w, c); bytes: whether its numbers are bytes; encoded: see `Stored.encoded`; profiled:
+    whether its colours are floats without a transfer function; notes: warnings about the image as
+    raw data, and as colours.
     """
 
     shape: tuple[int, ...]
@@ -59,7 +59,7 @@ class _Form:
 
 
 class _Pixels:
-    """The pixels of an image; of a file they are decoded beside, and let go of when packed."""
+    """The pixels of an image; a file is decoded in a thread, and forgotten when packed."""
 
     def __init__(self, image: Any):
         self._image = image
@@ -88,7 +88,7 @@ class _Pixels:
 
     @property
     def form(self) -> _Form:
-        """The form of the image, which is known even after `let_go`. Raises SceneError."""
+        """The form of the image, also after `let_go`. Raises SceneError."""
         if self._form is None:
             stored = self.stored
             self._form = _Form(
@@ -108,9 +108,9 @@ class _Pixels:
 
 @dataclass
 class _Packed:
-    """The words of an image, a view of the table once that is joined; its height and width.
+    """The words of an image, later a view of the joined table; size: height and width.
 
-    levels: first word, width and height of each of its levels, the image itself the first; (n, 3).
+    levels (n, 3): first word, width and height of each level, the first is the image itself.
     """
 
     words: Words
@@ -120,7 +120,7 @@ class _Packed:
 
 @dataclass
 class _Image:
-    """An image in one role, and the rows of `textures` that show it."""
+    """An image in a role, and the rows of `textures` that show it."""
 
     texture: Bitmap
     role: Role
@@ -134,7 +134,7 @@ class _Image:
 
     @property
     def form(self) -> _Form:
-        """The form of the image as the texture means it: as data, or as colours."""
+        """The form of the image as raw data or as colours, as the texture asks."""
         form = self.pixels.form
         if self.texture.raw or not form.profiled:
             return form
@@ -142,9 +142,9 @@ class _Image:
 
 
 class Images:
-    """The images of a scene, each in the roles that it has; `finish` puts them into the tables.
+    """The images of a scene, each in its roles; `finish` appends them to the tables.
 
-    budget: [bytes] that they may take, None for any number; cache: of what is decoded and packed.
+    budget: [bytes] of all images, None for any number; cache: of decoded and packed images.
     """
 
     def __init__(
@@ -157,9 +157,9 @@ class Images:
         self._spectra: dict[bool, _Spectra] = defaultdict(_Spectra)
 
     def add(self, texture: Bitmap, role: Role, row: np.ndarray) -> None:
-        """Ask for an image; where it lies will be written into the texture's row.
+        """Ask for an image; `finish` writes its first word into the texture's row.
 
-        Raises SceneError for what is no image.
+        Raises SceneError for a value that is no image.
         """
         channel_of = role is REAL and texture.channel
         levels = has_levels(texture, role)
@@ -171,10 +171,10 @@ class Images:
         self._wanted[key].rows.append(row)
 
     def finish(self, store: TableStore, roles: set[tuple[str, str]]) -> list[str]:
-        """Put the images that were asked for into the tables; return warnings.
+        """Append the images that were asked for; return warnings.
 
-        roles: gets the (kind, role) pairs of the images. Raises SceneError for files that cannot be
-        read.
+        roles: the (kind, role) pairs of the images are added to it. Raises SceneError for files
+        that cannot be read.
         """
         wanted, self._wanted = list(self._wanted.values()), {}
         notes = [*_left_out(wanted), *self._fit(wanted)]
@@ -186,7 +186,7 @@ class Images:
         return notes
 
     def _put(self, image: _Image, store: TableStore) -> str:
-        """Put an image into the tables, and where it is into its rows; return its kind."""
+        """Append an image, and write its first word into its rows; return its kind."""
         packed = self._packed(image)
         height, width = packed.size
         bytes_ = _packs(image.form, image, self.spectral)
@@ -211,22 +211,22 @@ class Images:
         return kind
 
     def _packed(self, image: _Image) -> _Packed:
-        """The words of an image, as they were made before if nothing differs."""
+        """Return the words of an image, from the cache if nothing differs."""
         texture = image.texture
         by = (
             *(version(texture.image), texture.raw, image.role, texture.channel),
             *(image.halvings, self.spectral, image.has_levels),
         )
-        made: _Packed = self.cache(Images._words, self, image, by=by)
-        return made
+        packed: _Packed = self.cache(Images._words, self, image, by=by)
+        return packed
 
     def joined(self, table: Words) -> None:
-        """Keep the words of the images as parts of the table that they have been joined to."""
+        """Keep the words of the images as views of the joined table."""
         for first, packed in self._placed:
             packed.words = table[first : first + packed.words.size]
 
     def _words(self, image: _Image) -> _Packed:
-        """The words of an image, level by level, of each row by row from the top."""
+        """Return the words of an image: level by level, row by row from the top."""
         texture, stored = image.texture, image.pixels.stored.meant(image.texture.raw)
         packs = _packs(image.form, image, self.spectral)
         values = arrays.checked(stored.values, "bitmap.image")
@@ -235,14 +235,17 @@ class Images:
             values = _halved(values, curved, image.halvings)
         if not image.has_levels:
             return self._level(image, values, curved, packs)
-        made = [self._level(image, one, curved, packs) for one in _levels(values, curved)]
-        firsts = np.cumsum([0, *(one.words.size for one in made[:-1])])
-        table = [(at, one.size[1], one.size[0]) for at, one in zip(firsts, made, strict=True)]
-        words = np.concatenate([one.words for one in made])
-        return _Packed(words, made[0].size, np.array(table, np.int64))
+        levels = [self._level(image, level, curved, packs) for level in _levels(values, curved)]
+        firsts = np.cumsum([0, *(level.words.size for level in levels[:-1])])
+        table = [(at, *level.size[::-1]) for at, level in zip(firsts, levels, strict=True)]
+        words = np.concatenate([level.words for level in levels])
+        return _Packed(words, levels[0].size, np.array(table, np.int64))
 
     def _level(self, image: _Image, values: NDArray[Any], curved: bool, packs: bool) -> _Packed:
-        """The words of one size of an image; curved, packs: of its bytes."""
+        """Return the words of a level of an image.
+
+        curved: the bytes are encoded; packs: they stay bytes.
+        """
         texture, role, size = image.texture, image.role, values.shape[:2]
         if role is REAL and packs:
             number = "rgba".find(texture.channel) if values.shape[2] > 1 else 0
@@ -252,8 +255,8 @@ class Images:
             return _Packed(np.pad(chosen, (0, -len(chosen) % 4)).view("<u4"), size)
         if packs:
             codes = _codes(values)
-            made = self._spectra[curved].packed(codes, curved) if self.spectral else codes
-            return _Packed(made, size)
+            words = self._spectra[curved].packed(codes, curved) if self.spectral else codes
+            return _Packed(words, size)
         decoded = Stored(values, curved).decoded()
         if role is REAL:
             numbers = np.nan_to_num(channel(decoded, texture.channel).astype(np.float32))
@@ -263,13 +266,13 @@ class Images:
         return _Packed(np.ascontiguousarray(colours).reshape(-1).view(np.uint32), size)
 
     def _read(self, image: object) -> _Pixels:
-        """The pixels of an image; a file is decoded once."""
+        """Return the pixels of an image; a file is decoded once."""
         if isinstance(image, (str, Path)):
             return self.cache(_Pixels, str(image), by=(version(image),))
         return _Pixels(image)
 
     def _decode(self, curved: bool, store: TableStore) -> int:
-        """The first of 256 words that say what bytes mean."""
+        """Return the first of the 256 words that decode bytes."""
         if curved not in self._decoding:
             self._decoding[curved] = store.append("images", _meaning(curved).view(np.uint32))
         return self._decoding[curved]
@@ -304,7 +307,7 @@ def has_levels(texture: Bitmap, role: Role) -> bool:
 
 @cache
 def _pool(process: int) -> ThreadPoolExecutor:
-    """The threads of a process, by its id: those of a parent do not come along when it forks."""
+    """Return the threads of a process, by its id: a fork has none of its parent's threads."""
     return ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1), "clpt-images")
 
 
@@ -313,7 +316,7 @@ def _is_alpha(image: _Image) -> bool:
 
 
 def _packs(form: _Form, image: _Image, spectral: bool) -> bool:
-    """Whether bytes stay bytes."""
+    """Return whether bytes stay bytes on the device."""
     if not form.bytes:
         return False
     if image.role is REAL:
@@ -322,7 +325,7 @@ def _packs(form: _Form, image: _Image, spectral: bool) -> bool:
 
 
 def _size(image: _Image, spectral: bool) -> int:
-    """Bytes on the device."""
+    """Return the bytes of an image on the device."""
     form = image.form
     height, width = (max(1, -(-n >> image.halvings)) for n in form.shape[:2])
     packed = _packs(form, image, spectral)
@@ -337,13 +340,13 @@ def _size(image: _Image, spectral: bool) -> int:
 
 
 def _left_out(wanted: Iterable[_Image]) -> list[str]:
-    """Return warnings of parts of image files that are left out, each once."""
-    said = [
+    """Return warnings of parts of image files that are left out, without repetition."""
+    notes = [
         f"{image.texture.image}: {note}"
         for image in wanted
         for note in image.pixels.form.notes[image.texture.raw]
     ]
-    return list(dict.fromkeys(said))
+    return list(dict.fromkeys(notes))
 
 
 def _note(image: _Image) -> str:
@@ -360,18 +363,18 @@ def _meaning(curved: bool) -> NDArray[np.float32]:
 
 
 def _halved(values: NDArray[Any], curved: bool, times: int) -> NDArray[Any]:
-    """Means of 2x2 texels of linear light, `times` over; bytes are made bytes again."""
-    made = Stored(values, curved).decoded()
+    """Return means of 2x2 texels of linear light, `times` over; bytes become bytes again."""
+    linear = Stored(values, curved).decoded()
     for _ in range(times):
-        odd = [(0, n % 2 if n > 1 else 0) for n in made.shape[:2]]
-        made = np.pad(made, (*odd, (0, 0)), "edge")
-        made = made if made.shape[0] == 1 else 0.5 * (made[0::2] + made[1::2])
-        made = made if made.shape[1] == 1 else 0.5 * (made[:, 0::2] + made[:, 1::2])
-    return _stored_as(values, made, curved)
+        odd = [(0, n % 2 if n > 1 else 0) for n in linear.shape[:2]]
+        linear = np.pad(linear, (*odd, (0, 0)), "edge")
+        linear = linear if linear.shape[0] == 1 else 0.5 * (linear[0::2] + linear[1::2])
+        linear = linear if linear.shape[1] == 1 else 0.5 * (linear[:, 0::2] + linear[:, 1::2])
+    return _stored_as(values, linear, curved)
 
 
 def _level_sizes(height: int, width: int) -> list[tuple[int, int]]:
-    """The heights and widths of an image's levels: halves, rounded down, until there is 1 texel."""
+    """Return heights and widths of an image's levels: halves, rounded down, to a single texel."""
     count = max(height, width).bit_length()
     return [(max(height >> i, 1), max(width >> i, 1)) for i in range(count)]
 
@@ -379,18 +382,18 @@ def _level_sizes(height: int, width: int) -> list[tuple[int, int]]:
 def _levels(values: NDArray[Any], curved: bool) -> list[NDArray[Any]]:
     """Return an image (h, w, c) and its smaller copies.
 
-    A texel is the mean of linear light over its part of the level before, to which texels count by
-    their share, so that each copy has its mean.
+    A texel is the mean of linear light over its area in the level before. A texel there counts by
+    the share of its area, so all levels have the same mean.
     """
-    made, found = Stored(values, curved).decoded(), [values]
+    linear, levels = Stored(values, curved).decoded(), [values]
     for height, width in _level_sizes(*values.shape[:2])[1:]:
-        made = _means(_means(made, height).swapaxes(0, 1), width).swapaxes(0, 1)
-        found.append(_stored_as(values, made, curved))
-    return found
+        linear = _means(_means(linear, height).swapaxes(0, 1), width).swapaxes(0, 1)
+        levels.append(_stored_as(values, linear, curved))
+    return levels
 
 
 def _means(values: NDArray[Any], count: int) -> NDArray[Any]:
-    """Means of `count` equal parts of the first axis."""
+    """Return means of `count` equal parts of the first axis."""
     n = len(values)
     if n == count:
         return values
@@ -404,59 +407,59 @@ def _means(values: NDArray[Any], count: int) -> NDArray[Any]:
     return ((at[1:] - at[:-1]) * (count / n)).astype(values.dtype)
 
 
-def _stored_as(values: NDArray[Any], made: NDArray[Any], curved: bool) -> NDArray[Any]:
-    """Linear values in the form of `values`: encoded if curved, bytes if those are bytes."""
-    stored = images.linear_to_srgb(made) if curved else made
+def _stored_as(values: NDArray[Any], linear: NDArray[Any], curved: bool) -> NDArray[Any]:
+    """Return linear values in the form of `values`: encoded if curved, bytes if `values` are."""
+    stored = images.linear_to_srgb(linear) if curved else linear
     if values.dtype != np.uint8 and not curved:
-        return made
+        return linear
     if values.shape[2] == 4:
-        stored[..., 3] = made[..., 3]
+        stored[..., 3] = linear[..., 3]
     if values.dtype != np.uint8:
         return stored
     return np.round(np.clip(stored, 0.0, 1.0) * 255.0).astype(np.uint8)
 
 
 def _codes(values: NDArray[np.uint8]) -> Words:
-    """r, g and b of each texel in the three lower bytes of a word, (n,)."""
-    made = np.zeros((values.shape[0] * values.shape[1], 4), np.uint8)
+    """Return words (n,) with r, g and b of each texel in the three lower bytes."""
+    channels = np.zeros((values.shape[0] * values.shape[1], 4), np.uint8)
     for i in range(3):
-        made[:, i] = values[..., i % values.shape[2]].reshape(-1)
-    return made.view("<u4").reshape(-1)
+        channels[:, i] = values[..., i % values.shape[2]].reshape(-1)
+    return channels.view("<u4").reshape(-1)
 
 
 class _Spectra:
-    """Packed spectra of colours of 8 bits a channel; each is made once, whatever images have it."""
+    """Packed spectra of colours of 8 bits a channel; images share them."""
 
     def __init__(self) -> None:
-        self.places = np.zeros((1 << 24) // RUN, np.uint32)  # of a run of colours: its row; 0: none
-        self.runs = np.zeros(1, np.uint32)  # of each row: its run
-        self.states = np.zeros(RUN, np.uint8)  # of each colour of a row: UNKNOWN, NEW or MADE
+        self.places = np.zeros((1 << 24) // RUN, np.uint32)  # a run's row; 0: no row
+        self.runs = np.zeros(1, np.uint32)  # a row's run
+        self.states = np.zeros(RUN, np.uint8)  # each colour of a row: UNKNOWN, NEW or PACKED
         self.words = np.zeros(RUN, np.uint64)
 
     def packed(self, codes: Words, curved: bool) -> Words:
-        """Two words for each colour of `_codes`, (2 n,)."""
+        """Return two words for each colour of `_codes`, (2 n,)."""
         parts = np.split(codes, range(CHUNK, len(codes), CHUNK))
         self._add_rows(parts)
         for part in parts:
             at = self._at(part)
             self.states[at[self.states[at] == UNKNOWN]] = NEW
         new = np.flatnonzero(self.states == NEW)
-        made = self.runs[new // RUN] * np.uint32(RUN) + (new % RUN).astype(np.uint32)
-        channels = np.stack([made & 255, made >> 8 & 255, made >> 16], axis=1)
+        colours = self.runs[new // RUN] * np.uint32(RUN) + (new % RUN).astype(np.uint32)
+        channels = np.stack([colours & 255, colours >> 8 & 255, colours >> 16], axis=1)
         packed = pack(spectra.uplift(_meaning(curved)[channels]))
         self.words[new] = packed.view(np.uint64).reshape(-1)
-        self.states[new] = MADE
+        self.states[new] = PACKED
         words = np.empty(len(codes), np.uint64)
         for first, part in zip(range(0, len(codes), CHUNK), parts, strict=True):
             words[first : first + CHUNK] = self.words[self._at(part)]
         return words.view(np.uint32)
 
     def _at(self, codes: Words) -> Words:
-        """Return the places of colours, whose runs have rows, in `states` and `words`."""
+        """Return the indices of colours in `states` and `words`; their runs must have rows."""
         return self.places[codes // np.uint32(RUN)] * np.uint32(RUN) + codes % np.uint32(RUN)
 
     def _add_rows(self, parts: list[Words]) -> None:
-        """Give rows to runs of colours that have none; a table of all would be slow to clear."""
+        """Add rows for new runs of colours; a table of all runs would be slow to clear."""
         seen = np.zeros(len(self.places), bool)
         for part in parts:
             seen[part // np.uint32(RUN)] = True
@@ -471,20 +474,21 @@ class _Spectra:
 
 def _longer(array: NDArray[Any], size: int) -> NDArray[Any]:
     """Return an array (n,) with zeros after it, (size,)."""
-    made = np.zeros(size, array.dtype)
-    made[: len(array)] = array
-    return made
+    padded = np.zeros(size, array.dtype)
+    padded[: len(array)] = array
+    return padded
 
 
 def pack(coefficients: NDArray[np.float32]) -> Words:
-    """Sigmoid coefficients (n, 3) as two words each (n, 2): x at NODES, of 21 bits.
+    """Return sigmoid coefficients (n, 3) as two words each (n, 2): x at NODES, of 21 bits.
 
-    The upper 21 bits of the words are the first two; the third's are in what is left.
+    The upper 21 bits of the words hold the first two nodes. The 10 and 11 lower bits that remain
+    hold the third.
     """
     c = coefficients.astype(np.float64)[:, :, None]
     x = ((c[:, 0] * NODES + c[:, 1]) * NODES + c[:, 2]).astype(np.float32)
     bits = x.view(np.uint32) + np.uint32(0x400)  # to the nearest
     upper = bits & np.uint32(0xFFFFF800)
-    rest = bits[:, 2] >> np.uint32(11)
-    first, second = upper[:, 0] | rest >> np.uint32(10), upper[:, 1] | rest & np.uint32(0x3FF)
+    third = bits[:, 2] >> np.uint32(11)
+    first, second = upper[:, 0] | third >> np.uint32(10), upper[:, 1] | third & np.uint32(0x3FF)
     return np.stack([first, second], axis=1).astype(np.uint32)

@@ -1,4 +1,4 @@
-"""Kernel text of the textures: the look-up in each role, and the loaders that call it."""
+"""Kernel text of textures: the look-up in each role, and the loaders that call it."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from clpt.scene.textures import MAPPINGS, Texture
 
 _LOOKED_UP = "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)"
 
-# Of the loaders: a part of the loop has them for all others, another part calls them, or a text
-# has its own.
+# Where a program has its loaders: in a part of the loop for all parts, in another part, or in its
+# own text.
 Where = Literal["part", "elsewhere", "own"]
 
 
 def dispatch_text(features: TextureFeatures, stochastic: bool = False, where: Where = "own") -> str:
     """Return the look-ups of the (kind, role) pairs in the scene, and the loaders that call them.
 
-    stochastic: for some material a random texel stands for a reflectance. where: the loaders are.
+    stochastic: some material reads a random texel for a reflectance. where: see `Where`.
 
     texture_<role>(scene, row, point, lambdas)                 whose row is at a word
-    spectrum_texture_<role>(scene, source, point, lambdas)     of 1 + the row, or no texture
+    spectrum_texture_<role>(scene, source, point, lambdas)     source: 1 + the row, 0: no texture
     spectrum_texture_texel(scene, source, point, lambdas)      a reflectance, or a texel of it
     real_texture_real(scene, source, point, lambdas)           the same for a real
     """
@@ -57,8 +57,8 @@ def dispatch_text(features: TextureFeatures, stochastic: bool = False, where: Wh
         for role in sorted({role for _, role in pairs})
     }
     programs = [role for role in leaves if ("program", role) in pairs]
-    for role, own in leaves.items():
-        parts.append(_look_up(role, own, "texture_leaf" if programs else "texture"))
+    for role, leaf_kinds in leaves.items():
+        parts.append(_look_up(role, leaf_kinds, "texture_leaf" if programs else "texture"))
     if programs:
         parts += _operand_text(leaves, features.depth)
     for role in leaves:
@@ -70,20 +70,20 @@ def dispatch_text(features: TextureFeatures, stochastic: bool = False, where: Wh
 
 
 def _texel_text(kinds: list[str], programs: bool, where: Where) -> list[str]:
-    """`spectrum_texture_texel`; programs: some texture is one, all of which is filtered."""
+    """Return `spectrum_texture_texel`; programs: some texture is a program, which is filtered."""
     text = _look_up("texel", kinds, "texture_leaf" if programs else "texture")
-    own = [text, _with_programs("texel", True)] if programs else [text]
-    own.append(_parameter("texel", where, how="inline"))  # short, and in few places
-    return ["#if STOCHASTIC_FILTERING || TEXELS_AT_RANDOM", *own, "#endif"]
+    lines = [text, _with_programs("texel", True)] if programs else [text]
+    lines.append(_parameter("texel", where, how="inline"))  # short, and in few places
+    return ["#if STOCHASTIC_FILTERING || TEXELS_AT_RANDOM", *lines, "#endif"]
 
 
 def _choice_lines(cls: type[Texture]) -> list[str]:
-    """`#define KIND_PARAMETER_CHOICE` for the choices that a kind's row holds as numbers."""
+    """Return `#define KIND_PARAMETER_CHOICE` for each choice that a row holds as a number."""
     return [
         f"#define {f'{cls.kind}_{name}_{choice}'.upper()} {number}"
         for name, param in device_params(cls).items()
         for number, choice in enumerate(param.choices)
-        if choice != "trilinear"  # which is a kind of its own in the kernels
+        if choice != "trilinear"  # a separate kind in the kernels
     ]
 
 
@@ -92,12 +92,12 @@ def _type(role: str) -> str:
 
 
 def _look_up(role: str, kinds: list[str], name: str) -> str:
-    """`name`_<role>, for textures that combine nothing."""
+    """Return `name`_<role>, which looks up textures that combine no others."""
     zero, more = ("0.0f", "") if role == "real" else ("spectrum_of(0.0f)", ", lambdas")
     row, cases = active("row"), []
     for kind in kinds:
         chosen = role == "texel" and kind in IMAGES
-        # Indices and factors are the same look-up, of other numbers.
+        # Indices and factors have the look-up of reflectances, on other numbers.
         verb = role if chosen or role in ("emission", "real") else "reflectance"
         seen = "point, point.u" if chosen else "point"
         looked_up = f"{kind}_{verb}({kind}_row(scene.textures, {row}), scene, {seen}{more})"
@@ -107,18 +107,21 @@ def _look_up(role: str, kinds: list[str], name: str) -> str:
 
 
 def _with_programs(role: str, some: bool) -> str:
-    """texture_<role> for all textures, where there are programs, and `some` in this role."""
-    own = "reflectance" if role == "texel" else role
-    run = f"texture_program(scene, TEXTURE_ROLE_{own.upper()}, row, m, point, lambdas)"
+    """Return texture_<role> for all textures of a scene with programs.
+
+    some: whether this role has programs.
+    """
+    program_role = "reflectance" if role == "texel" else role
+    run = f"texture_program(scene, TEXTURE_ROLE_{program_role.upper()}, row, m, point, lambdas)"
     forms = {"real": f"{run}.x", "reflectance": f"spectrum_clamped({run})"}
-    case = Case(f"gather_i(scene.textures, row) == {PROGRAM}", forms.get(own, run))
+    case = Case(f"gather_i(scene.textures, row) == {PROGRAM}", forms.get(program_role, run))
     leaf = f"texture_leaf_{role}(scene, row, point, lambdas)"
     signature = f"{_type(role)} texture_{role}{_LOOKED_UP}"
     return Function(signature, leaf, [case] if some else []).text()
 
 
 def _parameter(role: str, where: Where, how: str = "called") -> str:
-    """The texture that a parameter in a row names; how: see `function`."""
+    """Return the look-up of a parameter's texture; how: see `function`."""
     form = _type(role)
     name = f"{form.lower()}_texture_{role}"
     takes = "(Scene scene, integer source, TexturePoint point, Wavelengths lambdas)"
@@ -140,7 +143,7 @@ def _operand_text(kinds: dict[str, list[str]], depth: int) -> list[str]:
     cases = [Case("running & (operand == OPERAND_CONSTANT)", constant)]
     for role in (role for role in ROLES if kinds.get(role)):
         read = f"texture_leaf_{role}(scene, {at}, point, lambdas)"
-        # The role is known when the text is built: what it does not look up is dropped.
+        # A compiler drops the look-ups of other roles: the role is a constant there.
         tests = [f"((operand == OPERAND_OWN) & mask_of(role == TEXTURE_ROLE_{role.upper()}))"]
         if role == "real":
             read = f"spectrum_of({read})"

@@ -1,4 +1,4 @@
-"""Rules of textures: an image of spectra holds what the parameter is that it stands for."""
+"""Rules of textures: an image of spectra holds light or reflectance, as its parameter does."""
 
 from __future__ import annotations
 
@@ -13,24 +13,27 @@ from clpt.scene.textures import Bitmap, Placed, Product, Solid, Texture
 
 
 def check_textures(kind: Kind) -> None:
-    """Raise SceneError for light where a kind's parameter reflects, and for the reverse.
+    """Raise SceneError for an image of light as a reflectance, and for the reverse.
 
-    What a file holds is not looked at.
+    Images in files are not read for this.
     """
-    given = fields_of(kind)
+    values = fields_of(kind)
     for name, param in params(type(kind)).items():
-        if isinstance(given[name], (Texture, tuple)):
-            _check(given[name], param.role is EMISSION)
+        if isinstance(values[name], (Texture, tuple)):
+            _check(values[name], param.role is EMISSION)
 
 
 def check_image(image: object, where: str, *, emissive: bool) -> None:
-    """Raise SceneError for an image of the other kind of spectra, where it is in memory."""
+    """Raise SceneError for an image in memory of the other kind of spectra."""
     if isinstance(image, SpectralImage):
         spectral_exr.find(image, emissive=emissive, where=where)
 
 
 def _check(value: object, light: bool) -> None:
-    """Raise SceneError for a texture of the wrong kind of spectra; light: which is wanted."""
+    """Raise SceneError for a texture of the wrong kind of spectra.
+
+    light: whether its parameter emits.
+    """
     if isinstance(value, tuple):
         for entry in value:
             if isinstance(entry, Kind):
@@ -39,14 +42,14 @@ def _check(value: object, light: bool) -> None:
         _check_place(value)
         if isinstance(value, Bitmap):
             check_image(value.image, "bitmap.image", emissive=light)
-        given = fields_of(value)
+        values = fields_of(value)
         for name, param in params(type(value)).items():
-            shines = light and param.role in (FACTOR, REFLECTANCE) and name != _factor(value)
-            _check(given[name], shines)
+            emits = light and param.role in (FACTOR, REFLECTANCE) and name != _factor(value)
+            _check(values[name], emits)
 
 
 def _check_place(texture: Texture) -> None:
-    """Raise SceneError for a matrix that is a projection, where it is used."""
+    """Raise SceneError for a matrix in use that is a projection."""
     if isinstance(texture, Placed):
         last = texture.to_uv[2]
         if not np.allclose(last[:2], 0.0) or np.isclose(last[2], 0.0):
@@ -60,7 +63,10 @@ def _check_place(texture: Texture) -> None:
 
 
 def _factor(texture: Texture) -> str:
-    """The parameter that stays a factor in an emission: of a product one, for light times light."""
+    """Return the parameter of a product that stays a factor in an emission, "" for others.
+
+    An emission is light times a factor, never light times light.
+    """
     if not isinstance(texture, Product):
         return ""
     first, second = (isinstance(part, Texture) for part in (texture.first, texture.second))

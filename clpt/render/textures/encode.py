@@ -1,7 +1,7 @@
 """The rows of textures.
 
-A row of `textures` belongs to one texture in one role. Row 0 is blank and valid as any kind in any
-role, so that lanes which look up nothing have something to read.
+A row of `textures` belongs to a texture in a role. Row 0 is blank, and valid as any kind in any
+role, for idle lanes to read.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from clpt.render.records.parameter_words import SPECTRUM_WORDS
 from clpt.render.records.tables import TableStore
 from clpt.render.records.texture_rows import KINDS, PROGRAM, RECORDS
 from clpt.render.spectra.encode import SpectraTable
-from clpt.render.textures import noise
 from clpt.render.textures.bitmaps import Images, has_levels, identity
 from clpt.render.textures.programs import folded, is_composite, program, separated
 from clpt.render.textures.texels import bands
@@ -44,13 +43,42 @@ from clpt.spectra import RGB, luminance
 
 LARGEST = 2**31 - 1  # floats in `texels` that an index reaches
 
+# Perlin's reference implementation of Improving Noise (2002).
+PERMUTATION = np.array(
+    [
+        151, 160, 137, 91, 90, 15, 131, 13, 201, 95, 96, 53, 194, 233, 7, 225, 140, 36, 103, 30, 69,
+        142, 8, 99, 37, 240, 21, 10, 23, 190, 6, 148, 247, 120, 234, 75, 0, 26, 197, 62, 94, 252,
+        219, 203, 117, 35, 11, 32, 57, 177, 33, 88, 237, 149, 56, 87, 174, 20, 125, 136, 171, 168,
+        68, 175, 74, 165, 71, 134, 139, 48, 27, 166, 77, 146, 158, 231, 83, 111, 229, 122, 60, 211,
+        133, 230, 220, 105, 92, 41, 55, 46, 245, 40, 244, 102, 143, 54, 65, 25, 63, 161, 1, 216, 80,
+        73, 209, 76, 132, 187, 208, 89, 18, 169, 200, 196, 135, 130, 116, 188, 159, 86, 164, 100,
+        109, 198, 173, 186, 3, 64, 52, 217, 226, 250, 124, 123, 5, 202, 38, 147, 118, 126, 255, 82,
+        85, 212, 207, 206, 59, 227, 47, 16, 58, 17, 182, 189, 28, 42, 223, 183, 170, 213, 119, 248,
+        152, 2, 44, 154, 163, 70, 221, 153, 101, 155, 167, 43, 172, 9, 129, 22, 39, 253, 19, 98,
+        108, 110, 79, 113, 224, 232, 178, 185, 112, 104, 218, 246, 97, 228, 251, 34, 242, 193, 238,
+        210, 144, 12, 191, 179, 162, 241, 81, 51, 145, 235, 249, 14, 239, 107, 49, 192, 214, 31,
+        181, 199, 106, 157, 184, 84, 204, 176, 115, 121, 50, 45, 127, 4, 150, 254, 138, 236, 205,
+        93, 222, 114, 67, 29, 24, 72, 243, 141, 128, 195, 78, 66, 215, 61, 156, 180,
+    ],
+    np.uint32,
+)  # fmt: skip
+
+# The colours of marble's curves, linear, from Pharr, Jakob, Humphreys: Physically Based Rendering.
+MARBLE = np.array(
+    [
+        [0.58, 0.58, 0.60], [0.58, 0.58, 0.60], [0.58, 0.58, 0.60], [0.50, 0.50, 0.50],
+        [0.60, 0.59, 0.58], [0.58, 0.58, 0.60], [0.58, 0.58, 0.60], [0.20, 0.20, 0.33],
+        [0.58, 0.58, 0.60],
+    ]
+)  # fmt: skip
+
 
 class TextureTable:
-    """The rows of `textures`, and what textures ask of images and meshes.
+    """The rows of `textures`, and the images and mesh attributes that textures ask for.
 
     roles: the (kind, role) pairs that occur; attributes: the index in directories by (name, role,
-    channel); mappings: whether a texture makes its own uv; depth: the most values that a program
-    stacks.
+    channel); mappings: whether a texture has a mapping other than a mesh's uv; depth: the most
+    values that a program stacks.
     """
 
     def __init__(self, store: TableStore, spectra: SpectraTable, images: Images):
@@ -61,24 +89,23 @@ class TextureTable:
         self.depth = 0
         self._rows: dict[tuple[Any, Role], int] = {}
         self._folded: dict[tuple[int, Role], Any] = {}
-        self._alive: list[Any] = []  # textures that are known by identity
+        self._alive: list[Any] = []  # textures whose ids are keys
 
     def folded(self, texture: Texture, role: Role) -> Any:
-        """Return a texture with its constants put together, see `texture_programs.folded`."""
+        """Return a texture with its constants combined, see `programs.folded`."""
         key = id(texture), role
         if key not in self._folded:
-            made = folded(texture, role)
+            result = folded(texture, role)
             spectral = self.spectra.spectral and role in (REFLECTANCE, EMISSION)
-            self._folded[key] = separated(made, role) if spectral else made
+            self._folded[key] = separated(result, role) if spectral else result
             self._alive.append(texture)
         return self._folded[key]
 
     def row(self, texture: Texture, role: Role) -> int:
-        """Put a texture in a role into the tables; return the first word of its row in `textures`.
+        """Append a texture in a role; return the first word of its row in `textures`.
 
-        A composite must be `folded`.
-        The same texture in the same role is put in once. Raises SceneError for an image or a uv
-        transform that cannot be used.
+        A composite must be `folded`. The same texture in the same role is appended once. Raises
+        SceneError for an image or a uv transform that cannot be used.
         """
         key = _identity(texture), role
         if key not in self._rows:
@@ -89,12 +116,12 @@ class TextureTable:
         return self._rows[key]
 
     def finish(self) -> list[str]:
-        """Put the images into the tables, when all of them are known; return warnings."""
+        """Append the images, when all of them are known; return warnings."""
         return self.images.finish(self.store, self.roles)
 
     @property
     def second_uv(self) -> tuple[int, int]:
-        """The indices of the attributes that make a mesh's second set of uv; -1: none asks."""
+        """The indices of the attributes that make a mesh's second set of uv; -1: not used."""
         u, v = (self.attributes.get((name, REAL, ""), -1) for name in SECOND_UV)
         return u, v
 
@@ -129,13 +156,13 @@ class TextureTable:
         self.store.append_floats("texels", np.zeros(4))
         self.store.append("images", np.zeros(4, np.uint32))
         self.append_row("spectral_bitmap", {"kind": 0, "width": 1, "height": 1})
-        self.store.append("textures", noise.PERMUTATION)
+        self.store.append("textures", PERMUTATION)
 
 
 def _identity(texture: Texture) -> Any:
     """Return a key that is equal for the same textures.
 
-    It has the parameters of a bitmap, else the id of the object.
+    It holds the parameters of a bitmap; for other textures it is the id of the object.
     """
     if isinstance(texture, Bitmap):
         values = texture.raw, texture.filter, texture.wrap, texture.wrap_v, texture.channel
@@ -146,7 +173,7 @@ def _identity(texture: Texture) -> Any:
 
 
 def _uv(texture: Placed, table: TextureTable, down: bool = False) -> dict[str, Any]:
-    """The members of `_COMMON`; `down`: with v turned round, as an image's rows run."""
+    """Return the members of a row about uv; down: v runs down, as an image's rows do."""
     matrix = np.asarray(texture.to_uv, np.float64)
     u, v = matrix[:2] / matrix[2, 2]
     members = {"to_u": u, "to_v": [0.0, 0.0, 1.0] - v if down else v}
@@ -158,7 +185,7 @@ def _uv(texture: Placed, table: TextureTable, down: bool = False) -> dict[str, A
 
 
 def _second_uv(table: TextureTable) -> int:
-    """Append where a mesh's second set of uv stands, in as many words as a place in the world."""
+    """Append the attributes of a mesh's second set of uv, in as many words as `_transform`."""
     words = np.zeros(12, np.uint32)
     for i, name in enumerate(SECOND_UV):
         words[i] = table.attribute(name, REAL)
@@ -187,7 +214,7 @@ def _checkerboard(
 
 
 def _bitmap(texture: Bitmap, role: Role, table: TextureTable) -> int:
-    """Append a bitmap's row; unless it is one of spectra, its image comes when all are known."""
+    """Append a bitmap's row; its image follows in `finish`, an image of spectra at once."""
     filters, smooth = params(Bitmap)["filter"].choices, texture.filter == "trilinear"
     members = {
         **_uv(texture, table, down=True),
@@ -244,11 +271,11 @@ def _noise(texture: Noise, role: Role, table: TextureTable) -> tuple[str, dict[s
 
 def _marble(texture: Marble, role: Role, table: TextureTable) -> tuple[str, dict[str, Any]]:
     if role is REAL:
-        words = np.zeros((len(noise.MARBLE), SPECTRUM_WORDS), np.float32)
-        words[:, 0] = luminance(noise.MARBLE)
+        words = np.zeros((len(MARBLE), SPECTRUM_WORDS), np.float32)
+        words[:, 0] = luminance(MARBLE)
     else:
-        made = [table.spectra.words(RGB(*rgb), REFLECTANCE)[0] for rgb in noise.MARBLE]
-        words = np.array(made).view(np.float32)
+        colours = [table.spectra.words(RGB(*rgb), REFLECTANCE)[0] for rgb in MARBLE]
+        words = np.array(colours).view(np.float32)
     return texture.kind, {
         "transform": _transform(texture, table),
         "colours": table.store.append("textures", words.view(np.uint32)),

@@ -1,6 +1,6 @@
-"""The files that a scene's images are read from, as they were when they were read.
+"""The versions of the files from which a scene's images were read.
 
-Such a file may change while a scene is rendered: samples are of what was read.
+Such a file may change while a scene is rendered: all samples show the version that was read.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from clpt.scene.fingerprint import file_digest
 class ImageFiles:
     """The versions of a scene's files, and the digests of their bytes, by path.
 
-    They are noted before a scene is lowered; `check` says afterwards whether they are still so.
+    They are noted before a scene is lowered; `check` compares them afterwards.
     """
 
     versions: Mapping[str, str] = field(default_factory=dict)
@@ -26,9 +26,9 @@ class ImageFiles:
 
     @classmethod
     def of(cls, paths: Iterable[str], former: ImageFiles) -> ImageFiles:
-        """Note files; former: those of the scene before, which are not read again.
+        """Note files; former: the files of the scene before, which are not read again.
 
-        Files that cannot be read are left out: whoever lowers the scene tells what is wrong.
+        Files that cannot be read are left out: lowering raises their errors.
         """
         versions: dict[str, str] = {}
         digests: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""Textures that combine others, as programs in postfix order for kernels/textures/program.cl.
+"""Textures that combine others as programs in postfix order, see kernels/textures/program.cl.
 
 A program's row in `textures` is the position of "program" in the table of texture kinds, then
 instructions of two words: operand, operation and perhaps END, and the operand's argument.
@@ -29,16 +29,17 @@ Lower = Callable[[Texture, Role], int]
 
 
 def is_composite(value: object) -> bool:
-    """Whether a value is a texture that combines others."""
+    """Return whether a value is a texture that combines others."""
     if isinstance(value, Checkerboard):
         return any(_textured(colour) for colour in (value.color0, value.color1))
     return isinstance(value, (Product, Mix))
 
 
 def folded(value: object, role: Role) -> Any:
-    """Return a value, with constants that meet each other put together where that is exact.
+    """Return a value whose constants are combined where that is exact.
 
-    In the role REAL all constants are numbers; else those that are the same at all wavelengths.
+    In the role REAL all constants are numbers. In other roles a constant counts as a number if it
+    is the same at all wavelengths.
     """
     if isinstance(value, Checkerboard) and is_composite(value):
         pattern = Checkerboard(color0=0.0, color1=1.0, to_uv=value.to_uv)
@@ -77,10 +78,11 @@ class _Scaled(Product):
 
 
 def separated(value: object, role: Role) -> Any:
-    """Return a value in which products of colours in RGB are sums of three products of numbers.
+    """Return a value with RGB products of colours as sums of three products of numbers.
 
-    Each of `primaries` has its channel as the factor. A program adds by mixing: half and half, the
-    sum with the third, so the first two are times four and the third times two.
+    A summand is one of `primaries` times its channel. A program adds by mixing halves: the first
+    two summands, then this sum with the third. So the first two are times four, the third times
+    two.
     """
     if isinstance(value, Mix):
         return replace(
@@ -100,24 +102,24 @@ def separated(value: object, role: Role) -> Any:
 
 @cache
 def _primary(number: int, times: float, light: bool) -> Tabulated:
-    """A primary times a number, and times D65 for light."""
+    """Return a primary times a number, and times D65 for light."""
     values = times * primaries()[number].sample(cie.GRID)
     return Tabulated(cie.GRID, values * d65().sample(cie.GRID) if light else values, "hold")
 
 
 def _scaled(spectrum: Spectrum, factors: list[Any]) -> Any:
-    """A spectrum times textures and numbers; the numbers become one."""
+    """Return a spectrum times textures and numbers; the numbers become their product."""
     number = float(np.prod([f for f in factors if not _textured(f)]))
-    made: Any = spectrum
-    for one in (*filter(_textured, factors), *([number] if number != 1.0 else [])):
-        made = _Scaled(first=made, second=one)
-    return made
+    product: Any = spectrum
+    for factor in (*filter(_textured, factors), *([number] if number != 1.0 else [])):
+        product = _Scaled(first=product, second=factor)
+    return product
 
 
 def _factors(value: Any, number: int) -> list[Any]:
     """Return factors whose product is a channel of a product of colours.
 
-    They are numbers, and textures in the role REAL. number: of the channel, 0 to 2.
+    They are numbers, and textures in the role REAL. number: the channel, 0 to 2.
     """
     if isinstance(value, Product):
         return [*_factors(value.first, number), *_factors(value.second, number)]
@@ -130,12 +132,11 @@ def _factors(value: Any, number: int) -> list[Any]:
 
 
 def _joint(factors: list[Any]) -> Any:
-    """The product of factors as one value."""
     return reduce(lambda a, b: Product(first=a, second=b), factors)
 
 
 def _number(value: Any, role: Role) -> float | None:
-    """The number that a constant is."""
+    """Return the number of a constant, None for other values."""
     if isinstance(value, (int, float)):
         return float(value)
     if isinstance(value, Constant):
@@ -154,8 +155,8 @@ def program(
 ) -> tuple[Words, int]:
     """Return the instructions of a composite in a role, and how many values they stack.
 
-    value: as `folded` gave it; lower: puts a texture that combines nothing into the tables and
-    returns its row.
+    value: a result of `folded`; lower: appends a texture that combines no others and returns its
+    row.
     """
     code, depth = _Writer(role, store, spectra_, lower).code(value, "own")
     last, argument = code[-1]
@@ -163,13 +164,16 @@ def program(
 
 
 class _Writer:
-    """Writes one program."""
+    """Writes the instructions of a program."""
 
     def __init__(self, role: Role, store: TableStore, spectra_: SpectraTable, lower: Lower):
         self.role, self.store, self.spectra, self.lower = role, store, spectra_, lower
 
     def code(self, value: object, use: str) -> tuple[Code, int]:
-        """Instructions that push a value, and how many they stack; use: an operand's name."""
+        """Return instructions that push a value, and how many values they stack.
+
+        use: an operand's name.
+        """
         if isinstance(value, _Scaled):
             return self._joined([(value.first, use)], (value.second, "real"), "multiply")
         if isinstance(value, Product):
@@ -182,24 +186,24 @@ class _Writer:
         return [self._operand(value, use)], 1
 
     def _joined(self, pushed: list, last: tuple[Any, str], operation: str) -> tuple[Code, int]:
-        made: Code = []
+        joined: Code = []
         depth = 0
         for below, (value, use) in enumerate(pushed):
             code, needed = self.code(value, use)
-            made, depth = made + code, max(depth, below + needed)
+            joined, depth = joined + code, max(depth, below + needed)
         value, use = last
         if isinstance(value, (Product, Mix)):
             code, needed = self.code(value, use)
-            made, depth = made + code, max(depth, len(pushed) + needed)
+            joined, depth = joined + code, max(depth, len(pushed) + needed)
             operand, argument = OPERANDS.index("top"), 0
         else:
             operand, argument = self._operand(value, use)
-        return [*made, (operand | OPERATIONS[operation], argument)], depth
+        return [*joined, (operand | OPERATIONS[operation], argument)], depth
 
     def _operand(self, value: Any, use: str) -> tuple[int, int]:
         role = {"own": self.role, "factor": REFLECTANCE, "real": REAL}[use]
         if _textured(value):
-            # of a program for a number every operand is one
+            # in a program of numbers every operand is a number
             name = "own" if role == self.role else use
             return OPERANDS.index(name), self.lower(value, role)
         number = _number(value, role)
@@ -209,7 +213,7 @@ class _Writer:
         return OPERANDS.index("constant"), self.store.append("textures", self._words(value, role))
 
     def _words(self, value: Any, role: Role) -> Words:
-        """A colour or spectrum as five words; colours may exceed one; emitted numbers are D65."""
+        """Return a colour or spectrum as five words; colours may exceed 1, emission is D65."""
         if role is EMISSION and isinstance(value, Constant):
             value = RGBIlluminant(*[value.value] * 3)
         if role in (REFLECTANCE, INDEX) and type(value) in (RGB, RGBUnbounded):

@@ -1,4 +1,4 @@
-"""Images as the kernels read them: texels of colours, of spectra, of bands, or of numbers."""
+"""Images as kernels read them: texels of colours, of spectra, of bands, or of numbers."""
 
 from __future__ import annotations
 
@@ -13,34 +13,34 @@ from clpt.images.spectral_exr import SpectralImage
 from clpt.scene.roles import REAL, REFLECTANCE, Role
 from clpt.spectra import Tabulated
 
-FAR = 1000.0  # bands: how far beyond its ends a spectral image's bands are numbered
+FAR = 1000.0  # bands by which the numbering goes on beyond the ends of a spectral image
 
 
 def texels(image: Floats32, role: Role, spectral: bool) -> Floats32:
-    """Return what stands in `texels` for an image of `pixels`, row by row from the top.
+    """Return the texels of an image, row by row from the top.
 
     (h * w, 4): rgb, or sigmoid coefficients and a factor where `spectral`; (h * w,) for REAL.
     """
     if role is REAL:
         return image.reshape(-1)
     colours = np.broadcast_to(image, (*image.shape[:2], 3)).reshape(-1, 3)
-    made = np.ones((len(colours), 4), np.float32)
+    rows = np.ones((len(colours), 4), np.float32)
     if not spectral:
-        np.clip(colours, 0.0, 1.0 if role is REFLECTANCE else None, out=made[:, :3])
+        np.clip(colours, 0.0, 1.0 if role is REFLECTANCE else None, out=rows[:, :3])
     elif role is REFLECTANCE:
         distinct, which = _palette(np.clip(colours, 0.0, 1.0))
-        made[:, :3] = spectra.uplift(distinct)[which]
+        rows[:, :3] = spectra.uplift(distinct)[which]
     else:
-        made[:, 3], made[:, :3] = spectra.unbounded(colours)
-    return made
+        rows[:, 3], rows[:, :3] = spectra.unbounded(colours)
+    return rows
 
 
 def bands(image: SpectralImage, lo: float, hi: float) -> tuple[Floats32, Tabulated]:
-    """Return what stands in `texels` for a spectral image seen from `lo` to `hi` [nm].
+    """Return the texels of a spectral image for the wavelengths from `lo` to `hi` [nm].
 
     (h * w, n) float32 and the number of the band by wavelength: whole at the bands' wavelengths,
-    linear between them and beyond the ends. Bands outside the range but for the next are left out.
-    Raises SceneError if there are fewer than two.
+    linear between them and beyond the ends. Outside the range only the next band is kept on each
+    side. Raises SceneError for fewer than two bands.
     """
     lambdas, n = image.lambdas, len(image.lambdas)
     if n < 2:
@@ -58,9 +58,9 @@ def bands(image: SpectralImage, lo: float, hi: float) -> tuple[Floats32, Tabulat
 
 
 def _palette(colours: Floats32) -> tuple[Floats32, Any]:
-    """Distinct colours (k, 3), and which of them each of (n, 3) is, if channels have few values.
+    """Return the distinct colours (k, 3), and the index of each of the colours (n, 3) among them.
 
-    The channels of an 8-bit image have at most 256. Other images come back as they are.
+    The channels of an 8-bit image have at most 256 values. Other images are returned unchanged.
     """
     number, counts = np.zeros(len(colours), np.int64), 1
     for channel in colours.T:

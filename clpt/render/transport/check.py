@@ -6,21 +6,21 @@ from typing import NoReturn
 
 from clpt.errors import SceneError
 from clpt.geometry import shapes
-from clpt.render.camera.find import CONNECTED, dispersive_glasses
 from clpt.render.geometry.find import assembled
 from clpt.render.media import light_media
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import Scene
+from clpt.scene.cameras import CONNECTED
 from clpt.scene.integrators import ParticleTracer
-from clpt.scene.lights import DirectionalArea, Point
+from clpt.scene.lights import DirectionalArea
 from clpt.scene.materials import parts
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Shape
 
 
 def check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
-    """Raise SceneError for what only paths from lights can do, and for what they cannot."""
+    """Raise SceneError for a directional_area light, or parts that particle_tracer refuses."""
     if not isinstance(scene.integrator, ParticleTracer):
         for shape in shapes_:
             if isinstance(shape.emission, DirectionalArea):
@@ -31,22 +31,22 @@ def check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
                 )
         return
     spectral = scene.film.mode == "spectral"
-    if scene.camera.kind not in CONNECTED:
+    if not scene.camera.connects:
         names = " and ".join(CONNECTED)
         _refuse(f"the cameras {names}, not {scene.camera.kind}", "camera")
     if scene.film.alpha:
         _refuse("a film without alpha", "film.alpha")
-    if spectral and dispersive_glasses(scene.camera):
+    if spectral and scene.camera.dispersive_glasses:
         _refuse("a lens whose glass does not disperse", "camera.glass")
     for i, light in enumerate(scene.lights):
-        if isinstance(light, Point) and not light.falloff:
+        if light.reach == "placed" and not light.falloff:
             _refuse("a point light whose irradiance falls with distance", f"lights[{i}]")
     for shape in shapes_:
         _check_surface(shape, spectral)
 
 
 def check_lit_media(scene: Scene, cache: LoweringCache) -> None:
-    """Raise SceneError where paths from lights do not know in which medium they start."""
+    """Raise SceneError if the medium around a light is unknown to paths from lights."""
     index = SceneIndex.of(scene)
     if not (index.light_paths and index.has_media):
         return
@@ -59,13 +59,13 @@ def check_lit_media(scene: Scene, cache: LoweringCache) -> None:
 
 
 def _check_surface(shape: Shape, spectral: bool) -> None:
-    """Raise SceneError for materials and media that paths from lights cannot meet."""
-    made = list(parts(shape.material))
-    if spectral and any(part.fluoresces for part in made):
+    """Raise SceneError for materials and media that paths from lights cannot cross."""
+    materials = list(parts(shape.material))
+    if spectral and any(part.fluoresces for part in materials):
         _refuse("materials that keep the wavelength", shapes.where(shape))
     if spectral and any(_gives_other_light(medium) for medium in (shape.interior, shape.exterior)):
         _refuse("media that keep the wavelength", shapes.where(shape))
-    if any(part.no_back for part in made):
+    if any(part.no_back for part in materials):
         _refuse("materials that are reciprocal, which hair is not", shapes.where(shape))
 
 
@@ -74,6 +74,5 @@ def _refuse(needed: str, where: str) -> NoReturn:
 
 
 def _gives_other_light(medium: Medium | None) -> bool:
-    """Whether a medium gives light other wavelengths."""
     phases = () if medium is None else medium.collisions(True)
-    return any(one.fluoresces for phase in phases for one in phase.leaves)
+    return any(leaf.fluoresces for phase in phases for leaf in phase.leaves)

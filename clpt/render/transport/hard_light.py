@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.geometry import analytic, shape_records, shapes, triangles
-from clpt.render.camera import find as cameras
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
@@ -136,7 +135,7 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     integrator, without = index.integrator, Path(light_paths=0)
     if not index.lights_reach:
         return without, index.lit_media
-    if not cameras.is_connected(index.camera, index.mode):
+    if not index.camera.is_connected(index.mode):
         return without, "points cannot be joined to this camera"
     fewest = FEWEST - index.free_panes  # a pane on the way costs no depth
     if 0 <= integrator.max_depth < fewest:
@@ -146,7 +145,7 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     sharp = _first_with((one for one in index.shapes if not _hides(one)), is_sharp)
     if sharp is None:
         return without, "nothing is specular"
-    if _first_with((one for one in index.shapes if one.emission is None), _is_dull) is None:
+    if _first_with((one for one in index.shapes if one.emission is None), _is_diffuse) is None:
         return without, "there is nothing dull for a caustic to be seen on"
     small = list(_small_lights(lit))
     if not small:
@@ -211,7 +210,7 @@ def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
         return False
     covered = np.zeros(DIRECTIONS, bool)
     directions = _cone(np.array([0.0, 0.0, 1.0]), -1.0, DIRECTIONS)
-    for pieces in sharp_pieces(geometry, (), lambda one: is_sharp(one) and not _is_dull(one)):
+    for pieces in sharp_pieces(geometry, (), lambda one: is_sharp(one) and not _is_diffuse(one)):
         covered[_covered(pieces, place, directions)] = True
     return bool(covered.mean() > BULB)
 
@@ -248,11 +247,11 @@ def _covered(
 
 def _sees_clear(index: SceneIndex, geometry: Geometry) -> bool:
     """Whether mirrors and clear things fill enough of the picture: as if nothing hid them."""
-    view = cameras.view_of(index.camera, index.film.width, index.film.height)
+    view = index.camera.view_of(index.film.width, index.film.height)
     assert view is not None, "a camera that can be joined has a point"
     directions = _cone(view.axis, math.cos(view.angle), RAYS)
     for pieces in sharp_pieces(geometry, index.motions.shapes, lambda one: is_sharp(one, CLEAR)):
-        met = _covered(pieces, view.place, directions)
+        met = _covered(pieces, view.origin, directions)
         directions = np.delete(directions, met, axis=1)
         if directions.shape[1] <= (1.0 - SEEN) * RAYS:
             return True
@@ -269,12 +268,12 @@ def _first_with(all_: Iterable[Shape], wanted: Callable[[mt.Material], object]) 
     return None
 
 
-def _is_dull(material: mt.Material) -> bool:
+def _is_diffuse(material: mt.Material) -> bool:
     """Whether light paths can be joined to the camera on a material, or on one inside it."""
     if isinstance(material, mt.NormalMapped) or not material.reversible:
         return False
     if isinstance(material, mt.COMPOSITES):
-        return any(_is_dull(part) for _, part in mt.inner(material))
+        return any(_is_diffuse(part) for _, part in mt.inner(material))
     return not material.delta and not is_sharp(material)
 
 
@@ -297,11 +296,14 @@ def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, flo
             small = sky_light.sun_share(lamp, lit.look) >= SUN
         else:
             small = lamp.reach in ("placed", "distant") and lamp.falloff
+        bounds, place = lamp.bounds(), None
+        if bounds is not None:
+            place = motions.halfway(motions.lamps.get(i), (bounds.low + bounds.high) / 2.0)
+            far = max(float(np.linalg.norm(place - middle)), NEAR * radius)
+            small = small and float(((bounds.high - bounds.low) ** 2).sum()) < SMALL * far**2
+        elif lamp.reach == "placed":
+            small = False
         if small:
-            place = None
-            if lamp.reach == "placed":
-                bounds = light_bounds.of_lamp(lamp)
-                place = motions.halfway(motions.lamps.get(i), (bounds.low + bounds.high)[0] / 2.0)
             yield f"lights[{i}]", place, float(share[row]), slice(row, row + 1)
     ends = (*sources.first, len(share))[1:]
     for emitter, first, end in zip(geometry.emitters, sources.first, ends, strict=True):

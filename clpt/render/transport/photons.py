@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.records import PHOTON
-from clpt.render.camera import find as cameras
 from clpt.render.geometry.find import Geometry
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Vcm
@@ -59,10 +58,10 @@ def first_radius(
     power of the square root of 2, so that small changes of a scene rarely change it.
     """
     least, most = LEAST * scene_radius, MOST * scene_radius
-    view = cameras.view_of(camera, *film)
+    view = camera.view_of(*film)
     if view is None:
         return _rounded(math.sqrt(least * most))
-    far = _median_distance(_triangles(geometry) - view.place, view.axis, view.angle)
+    far = _median_distance(_triangles(geometry) - view.origin, view.axis, view.angle)
     pixel = far * view.width / film[0]
     return _rounded(float(np.clip(RADIUS * pixel, least, most)) if far else least)
 

@@ -29,8 +29,8 @@ PHOTON_RAY = 1.5  # the same of `vcm`
 
 @dataclass(frozen=True)
 class Trial:
-    """Pictures of a few samples each, (rounds, height, width, 3); rays of all, and of one the time
-    beside that of another trial's."""
+    """Pictures of a few samples each, (rounds, height, width, 3), the number of all their rays, and
+    the relative time of a ray."""
 
     pictures: Floats
     rays: int
@@ -65,25 +65,25 @@ def settings(of: NDArray[np.void], pixels: int = PIXELS) -> NDArray[np.void]:
 def variances(trials: Sequence[Trial], trim: float = TRIM) -> list[float]:
     """Return the variance of a picture of each trial; all are of one scene, with as many rounds.
 
-    It is relative to the mean of a block of pixels, as that of a pixel is too noisy; trim: the
-    share of the pixels that is left out, the worst. What a trial has hardly ever found is no part
-    of the variance that it shows: so where another one has surely found more light in a block, its
-    variance there is at least what follows from finding that light once in all its samples.
+    It is relative to the mean of a block of pixels, as the mean of a pixel is too noisy; trim: the
+    share of the worst pixels, which are left out. The variance of a trial misses light that it has
+    hardly ever found. So where another trial has surely found more light in a block, the variance
+    is at least the variance of finding that light once in all samples.
     """
     spread = [_in_blocks(trial.pictures.var(axis=0, ddof=1)) for trial in trials]
     means = [_in_blocks(trial.pictures.mean(axis=0)) for trial in trials]
     around = np.mean([_of_blocks(mean) for mean in means], axis=0)
     scale = np.maximum(around**2 + 1e-2 * around.mean() ** 2, 1e-300)
     count = BLOCK**2 * len(trials[0].pictures)
-    found = []
-    for own, mean in zip(spread, means, strict=True):
+    variances_ = []
+    for spread_here, mean in zip(spread, means, strict=True):
         least = np.zeros_like(around)
         for other, more in zip(spread, means, strict=True):
             missed = np.maximum(_of_blocks(more - mean), 0.0) ** 2
-            least = np.maximum(least, count * missed - SURE**2 * _of_blocks(own + other))
-        error = np.sort((np.maximum(own, least) / scale).mean(axis=-1), axis=None)
-        found.append(float(error[: math.ceil(error.size * (1.0 - trim))].mean()))
-    return found
+            least = np.maximum(least, count * missed - SURE**2 * _of_blocks(spread_here + other))
+        error = np.sort((np.maximum(spread_here, least) / scale).mean(axis=-1), axis=None)
+        variances_.append(float(error[: math.ceil(error.size * (1.0 - trim))].mean()))
+    return variances_
 
 
 def _in_blocks(picture: Floats) -> Floats:
@@ -103,8 +103,8 @@ def costs(trials: Sequence[Trial]) -> list[float]:
 
     1 for each where nothing is noisy.
     """
-    found = [
+    products = [
         variance * trial.rays * trial.ray
         for variance, trial in zip(variances(trials), trials, strict=True)
     ]
-    return [cost / found[0] if found[0] > 0.0 else 1.0 for cost in found]
+    return [cost / products[0] if products[0] > 0.0 else 1.0 for cost in products]

@@ -17,7 +17,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from clpt import device
-from clpt.device.timing import Timings
+from clpt.device.stream import Timings
 from clpt.render.flow import bounce, programs, signatures
 from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.records import Features
@@ -30,6 +30,7 @@ BATCH = 8  # bounces that are enqueued between two reads of the counters
 CORE_BOUNCES = 1 << 16  # of all slots, that a core's part of a loop takes at once
 LEAST_LAUNCH = 1 / 2  # of the usual one: shorter ones cost too much
 LAUNCHES = 3  # that a run has to wait for, about, before it ends
+LOOP_SECONDS = 0.5  # of a launch of the loop at most, as far as one bounce of all slots allows
 LAUNCH_SECONDS = 0.05  # of a stage at most: drivers of GPUs that draw a screen end long kernels
 FIRST_PARTS = 8  # launches that a stage is divided into before it is known how long one takes
 LEAST_ITEMS = 1 << 12  # of a part
@@ -53,6 +54,20 @@ class Step:
         most = -(-max(-(-items // count), LEAST_ITEMS) // group) * group
         for first in range(0, items, most):
             yield first, min(most, items - first)
+
+
+def next_bounces(bounces: int, took: float, most: int, cancel_seconds: float | None) -> int:
+    """Return the bounces of the next launch of a loop, after one of `bounces`.
+
+    took: the time of that [s]; most: what suits the device; cancel_seconds: in which a run is to
+    end that is stopped [s], or None. A launch takes LOOP_SECONDS at most, as far as one bounce of
+    all slots allows: whatever a bounce costs, the host looks at limits and signals meanwhile.
+    """
+    rate, wanted = bounces / max(took, 1e-6), most
+    if cancel_seconds is not None:
+        fitting = max(int(rate * cancel_seconds / LAUNCHES), bounces // 2)  # others take time too
+        wanted = max(min(fitting, most), math.ceil(most * LEAST_LAUNCH))
+    return max(1, min(wanted, 2 * bounces, int(rate * LOOP_SECONDS)))
 
 
 class Kernels:
@@ -128,7 +143,7 @@ class BounceLoop:
         self._stages: list[Step] | None = None
         self._loop: device.BoundKernel | None = None
         self._cancel_seconds = ending.seconds
-        self._bounces = self._most_bounces()
+        self._bounces = 1  # of a launch of the loop; `_adjust` doubles it while launches are short
         self._parts = FIRST_PARTS
 
     @property
@@ -296,16 +311,14 @@ class BounceLoop:
     def _adjust(self, loop: device.BoundKernel, took: float) -> None:
         """Let launches take so long as suits; took: what is between two reads of counters [s].
 
-        One of the loop: that a run ends in time. A stage's: that no driver ends it.
+        One of the loop: that a run ends in time, and looks at its limits meanwhile. A stage's: that
+        no driver ends it.
         """
         if not self.looped:  # one stage may take all of a bounce
             self._parts = max(1, math.ceil(took / BATCH / LAUNCH_SECONDS))
-        if self._cancel_seconds is None or not self.looped:
             return
-        fitting = int(self._bounces * self._cancel_seconds / LAUNCHES / max(took, 1e-6))
-        fitting = min(max(fitting, self._bounces // 2), 2 * self._bounces)  # others take time too
         most = self._most_bounces()
-        self._bounces = max(min(fitting, most), math.ceil(most * LEAST_LAUNCH))
+        self._bounces = next_bounces(self._bounces, took, most, self._cancel_seconds)
         loop.set_args(bounces=self._bounces)
 
     def _most_bounces(self) -> int:

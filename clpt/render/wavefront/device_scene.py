@@ -12,8 +12,8 @@ from clpt.arrays import on_host
 from clpt.device.buffers import Buffers
 from clpt.records import TABLES
 from clpt.render.flow.scene_to_tables import Lowered
-from clpt.render.media.device_grids import POINT_WORDS, CloudDensity, Values
-from clpt.render.textures.noise import PERMUTATION
+from clpt.render.media.grids import POINT_WORDS, CloudDensity, Values
+from clpt.render.textures.encode import PERMUTATION
 from clpt.render.wavefront import trees
 from clpt.render.wavefront.strategy import Strategy
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from clpt import bvh, device
 from clpt.arrays import Words
-from clpt.device.timing import Timings
+from clpt.device.stream import Timings
 from clpt.render.film.state import SAMPLES_WORD
 from clpt.render.flow import programs
 from clpt.render.flow.scene_to_tables import Lowered

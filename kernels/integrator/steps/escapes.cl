@@ -34,4 +34,5 @@ inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask n
 }
 
 /* Twin, where no medium is sealed by a smooth boundary. */
-#define path_escapes(scene, path, shadow, at, next, v, scatter, bs, onward) ((integer)(0))
+inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask next, Vertex v, Scattering scatter,
+                            BsdfSample bs, vec3 onward) { return (integer)(0); }

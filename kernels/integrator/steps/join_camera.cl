@@ -3,7 +3,8 @@ typedef struct {
     CameraPoint c;
     vec3 to; /* toward it, in shading.frame */
 } CameraJoint;
-#define join_camera_to(joint, scatter) ((joint).to)
+
+/* Step. */
 
 /* Chooses a point of the lens. */
 inline CameraJoint join_camera_seek(Scene scene, Vertex v, Scattering scatter)
@@ -16,15 +17,15 @@ inline CameraJoint join_camera_seek(Scene scene, Vertex v, Scattering scatter)
 }
 
 /* Returns what Path.state gains. arrives: 1 over the cosine of the ray that arrives. */
-inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Vertex v, Scattering scatter, Rival rival,
-                           CameraJoint joint, real arrives)
+inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Vertex v, Scattering scatter,
+                           MisRatio mis_ratio, CameraJoint joint, real arrives)
 {
     CameraPoint c = joint.c;
     BsdfPair pair = bsdf_pair(scatter.bsdf, joint.to, scatter.wo, spectrum_of(1.0f));
     mask shine = active & c.seen & (spectrum_max(pair.f) > 0.0f);
     real share = shading_frame_share(scatter.shading, neg3(v.d));
     real carries = VERTEX_COSINE(v.s.n, c.d) * arrives * c.importance * share;
-    carries *= rival_joint(scene, rival, v, pair, c, &shine);
+    carries *= mis_weight_of_connection(scene, mis_ratio, v, pair, c, &shine);
     Spectrum value = spectrum_scale(spectrum_mul(v.beta, pair.f), carries);
     value = vertex_beyond(scene, v, neg3(c.d), c.t, v.lambdas, value);
     connect_camera(shadow, at, active, shine, v.s, c, value);
@@ -33,7 +34,11 @@ inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Verte
 }
 
 /* Twin, where light paths leave photons alone, or a material sends light one way only. */
-typedef integer CameraJoint;
-#define join_camera_to(joint, scatter) ((scatter).wo)
-#define join_camera_seek(scene, v, scatter) ((integer)(0))
-#define join_camera(scene, shadow, at, active, v, scatter, rival, joint, arrives) ((integer)(0))
+inline CameraJoint join_camera_seek(Scene scene, Vertex v, Scattering scatter)
+{
+    CameraJoint joint;
+    joint.to = scatter.wo;
+    return joint;
+}
+inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Vertex v, Scattering scatter,
+                           MisRatio mis_ratio, CameraJoint joint, real arrives) { return (integer)(0); }

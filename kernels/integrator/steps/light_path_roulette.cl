@@ -15,4 +15,5 @@ inline mask light_path_roulette(Scene scene, Slab path, uint at, mask next, mask
 }
 
 /* Twin, at null surfaces, where nothing is lost. */
-#define light_path_roulette(scene, path, at, next, null, v, scatter, beta) (next)
+inline mask light_path_roulette(Scene scene, Slab path, uint at, mask next, mask null, Vertex v, Scattering scatter,
+                                Spectrum *beta) { return next; }

@@ -1,18 +1,19 @@
 /* Adds the light of photons around a vertex, where they are merged. */
-inline void merge_at_vertex(Scene scene, Slab path, uint at, mask met, Vertex v, Scattering scatter, Rival rival,
+inline void merge_at_vertex(Scene scene, Slab path, uint at, mask met, Vertex v, Scattering scatter, MisRatio mis_ratio,
                             Spectrum ratio SHADE_ARGS)
 {
     mask merges = met & merging_here(v.state, v.depth);
     if (any(merges)) {
         integer sample = load_path_sample(path, at);
-        Spectrum merged = merge_photons(scene, merges, v, scatter, rival, ratio, sample MERGE_PASSED);
+        Spectrum merged = merge_photons(scene, merges, v, scatter, mis_ratio, ratio, sample MERGE_PASSED);
         /* By something sharp, so it has met two surfaces; of no group of lights. */
-        light_layers_add(scene, path, at, merges, (integer)(2), (integer)(0), spectrum_mul(v.beta, merged),
-                         light_layers);
+        light_layers_add(scene, path, at, merges, (integer)(2), (integer)(0), spectrum_mul(v.beta, merged)
+                         LIGHT_LAYER_PASSED);
         merged = spectrum_add(load_path_radiance(path, at), spectrum_mul(v.beta, merged));
         store_path_radiance(path, at, merges, merged);
     }
 }
 
 /* Twin, where no photons are merged. */
-#define merge_at_vertex(scene, path, at, met, v, scatter, rival, ratio)
+inline void merge_at_vertex(Scene scene, Slab path, uint at, mask met, Vertex v, Scattering scatter, MisRatio mis_ratio,
+                            Spectrum ratio SHADE_ARGS) {}

@@ -17,10 +17,10 @@ inline mask met_emission(Scene scene, Slab path, uint at, mask active, Vertex v 
         Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(v.s), v.lambdas);
         le = spectrum_scale(spectrum_mul(v.beta, le), w);
         store_path_radiance(path, at, lit, spectrum_add(load_path_radiance(path, at), le));
-        light_layers_add(scene, path, at, lit, v.depth, light, le, light_layers);
+        light_layers_add(scene, path, at, lit, v.depth, light, le LIGHT_LAYER_PASSED);
     }
     return hidden;
 }
 
 /* Twin, on surfaces that do not shine. */
-#define met_emission(scene, path, at, active, v) mask_of(0)
+inline mask met_emission(Scene scene, Slab path, uint at, mask active, Vertex v SHADE_ARGS) { return mask_of(0); }

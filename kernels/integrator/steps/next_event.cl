@@ -6,8 +6,8 @@ typedef struct {
     vec3 wi;     /* toward it, in shading.frame */
     Spectrum value;
 } NextEvent;
-#define next_event_wi(e, scatter) ((e).wi)
 
+/* Step. */
 /* Chooses the point. */
 inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering scatter)
 {
@@ -24,12 +24,13 @@ inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering sc
 }
 
 /* Weighs its light. */
-inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering scatter, Rival rival, Guided guided,
-                                  Spectrum ratio SHADE_ARGS)
+inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering scatter, MisRatio mis_ratio,
+                                  Guided guided, Spectrum ratio SHADE_ARGS)
 {
     BsdfPair pair = bsdf_pair(scatter.bsdf, scatter.wo, e.wi, ratio);
     Spectrum f = spectrum_scale(pair.f, shading_frame_share(scatter.shading, e.ls.wi));
-    real w = event_weight(scene, rival, v.s, e.ls, e.begins, pair, guided_pdf(guide, guided, e.ls.wi, pair.pdf));
+    real p = guided_pdf(guided, e.ls.wi, pair.pdf MERGE_PASSED);
+    real w = event_weight(scene, mis_ratio, v.s, e.ls, e.begins, pair, p);
     e.shine = e.shine & (e.ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     w = w / sel(e.shine, fabs(e.ls.pdf), (real)(1.0f));
     e.value = spectrum_scale(spectrum_mul(spectrum_mul(v.beta, f), e.ls.radiance), w);
@@ -49,8 +50,15 @@ inline integer next_event_keep(Scene scene, Slab path, Slab shadow, uint at, mas
 }
 
 /* Twin, without lights, and at materials that send light one way only. */
-typedef integer NextEvent;
-#define next_event_wi(e, scatter) ((scatter).wo)
-#define next_event_seek(scene, next, v, scatter) ((integer)(0))
-#define next_event_weigh(scene, e, v, scatter, rival, guided, ratio) (e)
-#define next_event_keep(scene, path, shadow, at, active, v, e) ((integer)(0))
+inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering scatter)
+{
+    NextEvent e;
+    e.wi = scatter.wo;
+    return e;
+}
+inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering scatter, MisRatio mis_ratio,
+                                  Guided guided, Spectrum ratio SHADE_ARGS) { return e; }
+inline integer next_event_keep(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v, NextEvent e)
+{
+    return (integer)(0);
+}

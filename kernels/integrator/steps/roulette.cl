@@ -16,4 +16,5 @@ inline mask path_roulette(Scene scene, Slab path, uint at, mask next, mask null,
 }
 
 /* Twin, at null surfaces, where nothing is lost. */
-#define path_roulette(scene, path, at, next, null, v, scatter, guided, eta, beta) (next)
+inline mask path_roulette(Scene scene, Slab path, uint at, mask next, mask null, Vertex v, Scattering scatter,
+                          Guided guided, real eta, Spectrum *beta) { return next; }

@@ -1,12 +1,12 @@
-/* A rough metal under a rough, clear dielectric coat; front side. On top the coat's microfacets (Walter
- * et al. 2007 eq. 20), below them the metal's, met by directions refracted at the smooth boundary:
- * f = T(wo) T(wi) f_metal(wo', wi') / eta^2 [1/sr], exact where the coat is smooth. A rough coat turns
- * light by (1 - 1/eta) times its slopes: their variance, times that squared and a factor of 2.5, fitted
- * to random walks (tests/kernels/test_coated.py), is added to the metal's. What the coat throws back
- * inside, tabulated by the cosine at which it came, is summed as a geometric series: along the mirror direction, as
- * between smooth boundaries, or, the rougher the metal, as a diffuse light like plastic's. What a rough metal has sent
- * beyond the critical angle tends to stay beyond it: `leaves`, fitted to the same walks. A coat that disperses bends
- * each wavelength by its own index; directions are sampled by the mean of the four. */
+/* A rough metal under a rough, clear dielectric coat; front side. On top the coat's microfacets (Walter et al. 2007
+ * eq. 20), below them the metal's, met by directions refracted at the smooth boundary: f = T(wo) T(wi) f_metal(wo',
+ * wi') / eta^2 [1/sr], exact where the coat is smooth. A rough coat turns light by (1 - 1/eta) times its slopes:
+ * their variance, times that squared and a factor of 2.5, fitted to random walks (tests/kernels/test_coated.py), is
+ * added to the metal's. Light that the coat reflects back inside, tabulated by the incident cosine, is summed as a
+ * geometric series: along the mirror direction, as between smooth boundaries, or, the rougher the metal, as diffuse
+ * light like plastic's. Light that a rough metal sends beyond the critical angle tends to stay beyond it: `leaves`,
+ * fitted to the same walks. A coat that disperses bends each wavelength by its own index; directions are sampled by
+ * the mean of the four. */
 #include "materials/fresnel.cl"
 #include "materials/microfacet.cl"
 #include "materials/rough_coat.cl"
@@ -17,7 +17,7 @@ typedef struct {
     real bounce;       /* what leaves the metal's facets, if they reflect all */
     Spectrum again;    /* what comes of light that the coat throws back, as a diffuse albedo below it */
     real between;      /* share of it that stays in the mirror direction instead */
-    real leaves;       /* how much less of that leaves the coat at the next bounce than of what had come */
+    real leaves;       /* share of it that leaves the coat at the next bounce, over that at this bounce */
 } CoatedMetal;
 
 /* Index and extinction of the metal over the coat's index. */
@@ -102,7 +102,7 @@ inline Spectrum coated_conductor_at(CoatedConductor m, CoatedMetal c, vec3 wo, v
     return spectrum_sel((wo.z > 0.0f) & (wi.z > 0.0f), r, spectrum_of(0.0f));
 }
 /* eval; c and T(wo) are of the mean index. Where the coat disperses, each wavelength has a pass of the
- * loop, so that what comes out at one does not depend on the others. */
+ * loop, so that the value at a wavelength does not depend on the others. */
 inline Spectrum coated_conductor_value(CoatedConductor m, CoatedMetal c, vec3 wo, vec3 wi, real t_wo)
 {
     Spectrum eta = relative_index(m.coat_ior, m.ext_ior), r = spectrum_of(0.0f);

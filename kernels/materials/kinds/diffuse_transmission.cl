@@ -1,5 +1,5 @@
 /* Lambertian scattering to both sides: f = reflectance / pi on the side of wo, transmittance / pi on
- * the other [1/sr]. Where the two add up to more than one they are scaled down, wavelength by wavelength. */
+ * the other [1/sr]. A sum of both above 1 is scaled down, wavelength by wavelength. */
 
 /* What goes to the side of wi. */
 inline Spectrum diffuse_transmission_share(DiffuseTransmission m, mask crossed)

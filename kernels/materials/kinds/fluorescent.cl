@@ -1,6 +1,6 @@
 /* Lambertian paint that fluoresces: f = (reflectance + glow) / pi [1/sr], where glow is the integral
- * [1] of the re-radiation over the wavelengths that come, at those that leave (Donaldson 1954). By which
- * wavelengths light came is chosen by materials/reradiation.cl, with probabilities that divide out. */
+ * [1] of the re-radiation over the incident wavelengths, at the outgoing wavelengths (Donaldson 1954).
+ * materials/reradiation.cl chooses the incident wavelengths, with probabilities that divide out. */
 #include "materials/glow.cl"
 
 Spectrum fluorescent_albedo(Fluorescent m) { return with_glow(m.reflectance, m.reradiation, m.amount); }

@@ -7,7 +7,7 @@
  * and sample have in common, which is most of it. */
 #include "materials/gltf_layers.cl"
 
-/* Both directions as the lobes see them: along and across the anisotropy, thin ones' back turned up. */
+/* Both directions as the lobes see them: along and across the anisotropy; the back of a thin surface is turned up. */
 typedef struct { vec3 wo, wi; } GltfPair;
 inline vec3 gltf_turn(GltfSurface m, vec3 w, real sign)
 {
@@ -32,7 +32,7 @@ inline GltfPair gltf_pair(GltfSurface m, vec3 wo, vec3 wi)
     return p;
 }
 
-/* The coat's normal, where it has one of its own, and a turned direction in its frame. */
+/* The coat's normal, if it differs from the shading normal, and a turned direction in its frame. */
 inline vec3 gltf_coat_normal(GltfSurface m)
 {
     real scale = 2.0f * m.clearcoat_normal_scale;
@@ -59,8 +59,8 @@ typedef struct {
     Spectrum eta, f0, base_f0; /* index; reflectance at normal incidence of all, of the dielectric alone */
     real f90;                  /* of all at grazing angles; the dielectric's is m.specular */
     FilmBase film, base_film;  /* a film over all, over the dielectric alone */
-    real passed;               /* share of what is let through under the facets */
-    real scattered, through;   /* shares of what is scattered back, and to the other side */
+    real passed;               /* transmitted share under the facets */
+    real scattered, through;   /* shares of diffuse reflection and diffuse transmission */
 } GltfParts;
 
 inline GltfParts gltf_parts(GltfSurface m)
@@ -96,7 +96,7 @@ inline vec3 gltf_seen(GltfSurface m, vec3 wo, vec3 wi)
 {
     return v3(wi.x, wi.y, sel((m.thin != 0) & (wo.z * wi.z < 0.0f), -wi.z, wi.z));
 }
-/* The facet that sends light from wi to wo, by reflection or through it at one index. */
+/* The facet that sends light from wi to wo, by reflection, or by transmission at an index. */
 inline RefractingFacet gltf_facet(GltfSurface m, vec3 wo, vec3 wi, real index)
 {
     real eta = 1.0f;
@@ -116,7 +116,7 @@ inline real gltf_cosine(GltfSurface m, real c, real index)
     }
     return x;
 }
-/* Schlick's reflectance, of which f0 and f90 are at normal incidence and at grazing angles. */
+/* Schlick's reflectance; f0: at normal incidence, f90: at grazing angles. */
 inline real gltf_schlick(real f0, real f90, real c)
 {
     real x = 1.0f - c, weight = x * x * x * x * x;
@@ -155,8 +155,8 @@ inline Spectrum gltf_bounced(GltfSurface m, GltfParts p, Spectrum f0, real f90)
 }
 inline real gltf_lost(FacetAlbedo e) { return max_r(1.0f - e.a - e.b, (real)(0.0f)); }
 
-/* What a direction of the dielectric's facets leaves to what lies under them: 1 - E, the directional albedo; and
- * the same with a film. */
+/* The share of light under the dielectric's facets: 1 - E, with the directional albedo E; and the same with a
+ * film. */
 inline Spectrum gltf_left(GltfSurface m, GltfParts p, FacetAlbedo e)
 {
     Spectrum v;
@@ -203,7 +203,7 @@ inline real gltf_sheen_albedo(GltfSurface m, real z)
     return sel(z > 0.0f, charlie_albedo(max_r(z, (real)(0.0f)), m.sheen_roughness), (real)(0.0f));
 }
 
-/* Probabilities of the lobes by the strengths that wo sees; `facets` is of those under the coat. */
+/* Probabilities of the lobes by the strengths that wo sees; `facets`: of the facets under the coat. */
 typedef struct { real coat, sheen, scattered, through, facets; } GltfLobes;
 inline GltfLobes gltf_lobes(GltfSurface m, GltfParts p, vec3 wo)
 {
@@ -240,7 +240,7 @@ inline real gltf_reflects(GltfSurface m, GltfParts p, real c)
     return sel(p.passed > 0.0f, f / max_r(f + t, (real)(1e-6f)), (real)(1.0f));
 }
 
-/* f |cos| of what facets reflect and, at one index, let through. */
+/* f |cos| of the facets: reflection, and transmission at an index. */
 inline Spectrum gltf_facets(GltfSurface m, GltfParts p, vec3 wo, vec3 wi, real index)
 {
     mask front = wo.z > 0.0f, crossed = wo.z * wi.z < 0.0f;
@@ -318,7 +318,7 @@ inline Spectrum gltf_value(GltfSurface m, GltfParts p, vec3 wo, vec3 wi)
     return spectrum_sel(seen & (reflected | crossed), v, spectrum_of(0.0f));
 }
 
-/* pdf of turned directions, were the hero's index this one. */
+/* pdf of turned directions for a hero with this index. */
 inline real gltf_density(GltfSurface m, GltfParts p, GltfLobes l, vec3 wo, vec3 wi, real index)
 {
     mask reflected = wo.z * wi.z > 0.0f, crossed = wo.z * wi.z < 0.0f;

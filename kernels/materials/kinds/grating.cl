@@ -2,8 +2,8 @@
  * Order n leaves by the grating equation in conical mounting (Loewen and Popov 1997, 2.2; Born and
  * Wolf 1999, 8.6.1): along the surface, wi = -wo + n lambda / period. Orders that cannot leave drop
  * out, and the others share all the light. Reflective: front side; transmissive: both sides, the same
- * medium before and behind. Order 0 is chosen by its mean share at the path's wavelengths and keeps
- * them all; of the others one is chosen by the hero's shares, and its direction holds for the hero. */
+ * medium before and behind. The probability of order 0 is its mean share at the path's wavelengths, and it
+ * keeps them all. The hero's shares choose another order, whose direction holds for the hero alone. */
 #include "materials/fresnel.cl"
 #include "materials/diffraction.cl"
 
@@ -16,7 +16,7 @@ typedef struct {
     mask through;
 } GratingPlane;
 
-/* Delay per depth of groove, of one leg at cosine c: through air, or through the plate against air. */
+/* Delay per depth of groove, along a leg at cosine c: through air, or through the plate against air. */
 inline real grating_lag(mask through, real ior, real c)
 {
     return sel(through, 0.5f * (sqrt_r(ior * ior - 1.0f + c * c) - c), c);
@@ -79,7 +79,7 @@ inline real grating_straight(Grating m, GratingPlane g, real lambda, real *other
     return sel(total > 1e-12f, zero / max_r(total, (real)(1e-12f)), (real)(1.0f));
 }
 
-/* One of the orders but 0, by the hero's strengths; its own goes to `strength`. */
+/* A random order other than 0, by the hero's strengths; its own goes to `strength`. */
 inline real grating_choice(Grating m, GratingPlane g, real lambda, real left, real *strength)
 {
     real chosen = 0.0f;
@@ -87,7 +87,7 @@ inline real grating_choice(Grating m, GratingPlane g, real lambda, real left, re
     *strength = 0.0f;
     for (int n = -GRATING_ORDERS; n <= GRATING_ORDERS; n++) {
         real e = n == 0 ? (real)(0.0f) : grating_strength(m, g, n, lambda);
-        mask take = !found & (e > 0.0f); /* the last one, should rounding leave some over */
+        mask take = !found & (e > 0.0f); /* the last order takes the remainder of rounding */
         chosen = sel(take, (real)((float)n), chosen);
         *strength = sel(take, e, *strength);
         found = found | (take & (left < e));

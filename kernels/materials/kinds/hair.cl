@@ -19,11 +19,7 @@ typedef struct {
     Spectrum a[HAIR_LOBES];    /* shares of the light */
 } HairFibre;
 
-inline real hair_power20(real x)
-{
-    real x2 = x * x, x4 = x2 * x2, x8 = x4 * x4;
-    return x8 * x8 * x4;
-}
+inline real hair_power20(real x) { real x2 = x * x, x4 = x2 * x2, x8 = x4 * x4; return x8 * x8 * x4; }
 
 /* What depends on wo alone. */
 inline HairFibre hair_fibre(Hair m, vec3 wo)

@@ -1,7 +1,7 @@
 /* A measured material, front side (Dupuy and Jakob 2018, section 4): a point of a square is warped by luminance,
  * then by visible normals to a halfway direction, about which light is mirrored. f cos [1/sr] is a spectrum over the
- * first square, times ndf / (4 sigma). No pdf depends on the wavelength. Linear between what was measured, so that f
- * is reciprocal, and keeps energy, as well as the measurement does. */
+ * first square, times ndf / (4 sigma). No pdf depends on the wavelength. Values are linear between measured
+ * directions, so f is as reciprocal, and keeps energy as well, as the measurement does. */
 typedef struct {
     MeasurementParts parts;
     WarpSlices viewers;

@@ -1,6 +1,6 @@
 /* Modified Phong, front side (Lafortune and Willems 1994 eq. 6): f = kd / pi + ks (n + 2) / (2 pi)
- * cos^n a [1/sr], a the angle between wi and the mirror direction of wo. Albedos that add up to more
- * than one are scaled down, wavelength by wavelength. */
+ * cos^n a [1/sr], a the angle between wi and the mirror direction of wo. Sums of albedos above 1 are
+ * scaled down, wavelength by wavelength. */
 
 /* 1 / max(1, kd + ks), per wavelength. */
 inline Spectrum phong_scale(Phong m)

@@ -5,7 +5,7 @@
 #include "materials/principled.cl"
 #include "materials/refracting_facet.cl"
 
-/* The index, kept off one where light is refracted: h would be undefined. */
+/* The index, kept away from 1 where light is refracted: h would be undefined. */
 inline Spectrum principled_index(Principled m)
 {
     Spectrum eta = relative_index(m.eta, spectrum_of(1.0f));
@@ -49,7 +49,7 @@ inline PrincipledLobes principled_lobes(Principled m, vec3 wo, real f)
     return p;
 }
 
-/* The facet between two directions, by reflection or through it at one index. */
+/* The facet between two directions, by reflection, or by transmission at an index. */
 inline RefractingFacet principled_facet(vec3 wo, vec3 wi, real index)
 {
     real eta = 1.0f;
@@ -57,7 +57,7 @@ inline RefractingFacet principled_facet(vec3 wo, vec3 wi, real index)
     return refracting_facet(wo, wi, eta);
 }
 
-/* f |cos| of what is reflected; f, facets: the share that the facet p reflects, and f |cos| if it reflected all. */
+/* f |cos| of reflection; f: reflectance of the facet p; facets: f |cos| of a perfect mirror there. */
 inline Spectrum principled_reflected(Principled m, RefractingFacet p, Spectrum f, real facets, vec3 wo, vec3 wi,
                                      Spectrum eta)
 {
@@ -113,7 +113,7 @@ Spectrum principled_eval(Principled m, vec3 wo, vec3 wi)
     return v;
 }
 
-/* pdf, were the hero's index this one. */
+/* pdf for a hero with this index. */
 inline real principled_density(Principled m, vec3 wo, vec3 wi, real index)
 {
     Microfacets d = principled_facets(m.roughness, m.anisotropic);

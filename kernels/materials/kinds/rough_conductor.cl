@@ -1,7 +1,7 @@
 /* Rough metal of mirror-like microfacets, front side (Cook and Torrance 1982; Walter et al. 2007
  * eq. 20): f = F D G / (4 |cos| |cos|) [1/sr], G the product of Smith's two; normals are sampled as
- * wo sees them. F is that of the thin films, if facets wear some. One bounce between facets: the energy
- * of further ones is lost. */
+ * wo sees them. F is the reflectance of the thin films, if facets have films. Single bounce between facets: the energy
+ * of further bounces is lost. */
 #include "materials/fresnel.cl"
 #include "materials/microfacet.cl"
 

@@ -1,12 +1,12 @@
 /* Rough boundary of two dielectrics, both sides (Walter et al. 2007 eq. 20 and 21): microfacets
  * reflect or refract by Fresnel's share; normals are sampled as wo sees them. Radiance that is
- * refracted is scaled by 1 / eta^2. One event at a facet: the energy of further ones is lost.
+ * refracted is scaled by 1 / eta^2. Single event at a facet: the energy of further events is lost.
  * With a dispersive index each wavelength has its own half vector, so eval is exact at all of them;
  * directions are sampled for the hero. Thin films on the facets change the shares, not the directions. */
 #include "materials/fresnel.cl"
 #include "materials/microfacet.cl"
 
-/* The index, kept off one: there a facet would not bend light, and h would be undefined. */
+/* The index, kept away from 1: there a facet would not bend light, and h would be undefined. */
 inline Spectrum rough_dielectric_index(RoughDielectric m)
 {
     Spectrum eta = relative_index(m.int_ior, m.ext_ior);
@@ -16,7 +16,7 @@ inline Spectrum rough_dielectric_index(RoughDielectric m)
     return eta;
 }
 
-/* What a pair of directions means at one index. */
+/* The facet of a pair of directions at an index. */
 typedef struct {
     vec3 h;        /* half vector, on the front */
     Boundary b;    /* what the facet reflects and lets through */
@@ -41,7 +41,7 @@ inline RoughDielectricPair rough_dielectric_pair(RoughDielectric m, vec3 wo, vec
     return p;
 }
 
-/* f |cos| at one index but for the colours. */
+/* f |cos| at an index, without the colours. */
 inline Spectrum rough_dielectric_value(RoughDielectric m, Microfacets d, vec3 wo, vec3 wi, real index)
 {
     RoughDielectricPair p = rough_dielectric_pair(m, wo, wi, index);
@@ -64,7 +64,7 @@ Spectrum rough_dielectric_eval(RoughDielectric m, vec3 wo, vec3 wi)
     return spectrum_mul(v, spectrum_sel(reflected, m.specular_reflectance, m.specular_transmittance));
 }
 
-/* pdf, were the hero's index this one. */
+/* pdf for a hero with this index. */
 inline real rough_dielectric_density(RoughDielectric m, Microfacets d, vec3 wo, vec3 wi, real index)
 {
     RoughDielectricPair p = rough_dielectric_pair(m, wo, wi, index);

@@ -5,10 +5,7 @@
 #include "materials/microfacet.cl"
 #include "materials/rough_coat.cl"
 
-inline Microfacets rough_plastic_facets(RoughPlastic m)
-{
-    return microfacets_of(m.distribution, m.alpha, m.alpha);
-}
+inline Microfacets rough_plastic_facets(RoughPlastic m) { return microfacets_of(m.distribution, m.alpha, m.alpha); }
 
 /* The probability of the coat's reflection, from the two parts' strengths; t: the mean of T(wo). */
 inline real rough_plastic_coat_probability(RoughPlastic m, real t)

@@ -1,4 +1,4 @@
-/* A thin slab, both sides, of which the rest passes undeviated. */
+/* A thin slab, both sides: it reflects a share, and transmits the remainder undeviated. */
 #include "materials/thin_slab.cl"
 
 BsdfSample thin_dielectric_sample(ThinDielectric m, vec3 wo, vec3 u)

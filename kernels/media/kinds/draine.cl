@@ -8,7 +8,6 @@
  * That loses digits where g is near 0: up to DRAINE_CLOSED, K is summed at six Gauss points, whose error is below
  * rounding there. */
 #include "media/phase.cl"
-#include "media/henyey_greenstein.cl"
 #define DRAINE_CLOSED 0.25f
 #define DRAINE_STEPS 24
 
@@ -32,7 +31,7 @@ inline real draine_squares(real g, real v)
     return sel(closed, (1.0f - h * h) / (8.0f * h * h * h) * bracket, 0.5f * v * sum);
 }
 
-/* The cosine that u leads to. */
+/* The cosine for a random number u. */
 inline real draine_turn(real g, real alpha, real u)
 {
     real goal = u * (1.0f + alpha * (1.0f + 2.0f * g * g) * (1.0f / 3.0f));

@@ -1,7 +1,6 @@
-/* Henyey and Greenstein 1941: (1 - g^2) / (4 pi (1 + g^2 - 2 g cos)^1.5), cos of the angle by which light turns. It
- * is sampled by the inverse of its integral (Pharr, Jakob and Humphreys 2023, 11.3.1). */
+/* Henyey and Greenstein 1941: (1 - g^2) / (4 pi (1 + g^2 - 2 g cos)^1.5), cos of the scattering angle. It is
+ * sampled by the inverse of its integral (Pharr, Jakob and Humphreys 2023, 11.3.1). */
 #include "media/phase.cl"
-#include "media/henyey_greenstein.cl"
 
 Spectrum henyey_greenstein_eval(HenyeyGreenstein m, vec3 wo, vec3 wi)
 {

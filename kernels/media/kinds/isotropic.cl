@@ -1,4 +1,4 @@
-/* The same in all directions: 1 / 4 pi. */
+/* The same in all directions: 1 / (4 pi). */
 BsdfSample isotropic_sample(Isotropic m, vec3 wo, vec3 u)
 {
     BsdfSample s = bsdf_nothing();

@@ -1,5 +1,5 @@
-/* The same in all directions, and by which wavelengths light came is chosen by materials/reradiation.cl, as in
- * materials/kinds/fluorescent.cl: in a medium a point has no normal, and f = (reflectance + glow) / 4 pi [1/sr]. */
+/* Isotropic; materials/reradiation.cl chooses the incident wavelengths, as for materials/kinds/fluorescent.cl. A
+ * point of a medium has no normal, so f = (reflectance + glow) / 4 pi [1/sr]. */
 #include "materials/glow.cl"
 
 Spectrum reradiating_albedo(Reradiating m) { return with_glow(m.reflectance, m.reradiation, m.amount); }

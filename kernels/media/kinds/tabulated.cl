@@ -1,5 +1,5 @@
-/* A table over the cosine of the angle by which light turns, linear between its points: sampled by the inverse of its
- * integral, which is exact. */
+/* A table over the cosine of the scattering angle, linear between its points. It is sampled by the exact inverse of its
+ * integral. */
 #include "media/phase.cl"
 
 Spectrum tabulated_eval(Tabulated m, vec3 wo, vec3 wi) { return angular_density(m.values, -dot3(wo, wi)); }

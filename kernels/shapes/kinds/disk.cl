@@ -5,10 +5,7 @@
 inline real disk_reach(Disk q) { return size3(q.s) + size3(q.t); }
 real disk_size(Disk q) { return EXACT_SIZE * (disk_reach(q) + size3(q.center)); }
 
-inline real disk_pdf_area(Disk q)
-{
-    return INV_PI / wide_length3(cross3(q.s, q.t));
-}
+inline real disk_pdf_area(Disk q) { return INV_PI / wide_length3(cross3(q.s, q.t)); }
 
 ShapeSample disk_sample(Disk q, vec3 p, vec2 u)
 {

@@ -14,7 +14,7 @@ inline integer bitmap_wrap(integer i, integer size, integer wrap)
     return min_i(max_i(i, (integer)(0)), size - 1);
 }
 
-/* A coordinate in the first period, or near the image; one that is huge or not a number as well. */
+/* A coordinate in the first period, or near the image, even for huge coordinates and NaN. */
 inline real bitmap_coordinate(real x, integer wrap)
 {
     mask ends = wrap == BITMAP_WRAP_ZERO;
@@ -23,7 +23,7 @@ inline real bitmap_coordinate(real x, integer wrap)
     return clamp_r(x, sel(ends, (real)(-1.0f), (real)(0.0f)), sel(ends, (real)(2.0f), period));
 }
 
-/* One axis: two texels, and their weights; what lies outside weighs nothing where the wrap is zero. */
+/* Along an axis: two texels, and their weights; what lies outside weighs nothing where the wrap is zero. */
 inline void bitmap_axis(real x, integer size, integer wrap, mask smooth, integer *i0, integer *i1, real *w0, real *w1)
 {
     mask ends = wrap == BITMAP_WRAP_ZERO;
@@ -36,8 +36,8 @@ inline void bitmap_axis(real x, integer size, integer wrap, mask smooth, integer
     *i1 = bitmap_wrap(second, size, wrap);
 }
 
-/* One axis: one of the two, each with its weight as its chance; u: uniform. It is no longer `inside` where what lies
- * outside weighs nothing. */
+/* Along an axis: a random texel of the two, with its weight as its probability; u: uniform. It leaves `inside` where
+ * the outside has weight 0. */
 inline integer bitmap_axis_texel(real x, integer size, integer wrap, mask smooth, real u, mask *inside)
 {
     x = bitmap_coordinate(x, wrap) * to_real(size) + sel(smooth, u - 0.5f, (real)(0.0f));
@@ -58,7 +58,7 @@ inline BitmapTexels bitmap_texels(Bitmap t, Scene scene, TexturePoint point)
 
 /* How many of the four texels have weight in some lane: all, or the first. */
 inline int bitmap_corners(BitmapTexels b) { return any((b.u1 > 0.0f) | (b.v1 > 0.0f)) ? 4 : 1; }
-/* One of the four texels: its index in the image, and its weight. */
+/* A random texel of the four: its index in the image, and its weight. */
 inline integer bitmap_corner(Bitmap t, BitmapTexels b, int corner, real *weight)
 {
     int right = corner & 1, next = corner >> 1;

@@ -1,4 +1,4 @@
-/* Zero and one by turns in cubes of unit size. */
+/* 0 and 1 alternate in cubes of unit size. */
 inline real checkers_value(Checkers t, Scene scene, TexturePoint point)
 {
     vec3 p = texture_transformed(scene, t.transform, point.p);

@@ -1,4 +1,4 @@
-/* One within round dots, zero elsewhere, as pbrt's dots: of the cells of uv around whole numbers half have
+/* 1 within round dots, 0 elsewhere, as pbrt's dots: of the cells of uv around whole numbers half have
  * a dot of radius 0.35, put somewhere in it by noise. */
 #include "core/perlin_noise.cl"
 

@@ -2,7 +2,7 @@
  * between nine colours, 1.5 times their brightness. */
 #include "core/perlin_noise.cl"
 
-/* The colours between which it lies, from word `first`, and how far along. */
+/* The words of the two colours around the value, from word `first`, and the position between them. */
 inline integer marble_at(Marble t, Scene scene, TexturePoint point, real *along)
 {
     vec3 p = scale3(texture_transformed(scene, t.transform, point.p), t.scale);

@@ -1,5 +1,5 @@
-/* An image of 8 bits a channel, placed on uv as in textures/kinds/bitmap.cl, in fewer bytes: a number takes one, a
- * colour four, or eight as a spectrum (spectrum_packed_texel). `decode` is the first of 256 values that bytes mean. All
+/* An image of 8 bits a channel, placed on uv as in textures/kinds/bitmap.cl, in fewer bytes: a number takes 1, a
+ * colour 4, or 8 as a spectrum (spectrum_packed_texel). `decode` is the first of the 256 values of bytes. All
  * four texels are read before the first is decoded, so that the processor waits for memory once. */
 inline Bitmap packed_bitmap_image(PackedBitmap t)
 {

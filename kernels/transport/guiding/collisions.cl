@@ -23,4 +23,7 @@ inline integer collision_row(Scene scene, Slab path, Slab hit, uint at, mask act
 }
 
 /* Twin, where there are no media. */
-#define collision_row(scene, path, hit, at, active, row, shared) (row)
+inline integer collision_row(Scene scene, Slab path, Slab hit, uint at, mask active, integer row, real *shared)
+{
+    return row;
+}

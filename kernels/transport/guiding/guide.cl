@@ -50,15 +50,8 @@ inline integer guide_bin(vec3 d)
 }
 
 #if BSDF_GUIDED
-/* What the guide knows where a camera's path is. */
-typedef struct {
-    integer row;
-    real light; /* all that has come there; 0: nothing is known */
-    real even;  /* light from everywhere that is expected beside it, over it */
-} Guided;
-
 /* d: the direction in which the path arrives. */
-inline Guided guide_at(Scene scene, global const uint *guide, Surface s, vec3 d)
+inline Guided guide_at(Scene scene, Surface s, vec3 d MERGE_ARGS)
 {
     Guided g;
     g.row = 0;
@@ -133,7 +126,7 @@ inline vec3 guide_direction(global const uint *guide, Guided g, vec2 u, real *de
 /* A direction that may be next. */
 typedef struct {
     vec3 wi;
-    real guided, material; /* densities of both ways to find it [1/sr]; guided is 0 where this way does not lead */
+    real guided, material; /* densities of both techniques [1/sr]; guided is 0 where the guide cannot sample it */
     real weight;           /* of what it brings by the mean of the wavelengths: the chance that it is taken, unscaled */
 } Candidate;
 
@@ -147,10 +140,7 @@ inline Candidate guide_candidate(vec3 wo, vec3 wi, real guided, real material)
 }
 
 /* The radiance that is expected from a direction, over all that the guide knows. */
-inline real guide_expects(Guided g, Candidate c)
-{
-    return c.guided / guide_cosine(c.wi) + g.even * (0.25f / PI);
-}
+inline real guide_expects(Guided g, Candidate c) { return c.guided / guide_cosine(c.wi) + g.even * (0.25f / PI); }
 
 /* The next direction: one of the material and one of the guide are drawn, and one of both is taken, by what it brings
  * of the light that is expected (resampling: Talbot et al. 2005). uv, lobe: of the material; toward: of the guide;

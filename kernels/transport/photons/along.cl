@@ -21,7 +21,7 @@ typedef struct {
     integer medium, depth, group;
     Medium m;
     Spectrum ratio;
-    real arrives; /* rival */
+    real arrives; /* mis_ratio */
 } MergingRay;
 
 /* The part of a ray that is asked. */
@@ -68,7 +68,7 @@ inline Spectrum merge_photon_along(Photon photon, mask near, MergingRay ray, Mer
 {
     vec3 wi = to_frame(frame, octahedral_unpack(photon.to_light)), wo = v3(0.0f, 0.0f, 1.0f);
     BsdfPair pair = bsdf_pair(bsdf, wo, wi, ray.ratio);
-    real w = photon_weight(photon.rival, ray.arrives, number, area / unit, pair.p, pair.p_back);
+    real w = photon_weight(photon.mis_ratio, ray.arrives, number, area / unit, pair.p, pair.p_back);
     Spectrum light = photon_light(photon, near, pair, ray.ratio, w / (area * merging_chance(window, ray, t)));
     return spectrum_mul(light, spectrum_exp(spectrum_scale(ray.m.sigma_t, -t)));
 }
@@ -80,7 +80,7 @@ inline Spectrum merge_along(Scene scene, mask active, MergingRay ray, Bsdf bsdf,
     global const Settings *settings = scene.settings;
     real radius = merging_radius(scene, pass), half_step = MERGING_BESIDE * radius, step = 2.0f * half_step;
     real beside = merging_beside(scene, pass, ray.m.sigma_t), area = merging_area_along(scene, pass, ray.m.sigma_t);
-    real unit = settings->rival_area, number = settings->light_paths, begins = 0.0f, ends = 0.0f;
+    real unit = settings->mis_area_unit, number = settings->light_paths, begins = 0.0f, ends = 0.0f;
     MergingWindow window = merging_window(ray, step, u);
     Frame frame = frame_of(neg3(ray.d));
     Spectrum sum = spectrum_of(0.0f);

@@ -68,6 +68,6 @@ inline real merging_wavelength(Scene scene, real u, integer pass)
 
 /* Twin, where no photons are merged: each path has a time and wavelengths of its own. */
 #define PATH_BEGUN PATH_ALIVE /* the state in which a path begins at the camera */
-#define merging_moment(scene, u, own, pass) (own)
-#define merging_wavelength(scene, u, pass) (u)
-#define merging_pass(scene, light_path) (light_path)
+inline real merging_moment(Scene scene, real u, real own, integer pass) { return own; }
+inline real merging_wavelength(Scene scene, real u, integer pass) { return u; }
+inline integer merging_pass(Scene scene, integer light_path) { return light_path; }

@@ -1,10 +1,11 @@
 /* Photons of light paths that collide in media. */
-#include "transport/photons/media.cl"
-
 typedef struct {
     mask met;
     integer medium;
 } Collision;
+
+/* Step. */
+#include "transport/photons/media.cl"
 
 #include "transport/photons/part.cl"
 
@@ -25,11 +26,14 @@ inline void collision_photon(Slab path, Slab hit, uint at, Collision c, Photon *
     vec3 p = madd3(load_path_d(path, at), load_hit_t(hit, at), load_path_o(path, at));
     photon->p = sel3(c.met, p, photon->p);
     photon->normal = sel_n(c.met, as_natural(c.medium), photon->normal);
-    photon->rival = sel(c.met, load_path_rival(path, at), photon->rival);
+    photon->mis_ratio = sel(c.met, load_path_mis_ratio(path, at), photon->mis_ratio);
     *group = *group | sel_i(c.met, (integer)(MERGING_IN_MEDIUM), (integer)(0));
 }
 
 /* Twin, where there are no media. */
-typedef integer Collision;
-#define collision_met(scene, path, hit, at, active) ((integer)(0))
-#define collision_photon(path, hit, at, c, photon, group)
+inline Collision collision_met(Scene scene, Slab path, Slab hit, uint at, mask *active)
+{
+    Collision c = {mask_of(0), (integer)(0)};
+    return c;
+}
+inline void collision_photon(Slab path, Slab hit, uint at, Collision c, Photon *photon, integer *group) {}

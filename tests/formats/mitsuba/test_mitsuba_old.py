@@ -293,3 +293,44 @@ def test_unknown_kinds_are_errors_that_an_option_turns_into_grey(read):
 
 def test_all_lights_are_kinds(read):
     assert isinstance(read('<emitter type="sunsky"/>').lights[0], lights.Sky)
+
+
+def test_rough_diffuse(material):
+    made = material('<bsdf type="roughdiffuse"><float name="alpha" value="0.5"/></bsdf>')
+    assert isinstance(made, materials.OrenNayar) and made.interreflection
+    assert made.sigma == pytest.approx(np.degrees(0.5 / np.sqrt(2.0)))
+    fast = '<boolean name="useFastApprox" value="true"/>'
+    assert not material(f'<bsdf type="roughdiffuse">{fast}</bsdf>').interreflection
+
+
+def test_ward_in_its_three_forms(material):
+    for name, ours in (("balanced", "balanced"), ("ward-duer", "duer"), ("ward", "ward")):
+        text = f'<string name="variant" value="{name}"/><float name="alphaU" value="0.3"/>'
+        made = material(f'<bsdf type="ward">{text}</bsdf>')
+        assert (made.variant, made.alpha_u, made.alpha_v) == (ours, 0.3, 0.1)
+
+
+def test_coats(material):
+    """Over a diffuse base of r the coat sends r back once: r' / (1 - f r') = r."""
+    coat = '<bsdf type="{}"><float name="intIOR" value="1.5"/>{}</bsdf>'
+    inner = '<bsdf type="diffuse"><float name="reflectance" value="0.5"/></bsdf>'
+    for kind, cls in (("coating", materials.Plastic), ("roughcoating", materials.RoughPlastic)):
+        made = material(coat.format(kind, inner))
+        base = level(made.diffuse_reflectance)
+        assert isinstance(made, cls) and made.nonlinear
+        inside = 1.0 / base - 2.0
+        assert inside == pytest.approx(0.5963, abs=2e-3)  # of an index of 1.5 over 1.000277
+    metal = material(coat.format("coating", '<bsdf type="roughconductor"/>'))
+    assert isinstance(metal, materials.CoatedConductor) and level(metal.coat_ior) == 1.5
+    other = material(coat.format("coating", '<bsdf type="plastic"/>'))
+    assert isinstance(other, materials.Plastic)
+
+
+def test_a_dipole_is_a_body_in_which_light_walks(read):
+    inner = '<string name="material" value="cream"/><float name="scale" value="2"/>'
+    shape = f'<shape type="sphere"><subsurface type="dipole">{inner}</subsurface></shape>'
+    made = read(shape).shapes[0]
+    assert isinstance(made.material, materials.Dielectric) and made.interior.scale == 2.0
+    assert made.interior.sigma_s == RGBUnbounded(7380.0, 5470.0, 3150.0)
+    with pytest.raises(SceneError, match="is not supported"):
+        read(shape, "3.0.0")

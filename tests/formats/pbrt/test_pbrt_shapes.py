@@ -11,6 +11,7 @@ from clpt.formats import load
 from clpt.geometry import triangles
 from clpt.scene import shapes, subdivision
 from clpt.scene.materials import Mask, Null, TwoSided
+from clpt.scene.textures import Product
 
 QUAD = '"point3 P" [0 0 0 2 0 0 2 1 0 0 1 0] "integer indices" [0 1 2 0 2 3]'
 TEXTURED = 'Texture "t" "spectrum" "checkerboard"\nMaterial "diffuse" "texture reflectance" "t"\n'
@@ -192,6 +193,24 @@ def test_subdivided_shapes(one, scene):
         scene(f'Shape "loopsubdiv" {text} "integer levels" 11')
 
 
+def test_a_lamp_does_not_shine_where_alpha_masks_it(scene):
+    """But an alpha of 0 all over leaves it all its light, which no ray sees."""
+    lamp = 'AreaLightSource "diffuse" "rgb L" [1 1 1] Shape "sphere" "{} alpha" {}'
+    texture = 'Texture "t" "float" "checkerboard" "float tex1" 0 "float tex2" 1 '
+    for kind, value, masks in (
+        ("float", "0.5", True),
+        ("texture", '"t"', True),
+        ("float", "0", False),
+    ):
+        made = scene(texture + lamp.format(kind, value))
+        radiance = made.shapes[0].emission.radiance
+        assert made.shapes[0].emission.visible == masks
+        assert isinstance(radiance, Product) == masks
+        shared = not masks or radiance.second is made.shapes[0].material.opacity
+        assert shared or radiance.second.value == made.shapes[0].material.opacity
+        assert not made.warnings
+
+
 def test_alpha(one, scene):
     assert one('Shape "sphere" "float alpha" 0.25').material.opacity == 0.25
     assert isinstance(one('Attribute "shape" "float alpha" 0 Shape "sphere"').material, Mask)
@@ -234,7 +253,7 @@ def test_materials_may_be_named_before_they_are_made(scene):
     ("text", "message"),
     [
         ('Shape "spheer"', "unknown shape 'spheer'; did you mean 'sphere'"),
-        ('Shape "cone"', "version 3"),
+        ('Shape "cone"', "not supported; use a mesh"),
         ('Shape "trianglemesh"', "needs the parameter 'point3 P'"),
         (
             'Shape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0] "integer indices" [0 1 9]',

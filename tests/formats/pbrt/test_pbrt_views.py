@@ -237,7 +237,6 @@ def test_samplers_and_integrators(scene):
         ('Camera "perspective" "float fov" 180', "between 0 and 180"),
         ('Camera "perspective" "float shutterclose" 0', "does not open"),
         ('Camera "fisheye"', "unknown camera"),
-        ('Film "image"', "version 3"),
         ('Film "rgb" "integer xresolution" 0', "must be a whole number from 1 to 65536"),
         ('PixelFilter "boks"', "did you mean 'box'"),
         ('Sampler "random"', "unknown sampler"),

@@ -9,7 +9,6 @@ import pytest
 
 import clpt
 from clpt import transforms as tf
-from clpt.render.film.filters import FUNCTIONS
 from clpt.scene import Film, Scene, cameras
 from clpt.scene.integrators import (
     BlackmanHarris,
@@ -118,7 +117,7 @@ def test_an_edge(pixel_filter: Filter) -> None:
     )
     profile = clpt.render(scene, 1024)[:, :, 0].astype(np.float64).mean(axis=0)
     x = np.linspace(-8.0, 8.0, 160_001)
-    values = FUNCTIONS[type(pixel_filter)](pixel_filter, np.abs(x))
+    values = pixel_filter.profile(np.abs(x))
     reach = {"box": 0.5, "tent": 1.0, "gaussian": 2.0, "mitchell": 2.0, "blackman_harris": 1.5}
     values = np.where(np.abs(x) <= reach[pixel_filter.kind], values, 0.0)
     integral = np.cumsum(values) / values.sum()

@@ -193,7 +193,7 @@ def test_the_told_error_is_that_beside_a_reference(sampler):
 
 def test_the_picture_of_a_film_is_denoised_alike(statistical):
     """A film in a file has its halves, and no device of its own."""
-    made = statistical._saved_film()
+    made = statistical.saved_film()
     for one, other in zip(made.halves(), statistical.halves(), strict=True):
         np.testing.assert_array_equal(one, other)
     denoised = clpt.DenoisedPicture(made, "statistical").image()

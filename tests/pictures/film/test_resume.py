@@ -51,7 +51,7 @@ def test_another_scene_is_refused_by_what_differs(tmp_path: Path, changes, told)
         with pytest.raises(SceneError, match=rf"a\.film: the film is of something else: {told}"):
             renderer.load_state(path)
         with pytest.raises(SceneError, match=told):
-            film_file.read(path).merged(renderer._saved_film())
+            film_file.read(path).merged(renderer.saved_film())
         assert renderer.samples == 1
         np.testing.assert_array_equal(renderer.image(), before)
 
@@ -80,13 +80,31 @@ def test_other_settings_and_kernels_are_refused(tmp_path: Path):
     path = tmp_path / "a.film"
     with clpt.Renderer(sky(sampler=Zsobol(), spp=16)) as renderer:
         renderer.run(2)
-        saved = renderer._saved_film()
+        saved = renderer.saved_film()
     film_file.write(path, saved)
     check_refused(path, r"halves: False -> True", spp=12, halves=True)
     check_refused(path, r"sampler\.points: 16 -> 32", spp=17)
     origin = dataclasses.replace(saved.origin, kernels="0", clpt="0.0.1")
     film_file.write(path, dataclasses.replace(saved, origin=origin))
     check_refused(path, r"kernels: of clpt 0\.0\.1 -> others", spp=16)
+
+
+@pytest.mark.parametrize(
+    "taken", [((-5, -2),), ((0, 2**31),), ((4, 2),), ((2, 2),), ((0, 2), (1, 3)), ((4, 6), (0, 2))]
+)
+def test_ranges_that_no_render_takes_are_refused(taken, tmp_path: Path):
+    path = tmp_path / "a.film"
+    with clpt.Renderer(sky()) as renderer:
+        renderer.run(2)
+        saved = renderer._saved_film()
+        film_file.write(path, saved)
+        assert film_file.read(path).film.taken == ((0, 2),)
+        film = dataclasses.replace(saved.film, taken=taken)
+        film_file.write(path, dataclasses.replace(saved, film=film))
+        with pytest.raises(SceneError, match="ranges of samples must ascend"):
+            renderer.load_state(path)
+        with pytest.raises(SceneError, match="ranges of samples must ascend"):
+            film_file.read_header(path)
 
 
 def check_refused(path: Path, told: str, spp: int, **options: bool) -> None:
@@ -98,14 +116,14 @@ def check_refused(path: Path, told: str, spp: int, **options: bool) -> None:
 def test_another_class_of_device_is_told(tmp_path: Path, caplog):
     with clpt.Renderer(sky()) as renderer:
         renderer.run(2)
-        saved = renderer._saved_film()
+        saved = renderer.saved_film()
         (session,) = saved.sessions
         other = dataclasses.replace(session, device={**session.device, "lanes": 4, "device": "X"})
         with caplog.at_level(logging.WARNING, "clpt"):
             renderer._restore(dataclasses.replace(saved, sessions=(other, session)))
         assert "device: X -> " in renderer.warnings[-1] and "lanes: 4 -> " in caplog.text
         renderer.run(1)
-        sessions = renderer._saved_film().sessions
+        sessions = renderer.saved_film().sessions
         assert len(sessions) == 3 and sessions[0].device["device"] == "X"
 
 
@@ -117,12 +135,12 @@ def test_what_cannot_be_written_is_told(tmp_path: Path):
 def test_what_begins_anew_has_no_history():
     with clpt.Renderer(sky()) as renderer:
         with pytest.raises(SceneError, match="no film is held"):
-            renderer._saved_film(held=True)
+            renderer.saved_film(held=True)
         renderer.run(2)
-        renderer._restore(renderer._saved_film())
-        assert len(renderer._saved_film().sessions) == 2
+        renderer._restore(renderer.saved_film())
+        assert len(renderer.saved_film().sessions) == 2
         renderer.reset(seed=3, first_sample=7)
-        saved = renderer._saved_film()
+        saved = renderer.saved_film()
         assert renderer.samples == 7 and not saved.film.words.any()
         assert len(saved.sessions) == 1 and saved.seconds == 0.0 and not saved.film.taken
         assert saved.origin.scene.values["seed"] == 3

@@ -10,7 +10,6 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.render.film import filters
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import Film, Scene, lights
 from clpt.scene import integrators as it
@@ -31,7 +30,7 @@ def sky(radiance: float, **film: object) -> Scene:
 def test_how_far_a_filter_reaches(radius):
     """No pixel outside of the taps holds a point, and all of them are within reach."""
     chosen = it.Box(radius=radius)
-    reach, taps = filters.reach(chosen), filters.taps(chosen)
+    reach, taps = chosen.reach, chosen.taps
     assert taps <= 2 * reach + 1
     offset = np.linspace(-0.5, 0.5, 1001)[1:-1]
     pixels = np.arange(-8, 9)

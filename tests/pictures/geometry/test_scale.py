@@ -302,8 +302,8 @@ def test_light_of_one_kind_of_any_strength(name: str) -> None:
 def test_light_in_a_scene_of_any_size(integrator: Integrator) -> None:
     """The same samples in scenes from a micrometre to a hundred million kilometres.
 
-    Squares of areas leave float32 from sides of 4e9 m on, and rivals of light paths grow with the
-    square of the size. Sizes are powers of two, so that samples go the same ways.
+    Squares of areas leave float32 from sides of 4e9 m on, and MIS ratios of light paths grow with
+    the square of the size. Sizes are powers of two, so that samples go the same ways.
     """
     ordinary = blocks(clpt.render(lit_hall(1.0, LAMPS, 1.0, integrator=integrator), 16))
     for exponent in (-20, -13, 13, 24, 27, 33, 36):

@@ -11,7 +11,7 @@ import clpt
 from clpt import transforms as tf
 from clpt.device import choose
 from clpt.render.flow import scene_to_tables as lowering
-from clpt.render.materials import gloss
+from clpt.render.materials import encode
 from clpt.scene import Film, Scene, materials
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Path
@@ -88,7 +88,8 @@ def test_gloss_only_changes_how_lights_are_chosen(mode, light_paths, monkeypatch
     scene = polished(mode, light_paths)
     assert lowering.lower(scene).features.lights.gloss > 0
     ours = blocks(exposures(scene, 24, 24))
-    monkeypatch.setattr(gloss, "word", lambda material: 0)
+    for module in (lowering, encode):
+        monkeypatch.setattr(module, "gloss_word", lambda material: 0)
     assert lowering.lower(scene).features.lights.gloss == 0
     theirs = blocks(exposures(scene, 24, 24))
     assert_agree(ours, theirs, "by gloss against by cosine")

@@ -9,7 +9,7 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.render.textures.noise import PERMUTATION
+from clpt.render.textures.encode import PERMUTATION
 from clpt.scene import media
 from clpt.transforms import rotate, scale, translate
 from tests.pictures.media.test_grids import scene_of

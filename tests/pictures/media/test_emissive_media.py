@@ -15,8 +15,7 @@ import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.geometry.triangles import triangulate
-from clpt.render.lights import glow
-from clpt.render.lights.bricks import Glow
+from clpt.render.lights.bricks import BrickLights
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic, Perspective
 from clpt.scene.integrators import Box, Direct, Whitted
@@ -274,7 +273,7 @@ def test_bodies_as_lights(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene.integrator = PathIntegrator(max_depth=3, light_paths=0)
     scene.lights = []
     pictures = [exposures(scene, 12, 128).mean(axis=(1, 2), keepdims=True)]
-    monkeypatch.setattr(glow, "_body", lambda *_: None)
+    monkeypatch.setattr(bodies, "_body", lambda *_: None)
     pictures.append(exposures(scene, 12, 512).mean(axis=(1, 2), keepdims=True))
     assert_agree(*pictures, "bodies as lights and bodies that are met", 2e-4)
 
@@ -296,15 +295,15 @@ def test_bricks_as_lights(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene.integrator = PathIntegrator(max_depth=3, light_paths=0)
     scene.lights = []
     pictures = [exposures(scene, 12, 128).mean(axis=(1, 2), keepdims=True)]
-    monkeypatch.setattr(Glow, "brightest", nothing)
+    monkeypatch.setattr(BrickLights, "brightest", nothing)
     pictures.append(exposures(scene, 12, 256).mean(axis=(1, 2), keepdims=True))
     assert_agree(*pictures, "a flame as lights and a flame that is met", 2e-4)
 
 
-def nothing(glow: Glow) -> Glow:
+def nothing(glow: BrickLights) -> BrickLights:
     """No brick of those that emit."""
     none = (values[:0] for values in (glow.numbers, glow.power, glow.corners, glow.edges))
-    return Glow(*none, glow.emitting)
+    return BrickLights(*none, glow.emitting)
 
 
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])

@@ -18,13 +18,12 @@ from clpt import spectra
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.formats.volumes import vol
-from clpt.render.media import device_grids
-from clpt.render.media import encode_grids as grids
+from clpt.render.media import grids
 from clpt.scene import Film, Scene, media
-from clpt.scene.cameras import Orthographic
-from clpt.scene.integrators import Box
+from clpt.scene.cameras import Orthographic, Perspective
+from clpt.scene.integrators import Box, ParticleTracer
 from clpt.scene.integrators import Path as PathIntegrator
-from clpt.scene.lights import Constant, Directional, Envmap, Light
+from clpt.scene.lights import Constant, Directional, Envmap, Light, Point
 from clpt.scene.materials import Diffuse, Null
 from clpt.scene.shapes import Cube, Rectangle
 from clpt.spectra import uplift
@@ -211,7 +210,7 @@ def assert_same_bricks(renderer: clpt.Renderer, values: np.ndarray) -> None:
     assert np.array_equal(there[:, 1], here[:, 1])
     for (begin, _), (own, most) in zip(there, here, strict=True):
         begin += grid.first
-        points = found[begin : begin + device_grids.POINT_WORDS]
+        points = found[begin : begin + grids.POINT_WORDS]
         assert np.array_equal(points, host[own : own + len(points)] if most else 0 * points)
 
 
@@ -332,6 +331,22 @@ def test_null_collisions_have_an_end(sigma_t: float, seen: str) -> None:
         renderer.run(1)
         assert renderer.counts.rejected == renderer.counts.samples == 4
         assert not renderer.image().any()
+
+
+def test_light_paths_count_where_null_collisions_end_them() -> None:
+    """And nothing counts where none of them is ended."""
+    lamp = Point(position=(0.0, 0.0, -4.0))
+    for sigma_t, ends in ((1e9, True), (3e4, False)):
+        scene = dataclasses.replace(
+            scene_of(holed(sigma_t)),
+            lights=[lamp],
+            camera=Perspective(to_world=tf.look_at([0, 0, 8], [0, 0, 0], [0, 1, 0])),
+            integrator=ParticleTracer(),
+        )
+        with clpt.Renderer(with_film(scene, width=8, height=8)) as renderer:
+            renderer.run(8)
+            assert 0 <= renderer.counts.rejected <= renderer.counts.samples
+            assert (renderer.counts.rejected > 0) == ends
 
 
 def test_a_dense_grid_with_holes_is_right_below_the_bound() -> None:

@@ -16,7 +16,7 @@ import pytest
 import clpt
 from clpt.errors import SceneError
 from clpt.render.materials.encoder import Encoder
-from clpt.render.media import encode_grids as grids
+from clpt.render.media import grids
 from clpt.scene import integrators, media, phases
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Constant, Spot

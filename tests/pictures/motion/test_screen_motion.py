@@ -10,7 +10,7 @@ import pytest
 import clpt
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.render.film.layer_preview import viewable
+from clpt.render.film.layers import viewable
 from clpt.scene import Film, Scene, lights, materials, shapes
 from clpt.scene.cameras import Lens, Orthographic, Perspective
 from clpt.scene.integrators import Box, Path

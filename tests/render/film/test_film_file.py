@@ -17,7 +17,7 @@ import pytest
 import clpt
 from clpt.errors import SceneError
 from clpt.render.film import film_file
-from clpt.render.film.picture_form import PictureForm
+from clpt.render.film.pictures import PictureForm
 from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.film.state import FilmState
 from clpt.scene.fingerprint import Fingerprint
@@ -146,7 +146,7 @@ def test_foreign_files(tmp_path: Path):
         film_file.read_header(path)
     with pytest.raises(SceneError, match="cannot be read: No such file"):
         film_file.read(tmp_path / "b.film")
-    with pytest.raises(SceneError, match="cannot be read"):
+    with pytest.raises(SceneError, match="is a folder, not a file"):
         film_file.read(tmp_path)
 
 

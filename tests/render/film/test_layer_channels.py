@@ -16,8 +16,7 @@ from clpt.render.film.colour import sensor
 from clpt.render.film.cryptomatte import RANKS
 from clpt.render.film.layer_channels import SETS, channels_of
 from clpt.render.film.layers import white_paper
-from clpt.render.film.picture_form import PictureForm
-from clpt.render.film.pictures import Still
+from clpt.render.film.pictures import PictureForm, Still
 from clpt.render.records.layer_names import LayerNames
 from clpt.scene import Film
 from clpt.scene.layers import LAYERS
@@ -43,7 +42,7 @@ class Source(Still):
     def __init__(self, bands: int = 0):
         names = LayerNames(objects=("a ball", "a ball", "floor"), materials=("ink",))
         output = tuple(tuple(row) for row in np.eye(3).tolist())
-        self._form = PictureForm(output, bands=bands, layers=tuple(LAYERS), names=names)
+        self.form = PictureForm(output, bands=bands, layers=tuple(LAYERS), names=names)
 
     def image(self):
         return np.full((*SIZE, 3), 0.5, np.float32)
@@ -54,7 +53,7 @@ class Source(Still):
         return pictures()
 
     def spectral_image(self):
-        lambdas = self._form.band_centres
+        lambdas = self.form.band_centres
         return clpt.SpectralImage(np.ones((*SIZE, len(lambdas)), np.float32), lambdas, True)
 
 

@@ -118,7 +118,9 @@ def test_only_materials_of_lights_look_for_light() -> None:
     texts = programs.sources(features, "wide8", 8, queued=False)
     for kind in features.materials.kinds:
         kept = texts[f"shade_{kind}"].text
-        assert ("light_shows(scene, s.light" in kept) == (kind in features.materials.shining), kind
+        assert ("light_shows(scene, v.s.light" in kept) == (kind in features.materials.shining), (
+            kind
+        )
 
 
 @pytest.mark.parametrize("mode", ["rgb", "spectral"])

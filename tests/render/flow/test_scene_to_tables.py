@@ -13,7 +13,7 @@ from clpt.records import SETTINGS, SHAPE, SHAPE_BITS, TABLES
 from clpt.render.flow.scene_to_tables import TREE_FROM, lower
 from clpt.render.flow.settings import DEEPEST
 from clpt.render.geometry import find as geometry
-from clpt.render.materials import gloss
+from clpt.render.materials.encode import gloss_word
 from clpt.render.records.parameter_words import MIXTURE, NORMAL_MAP_WORDS
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
@@ -185,7 +185,7 @@ def test_gloss_stands_before_rows_where_a_tree_asks_for_it() -> None:
         assert made.features.lights.tree and made.features.lights.gloss == words
         for material, row in zip(shapes, rows(made)["front"] & 0xFFFFFF, strict=True):
             leaf = rough if material is wavy else material
-            assert not words or made.tables["materials"][row - words] == gloss.word(leaf)
+            assert not words or made.tables["materials"][row - words] == gloss_word(leaf)
     few = lower(scene(Sphere(material=rough), lights=lamps[:2]))
     assert not few.features.lights.tree and few.features.lights.gloss == 0
 
@@ -201,9 +201,9 @@ def test_gloss_is_that_of_the_material() -> None:
         m.Phong(exponent=49.5, specular=0.3, diffuse=0.1): (0.1, 0.75),
     }
     for material, (alpha, share) in found.items():
-        word = gloss.word(material)
+        word = gloss_word(material)
         assert (word >> 16) / 65535 == pytest.approx(alpha, abs=2e-5), material
         assert (word & 0xFFFF) / 65535 == pytest.approx(share, abs=2e-5), material
     glass = m.RoughDielectric(alpha=0.1), m.Principled(spec_trans=0.5)
     for material in (m.Diffuse(), m.Plastic(), m.Conductor(), *glass):
-        assert gloss.word(material) == 0
+        assert gloss_word(material) == 0

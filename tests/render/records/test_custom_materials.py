@@ -135,7 +135,7 @@ def test_a_row_of_the_whole_text_is_found_in_the_users_file() -> None:
     broken = dataclasses.replace(scene(m.Diffuse), shapes=[shapes.Cube(material=Flawed())])
     made = programs.sources(lower(broken).features, "wide8", 8, queued=False)["shade_flawed"]
     rows = made.text.splitlines()
-    file, line = made.place(1 + next(i for i, row in enumerate(rows) if "nonsense" in row))
+    file, line = made.location(1 + next(i for i, row in enumerate(rows) if "nonsense" in row))
     assert file is not None and line is not None and Path(file) == Path(__file__)
     assert "nonsense" in Path(file).read_text(encoding="utf-8").splitlines()[line - 1]
 

@@ -47,7 +47,7 @@ def test_the_error_is_told(method):
         for _ in range(2)
     ]
     made = SimpleNamespace(halves=lambda: tuple(halves), layers=dict)
-    made._developed = lambda: made
+    made.developed = lambda: made
     cells = np.ones(2 * (size // 16) ** 2, bool)
     told = float(np.sqrt(DenoisedNoise(lambda: made, choose(), method).measure(cells).mean()))
     picture = SimpleNamespace(
@@ -56,7 +56,7 @@ def test_the_error_is_told(method):
         samples_per_pixel=lambda: np.full((size, size), 2.0),
         _form=SimpleNamespace(bands=0, alpha=False),
     )  # fmt: skip
-    picture._developed = lambda: picture
+    picture.developed = lambda: picture
     weights = np.array([0.2126, 0.7152, 0.0722])
     wrong = (clpt.DenoisedPicture(picture).colours() - truth) @ weights / (truth @ weights)
     left = float(np.sqrt(np.mean(wrong**2)))
@@ -78,7 +78,7 @@ def test_a_limit_is_for_what_is_left():
         assert film[..., 3].min() >= 16 and film[..., 3].mean() < before.mean() / 2
         renderer.reset().wait()
         renderer.run(20, noise=LIMIT)
-        saved = renderer._saved_film()
+        saved = renderer.saved_film()
         renderer.reset().wait()
         renderer._restore(saved)
         renderer.run(MOST - 20, noise=LIMIT)

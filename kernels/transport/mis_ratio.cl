@@ -1,0 +1,237 @@
+/* MIS weights of paths from the camera and paths from lights.
+ *
+ * A path x_1 .. x_k, seen by the camera at x_1, with the light at x_k, has three techniques: the camera's path meets
+ * the light (s = 0), next-event estimation chooses the light from x_{k-1} (s = 1), or a light path is connected to the
+ * camera at x_1 (t = 1). The power heuristic with exponent 2 weighs them (Veach 1997, 9.2.4 and 10.2). Each side
+ * carries a recursive MIS quantity from vertex to vertex, as dVCM and dVC of Georgiev 2012, "Implementing Vertex
+ * Connection and Merging": the `mis_ratio` of its path is the density of the other side's technique over the path's
+ * own density. Squared distances cancel. Densities of directions p [1/sr], reverse densities, and cosines to the
+ * geometric normals remain.
+ *
+ * The mis_ratio of a camera's path begins with the number l of light paths a sample. c is the cosine of the incident
+ * ray, c' of the next ray, and p_back the density of the incident direction for a light path that comes back:
+ *
+ *     mis_ratio' = mis_ratio / (importance c) c' / p at x_1,    mis_ratio / c p_back c' / p at later vertices;
+ *
+ * importance: film/connect.cl. At x_1 a delta lobe leaves 0, as no light path can be connected there; at later vertices
+ * p_back / p counts as 1. Times the density of emission (light_path_pdf) this is the third density over the first.
+ *
+ * The mis_ratio of a light path begins with 1 / l, over the gain of aiming (lights/aiming.cl). At its first vertex, q
+ * is the density of next-event estimation, and
+ *
+ *     mis_ratio' = mis_ratio / (emission c) sqrt(q^2 + p_back^2) c' / p,    then mis_ratio / c p_back c' / p;
+ *
+ * p_back is 0 there if no ray can meet the light, q is 0 behind a delta lobe. At the connection to the camera c' / p
+ * becomes importance c', with the cosine c' to the camera.
+ *
+ * Direct light at x_1 is left to next-event estimation of the camera's path: a light path is connected from its second
+ * vertex on, and for k = 2 the third density is 0. (Splats of light that next-event estimation finds without noise
+ * would add noise only, see bench/notes/light_paths.md.) If x_1 is a collision, which the camera's path reaches by
+ * chance, and no ray can meet the light, a light path is connected there too. Null surfaces change nothing.
+ * If a material ends light paths (`ends_light_paths`), the camera's mis_ratio is 0.
+ *
+ * A vertex may be a collision in a medium. Both sides sample a collision with density transmittance times extinction,
+ * and a surface with density transmittance. The transmittance between two vertices is equal both ways, and at a
+ * collision the extinction takes the place of c and c'; both cancel, so that c and c' are 1 (VERTEX_COSINE). If one
+ * side is connected and the other has sampled a distance, weights leave the transmittance out, as weights of next-event
+ * estimation do. They leave out the change by equiangular sampling too: any weights that sum to 1 are valid, and both
+ * sides know these.
+ *
+ * If some light paths aim at specular shapes, Russian roulette ends most others at a diffuse x_{k-1}: the third density
+ * is lower there (transport/diffuse_roulette.cl).
+ *
+ * With photon merging (transport/photons/gather.cl) vertex merging at x_i is a fourth technique. x_i is the first
+ * vertex from the camera that is not specular, if some vertex beyond it is specular: the camera's path and a light path
+ * that end there nearly meet. Light paths that are connected to the camera find such light at x_1 more sharply, and x_i
+ * is not x_1 then. With e = `merging_area`, the density of merging over the product of both paths' densities is e. So a
+ * camera's path carries from x_i on (dVM of Georgiev 2012)
+ *
+ *     merge_ratio' = e c' / p,    then merge_ratio / c p_back c' / p,
+ *
+ * and at a specular vertex the square of merge_ratio is added to the square of mis_ratio. A light path that has met a
+ * specular vertex begins, at each vertex that is not specular, with merge_ratio' = e / l c' / p, and goes on as above
+ * while all later vertices are specular; it counts at a connection to a specular x_1.
+ *
+ * In a medium x_i is a collision, and photons are merged along the ray to it (transport/photons/along.cl): e is the
+ * section of the cylinder around the ray times the number of light paths. The transmittance up to x_i is left out, as
+ * above.
+ *
+ * Densities over areas (importance, emission, 1 / e) scale with the square of the scene's size. So areas are in units
+ * of `settings->mis_area_unit`, which follows the size of very large and very small scenes and is 1 m^2 in others: the
+ * ratios stay inside a float, and far from the limits below.
+ *
+ * Whether a vertex is specular depends on the densities of both directions alone, and so is equal for both sides: a
+ * delta lobe, or a density above SPECULAR_PDF (transport/photons/weight.cl). */
+
+/* MIS quantities of a path at a vertex. */
+typedef struct {
+    real arrives;     /* mis_ratio / c, with importance and emission */
+    real nee_pdf;     /* q at the first vertex of a light path */
+    mask first;       /* the first vertex of the path */
+    mask met;         /* a ray from the vertex may meet the light */
+    real merge_ratio; /* added to `arrives` at a specular vertex; of a light path, at the connection alone */
+    real merges;      /* density of merging at the vertex over the path's density, 0 without merging */
+} MisRatio;
+
+/* Step. */
+#define MIS_RATIO_MOST 1e18f /* so that its square is finite */
+
+inline real mis_ratio_limited(real mis_ratio) { return min_r(mis_ratio, (real)(MIS_RATIO_MOST)); }
+
+/* Whether light paths end at a vertex: its scattering is not reversible. */
+inline mask ends_light_paths(Scene scene, Vertex v)
+{
+    return BSDF_ENDS_LIGHT_PATHS ? mask_of(1) : shading_frame_turns(scene, v.row);
+}
+
+#include "generated/diffuse_roulette.cl"
+#include "generated/mis_ratio_steps.cl"
+
+/* sampler: of the path's sample. */
+inline MisRatio mis_ratio_of_camera_path(Scene scene, Slab path, uint at, Vertex v, Sampler sampler)
+{
+    MisRatio r;
+    real mis_ratio = load_path_mis_ratio(path, at);
+    r.first = v.depth == 0;
+    r.met = mask_of(1);
+    r.nee_pdf = 0.0f;
+    if (any(r.first)) mis_ratio = sel(r.first, mis_ratio_seen(scene, v, sampler, mis_ratio), mis_ratio);
+    real goes_on = 1.0f / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f));
+    goes_on = sel(ends_light_paths(scene, v), (real)(0.0f), goes_on);
+    r.arrives = mis_ratio * goes_on;
+    r.merge_ratio = load_path_merge_ratio(path, at) * goes_on;
+    r.merges = merge_ratio_here(scene, path, at, v);
+    return r;
+}
+
+/* Whether a ray may meet a row of `lights`. */
+inline mask light_can_be_met(Scene scene, integer row)
+{
+    return (row < scene.settings->infinite_count) | light_shows(scene, row, light_at(scene, row).shape >= 0);
+}
+
+/* Density of a light path from the point of a light sample. It is computed before the material is loaded, as both
+ * together would need too many registers of a GPU. */
+inline real event_begins(Scene scene, Surface s, LightSample ls)
+{
+    return light_path_pdf(scene, ls.row, s.p, ls.wi, ls.t, ls.n);
+}
+
+/* Density of a light path along the sample over the density of next-event estimation. begins: from event_begins; p,
+ * p_back: densities of the material. */
+inline real mis_ratio_of_light_sample(Scene scene, MisRatio r, Surface s, LightSample ls, real begins, real p,
+                                      real p_back)
+{
+    real chosen = sel(ls.pdf < 0.0f, ls.chance, ls.pdf);
+    real emission = begins / max_r(chosen, (real)(1e-30f));
+    real arrives = mis_ratio_arriving(r, mask_of(0), p, p_back) * VERTEX_COSINE(s.n, ls.wi) * emission;
+    real third = after_diffuse_roulette(mis_ratio_limited(arrives * p_back), p);
+    real joined = 0.0f;
+    if (BSDF_IS_PHASE) joined = sel(light_can_be_met(scene, ls.row), (real)(0.0f), mis_ratio_limited(arrives));
+    return sel(r.first, joined, third);
+}
+
+/* The mis_ratio of a camera's path that continues along d, with density p; delta: by a delta lobe. */
+inline real mis_ratio_to_light(MisRatio r, Surface s, vec3 d, mask delta, real p, real p_back)
+{
+    real scatters = sel(r.first, (real)(1.0f), p_back) / max_r(p, (real)(1e-30f));
+    real change = sel(delta, sel(r.first, (real)(0.0f), (real)(1.0f)), scatters);
+    return mis_ratio_limited(mis_ratio_arriving(r, delta, p, p_back) * change * VERTEX_COSINE(s.n, d));
+}
+
+/* receiver: by which next-event estimation would choose a light here. */
+inline MisRatio mis_ratio_of_light_path(Scene scene, Slab path, uint at, Vertex v, Receiver receiver)
+{
+    MisRatio r;
+    r.arrives = load_path_mis_ratio(path, at) / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f));
+    r.first = v.depth == 1;
+    r.met = mask_of(1);
+    r.nee_pdf = 0.0f;
+    if (any(r.first)) {
+        integer row = sel_i(r.first, load_path_light(path, at), (integer)(0));
+        vec3 wi = neg3(v.d), n = load_path_sampled_hemisphere(path, at);
+        real t = v.t + load_path_null_distance(path, at);
+        real emission = common_light_begins_pdf(scene, row, v.s.p, receiver, wi, t, n, &r.nee_pdf);
+        r.arrives = r.arrives / sel(r.first, max_r(emission, (real)(1e-30f)), (real)(1.0f));
+        r.met = !r.first | light_can_be_met(scene, row);
+    }
+    r.merge_ratio = load_path_merge_ratio(path, at) / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f));
+    r.merges = merge_ratio_of_photon(scene, path, at, v);
+    return r;
+}
+
+/* The mis_ratio of a light path that continues along d, with density p. */
+inline real mis_ratio_to_camera(MisRatio r, Surface s, vec3 d, mask delta, real p, real p_back)
+{
+    real back = sel(r.met, p_back, (real)(0.0f));
+    real either = sel(r.first, sqrt(sqr(back) + sqr(r.nee_pdf)), back) / max_r(p, (real)(1e-30f));
+    real change = sel(delta, sel(r.met, (real)(1.0f), (real)(0.0f)), either);
+    return mis_ratio_limited(r.arrives * change * VERTEX_COSINE(s.n, d));
+}
+
+/* The square of the mis_ratio of a light path that is connected to the camera. p, p_back: densities of the material
+ * for a camera's path. */
+inline real mis_square_of_connection(Scene scene, MisRatio r, Surface s, CameraPoint c, real p, real p_back)
+{
+    real importance = c.importance * scene.settings->mis_area_unit, chosen = 1.0f / max_r(importance, (real)(1e-30f));
+    real square = sqr(mis_ratio_to_camera(r, s, c.d, mask_of(0), chosen, p));
+    return square + merge_ratio_square(r, s, c.d, importance, p, p_back);
+}
+
+/* MIS weight of a light sample of next-event estimation; p: its density by the material and a guide. */
+inline real event_weight(Scene scene, MisRatio r, Surface s, LightSample ls, real begins, BsdfPair pair, real p)
+{
+    real third = mis_ratio_of_light_sample(scene, r, s, ls, begins, pair.p, pair.p_back);
+    return mis_weight_of_three(ls.pdf, pair.p, third);
+}
+
+/* Stores the ratios of camera paths that `scatters` along `onward`. Returns the density of that direction. */
+inline real keep_mis_ratio_to_light(Slab path, uint at, mask scatters, MisRatio r, Vertex *v, vec3 onward,
+                                    mask delta, BsdfSample bs)
+{
+    store_path_mis_ratio(path, at, scatters, mis_ratio_to_light(r, v->s, onward, delta, bs.p, bs.p_back));
+    keep_merge_ratio_to_light(path, at, scatters, r, v, onward, delta, bs.p, bs.p_back);
+    return bs.p;
+}
+
+/* Stores the ratios of light paths that continue along `onward`. Returns the mask of those. */
+inline mask keep_mis_ratio_to_camera(Scene scene, Slab path, uint at, mask next, mask null, MisRatio r, Vertex *v,
+                                     vec3 onward, BsdfSample bs)
+{
+    next = next & !ends_light_paths(scene, *v);
+    mask delta = (bs.lobe & LOBE_DELTA) != 0;
+    store_path_mis_ratio(path, at, next & !null, mis_ratio_to_camera(r, v->s, onward, delta, bs.p, bs.p_back));
+    keep_merge_ratio_to_camera(path, at, next & !null, null, r, v, onward, delta, bs.p, bs.p_back);
+    return next;
+}
+
+/* MIS weight of the connection of a light path to the camera; clears `shine` where the camera's path is better. */
+inline real mis_weight_of_connection(Scene scene, MisRatio r, Vertex v, BsdfPair pair, CameraPoint c, mask *shine)
+{
+    mask hidden = mask_of(scene.settings->hide_lights != 0) & (v.s.light >= 0);
+    mask joined = BSDF_IS_PHASE ? !r.first | !r.met : !r.first;
+    *shine = *shine & joined & !hidden & !ends_light_paths(scene, v);
+    return 1.0f / (1.0f + mis_square_of_connection(scene, r, v.s, c, pair.p, pair.p_back));
+}
+
+/* Twin, where paths are not weighed against light paths. */
+inline MisRatio mis_ratio_nothing(void) { MisRatio r = {0.0f, 0.0f, mask_of(0), mask_of(0), 0.0f, 0.0f}; return r; }
+inline MisRatio mis_ratio_of_camera_path(Scene scene, Slab path, uint at, Vertex v, Sampler sampler)
+{
+    return mis_ratio_nothing();
+}
+inline MisRatio mis_ratio_of_light_path(Scene scene, Slab path, uint at, Vertex v, Receiver receiver)
+{
+    return mis_ratio_nothing();
+}
+inline real event_begins(Scene scene, Surface s, LightSample ls) { return (real)(0.0f); }
+inline real event_weight(Scene scene, MisRatio r, Surface s, LightSample ls, real begins, BsdfPair pair,
+                         real p) { return sel(ls.pdf < 0.0f, (real)(1.0f), mis_weight(ls.pdf, p)); }
+inline real keep_mis_ratio_to_light(Slab path, uint at, mask scatters, MisRatio r, Vertex *v, vec3 onward,
+                                    mask delta, BsdfSample bs) { return bs.pdf; }
+inline mask keep_mis_ratio_to_camera(Scene scene, Slab path, uint at, mask next, mask null, MisRatio r, Vertex *v,
+                                     vec3 onward, BsdfSample bs) { return next; }
+inline real mis_weight_of_connection(Scene scene, MisRatio r, Vertex v, BsdfPair pair, CameraPoint c, mask *shine)
+{
+    return (real)(1.0f);
+}
