@@ -55,6 +55,7 @@ inline Lamp lamp(integer row)
 #define merging_pass(scene, sample) (sample)
 #define merging_area(scene, pass) (scene).area
 #define light_at(scene, row) lamp(row)
+#define light_shows(scene, row, front) (front)
 #define light_path_pdf(scene, row, p, wi, t, n) (scene).emission
 #define light_emit_pdf(scene, row, wi, t) (scene).emission
 #define light_found_pdf(scene, row, p, receiver, wi, t, n) (scene).found
