@@ -18,8 +18,11 @@ def from_array(image: object, where: str | None = None) -> Stored:
     """Return an array (h, w), or (h, w, 1, 3 or 4), in host or device memory as an image.
 
     Floats are linear. Bytes (uint8) are as in a .png: colours in sRGB, not multiplied by alpha.
-    Raises SceneError for other numbers, as these do not say what is white, and other shapes.
+    Raises SceneError for other numbers, as these do not say what is white, for other shapes, and
+    for None.
     """
+    if image is None:
+        raise SceneError("an image must be a path or an array, not None", where=where)
     try:
         values = np.asarray(on_host(image))
     except ValueError as error:
