@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import SceneError, one_line
+from ..errors import SceneError
 from ..formats import errors_of, load, locate
 from .options.loading_options import loading_options
 from .options.scene_path import ScenePath
@@ -31,7 +31,7 @@ def all_of(first: SceneError, errors: list[SceneError]) -> SceneError:
     if len(errors) < 2:
         return first
     for error in errors:
-        click.echo(one_line(str(error)), err=True)
+        terminal.say(error)
     return SceneError(f"{len(errors)} things above keep it from being read", file=first.file)
 
 

@@ -410,7 +410,7 @@ def test_changes_of_a_scene():
         (["--integrator", "direct", "--light-paths", "1"], "no light paths"),
         (["--light-paths", "65"], "--light-paths"),
         (["--light-paths", "many"], "--light-paths"),
-        (["--integrator", "vcm", "--light-paths", "auto"], "whole number from 1"),
+        (["--integrator", "vcm", "--light-paths", "auto"], "must be a whole number, not 'auto'"),
         (["--integrator", "path", "--radius", "0.1"], "no photons"),
         (["--integrator", "vcm", "--radius", "-1"], "--radius"),
         (["--device", "no such device"], "is not there"),

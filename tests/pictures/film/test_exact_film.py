@@ -286,7 +286,9 @@ def test_sums_near_their_end_are_counted():
         renderer.update(scene=painted(2.0**45))
         renderer.run(2)
         assert renderer._wavefront.counts.rejected == 12 and not renderer.image().any()
-        assert refusals(renderer)[0].startswith("12 samples were not finite, or too bright")
+        assert refusals(renderer)[0].startswith(
+            "12 samples were not finite, too bright, or in a medium"
+        )
 
 
 def test_the_exposure_moves_the_range():

@@ -96,7 +96,7 @@ def test_ranges_that_no_render_takes_are_refused(taken, tmp_path: Path):
     path = tmp_path / "a.film"
     with clpt.Renderer(sky()) as renderer:
         renderer.run(2)
-        saved = renderer._saved_film()
+        saved = renderer.saved_film()
         film_file.write(path, saved)
         assert film_file.read(path).film.taken == ((0, 2),)
         film = dataclasses.replace(saved.film, taken=taken)

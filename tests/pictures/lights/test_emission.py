@@ -48,12 +48,14 @@ def test_radiance_of_lamps(name: str) -> None:
 
 
 def test_lamps_in_rgb_mode() -> None:
-    """In RGB mode a lamp is its colour, what lies beyond Rec. 709 cut off."""
+    """In RGB mode a lamp has its luminance; its colour is cut to Rec. 709."""
     lamp = LAMPS["sodium"]
     film = Film(width=4, height=4)
     scene = Scene(camera=Orthographic(), lights=[Constant(radiance=lamp)], film=film)
     image = exposures(with_film(scene, mode="rgb"), 2, 1).mean(axis=(0, 1, 2))
-    expected = np.maximum(spectra.XYZ_TO_REC709 @ xyz_of(lamp), 0.0)
+    xyz = xyz_of(lamp)
+    cut = np.maximum(spectra.XYZ_TO_REC709 @ xyz, 0.0)
+    expected = cut * xyz[1] / spectra.rgb_to_xyz(cut)[1]
     np.testing.assert_allclose(image, expected, rtol=2e-3, atol=1e-6)
 
 

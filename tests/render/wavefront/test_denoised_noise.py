@@ -54,7 +54,7 @@ def test_the_error_is_told(method):
         denoise=method, halves=made.halves, layers=dict,
         colours=lambda: sum(halves) / 2, image=lambda: sum(halves) / 2,
         samples_per_pixel=lambda: np.full((size, size), 2.0),
-        _form=SimpleNamespace(bands=0, alpha=False),
+        form=SimpleNamespace(bands=0, alpha=False),
     )  # fmt: skip
     picture.developed = lambda: picture
     weights = np.array([0.2126, 0.7152, 0.0722])
