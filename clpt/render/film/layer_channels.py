@@ -35,8 +35,8 @@ def write_layers(
 
     path: of the file. source: the renderer or film. names: one of SETS; "blender" gives names such
     as ViewLayer.Combined.R. metadata: further attributes of the file. The picture is stored in half
-    floats; bands and layers are stored in float32. The data window of a crop is its part of the whole film. Raises
-    SceneError.
+    floats; bands and layers are stored in float32. The data window of a crop is its part of the
+    whole film. Raises SceneError.
     """
     source = source.developed()
     layers, form = source.layers(), source.form

@@ -53,6 +53,7 @@ def test_the_error_is_told(method):
     picture = SimpleNamespace(
         denoise=method, halves=made.halves, layers=dict,
         colours=lambda: sum(halves) / 2, image=lambda: sum(halves) / 2,
+        picture=lambda: sum(halves) / 2,
         samples_per_pixel=lambda: np.full((size, size), 2.0),
         form=SimpleNamespace(bands=0, alpha=False),
     )  # fmt: skip
