@@ -281,7 +281,8 @@ class Kind(metaclass=KindType):
     _size: ClassVar[tuple[int, int]] = (1, 1)  # of an object: its parts, and how deep they lie
 
     def __init_subclass__(cls) -> None:
-        cls.kind = _snake(cls.__name__)
+        if "kind" not in vars(cls):  # a class may take the kernels of another kind
+            cls.kind = _snake(cls.__name__)
         cls.__repr__ = Kind.__repr__  # type: ignore[method-assign]  # `dataclass` leaves it then
 
     def __post_init__(self) -> None:
