@@ -24,7 +24,7 @@ inline mask light_tree_in_cone(LightNode n, vec3 from)
 }
 
 /* What the lights below a node may send to p, all surfaces there shading them: their power, times the mean of their
- * cosines (light_lobes.py), over the squared distance; and times what p reflects, which of a dull surface is the cosine
+ * cosines (tree_nodes.py), over the squared distance; and times what p reflects, which of a dull surface is the cosine
  * there if light from one hemisphere only matters. No light is lost: 0 means that there is none. lift: 1 where light
  * from both sides matters, else 0. Lights that shine on the whole scene count as much everywhere. */
 inline real light_tree_importance(LightNode n, vec3 p, Receiver receiver, real lift)
