@@ -138,12 +138,12 @@ def _at_the_camera(index: SceneIndex, cache: LoweringCache) -> tuple[tuple[Any, 
 
 def _passed_through(index: SceneIndex, cache: LoweringCache) -> list[str]:
     """A warning where the camera is not in the same media all the time, else none."""
-    bounding = boundaries(index.listed, matter_of if index.nested else None)
+    bounding = boundaries(index.scene.shapes, matter_of if index.nested else None)
     if index.motions.camera is None and stands_still(bounding):
         return []
     found: list[tuple[Any, ...]] = []
     for time in index.motions.looks():
-        origin = camera_origin(index.camera, index.film, time)
+        origin = camera_origin(index.scene.camera, index.scene.film, time)
         found.append(
             bodies_at(bounding, matter_of, origin, time, cache)
             if index.nested

@@ -18,7 +18,7 @@ from clpt.render.geometry.surroundings import every
 from clpt.render.lights.bounds import Bounds, all_around
 from clpt.render.lights.bricks import BrickLights, black_bodies, brick_lights
 from clpt.render.materials.encoder import Encoder
-from clpt.render.records.light_rows import BODY, RECORDS
+from clpt.render.records.lights import BODY, RECORDS
 from clpt.render.scene_index import SceneIndex, leaves_of
 from clpt.render.spectra.look import Look
 from clpt.scene.media import Grid, Lattice, Medium
@@ -122,8 +122,8 @@ def _body(medium: Medium, index: SceneIndex, look: Look) -> BodyLight | None:
     Its boundaries must be closed, at rest and null, and must fill a box well.
     """
     cached = look.cache
-    elsewhere = {index.camera.medium, *(shape.exterior for shape in index.shapes)}
-    around = [shape for shape in every(index.listed) if shape.interior is medium]
+    elsewhere = {index.scene.camera.medium, *(shape.exterior for shape in index.shapes)}
+    around = [shape for shape in every(index.scene.shapes) if shape.interior is medium]
     if medium in elsewhere or not around or not all(_encloses(shape) for shape in around):
         return None
     if hole_around(index, medium, cached) > HOLE:

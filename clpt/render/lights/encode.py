@@ -25,7 +25,7 @@ from clpt.render.lights.encode_lamps import blank_row, lower_lamp
 from clpt.render.lights.find import Source, Sources, is_whole
 from clpt.render.lights.power import brightness
 from clpt.render.materials.encoder import Encoder
-from clpt.render.records.light_rows import ALONG, BOTH, FRONT, KINDS, UNSEEN
+from clpt.render.records.lights import ALONG, BOTH, FRONT, KINDS, UNSEEN
 from clpt.render.records.lowering_cache import content
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
@@ -225,9 +225,9 @@ def light_level(
         away = np.square((bounds.low + bounds.high) / 2.0 - centre).sum(axis=1)
         square = np.where(bounds.placed, np.maximum(away, radius**2), radius**2)
         arrives = float((lights.power / (4.0 * np.pi * square)).sum())
-    look = Look.of(index.film)
+    look = Look.of(index.scene.film)
     media = [medium.light for medium in index.emitting if medium.light is not None]
     glow = [brightness(light, look) * radius for light in media]
-    ambient = index.integrator.ambient
+    ambient = index.scene.integrator.ambient
     around = 0.0 if ambient is None else brightness(ambient, look)
     return max(lights.radiance, arrives, around, *glow)

@@ -18,8 +18,8 @@ from clpt.render.lights.encode import LightRows
 from clpt.render.materials.encode import MaterialWords
 from clpt.render.materials.encoder import Encoder
 from clpt.render.media import grids
-from clpt.render.records.media import MOST_AIMS
-from clpt.render.records.parameter_words import SPECTRUM_WORDS
+from clpt.render.records import MOST_AIMS
+from clpt.render.records.materials import SPECTRUM_WORDS
 from clpt.render.records.tables import as_words
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import materials as mt
@@ -85,7 +85,7 @@ class MediumWords:
         self._sealed, self._glows = sealed, glows
         self._words: dict[Medium, int] = {}
         self.lights: list[tuple[int, BrickLights | BodyLight]] = []  # by their medium's word
-        self._light_row = len(index.lights)  # in `lights`, of the next brick or body
+        self._light_row = len(index.scene.lights)  # in `lights`, of the next brick or body
         self._has_media = bool(index.media)  # False for an integrator that sees none
 
     def word(self, medium: Medium | None) -> int:
