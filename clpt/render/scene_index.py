@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,10 +10,12 @@ from clpt.geometry import instancing, shapes
 from clpt.geometry.instancing import Placed, Prototype
 from clpt.geometry.motion import Motions
 from clpt.render.records import GridFeatures, custom_materials
-from clpt.scene import Scene
+from clpt.scene import Film, Scene
 from clpt.scene import materials as mt
-from clpt.scene.integrators import Auto, Direct, Integrator, ParticleTracer, Path, Vcm
+from clpt.scene.cameras import Camera
+from clpt.scene.integrators import Auto, Direct, Integrator, ParticleTracer, Path, Sampler, Vcm
 from clpt.scene.layers import LAYERS
+from clpt.scene.lights import Light
 from clpt.scene.media import Grid, Medium
 from clpt.scene.phases import LEAVES
 from clpt.scene.scatterer import Scatterer
@@ -26,18 +28,27 @@ UNKNOWN = "its medium was not looked for"
 
 @dataclass(frozen=True)
 class SceneIndex:
-    """A scene with facts about it.
+    """The parts of a scene with facts about them.
 
-    shapes: every shape once; shapes of groups have the coordinates of their group. placed: shapes
-    that are lowered as they are. prototypes: shapes that instances share. leaves: classes of leaf
-    materials, in the order of material words. normal_mapped: whether a material has a normal or a
-    bump map. warnings: of instances that became triangles. motions: of shapes, lights and the
-    camera. lit_media: why no path can start at some light in a medium; "" if paths can.
+    integrator: of the scene, or the choice for "auto". lights: lights without a shape. listed:
+    shapes as the scene lists them, with instances. shapes: every shape once; shapes of groups have
+    the coordinates of their group. placed: shapes that are lowered as they are. prototypes: shapes
+    that instances share. leaves: classes of leaf materials, in the order of material words.
+    normal_mapped: whether a material has a normal or a bump map. warnings: of instances that became
+    triangles. motions: of shapes, lights and the camera. lit_media: why no path can start at some light in a medium; "" if paths can.
     lit_before: whether light paths were ghosts of a lens before an edit; None without an edit.
     candidates: integrators for a trial, the chosen integrator first; empty without a trial.
     """
 
-    scene: Scene
+    camera: Camera
+    film: Film
+    integrator: Integrator
+    sampler: Sampler
+    spp: int
+    noise: float | None
+    seed: int
+    lights: Sequence[Light]
+    listed: Sequence[Shape]
     shapes: tuple[Shape, ...]
     placed: tuple[Placed, ...]
     prototypes: tuple[Prototype, ...]
@@ -60,7 +71,15 @@ class SceneIndex:
         placed, prototypes = instancing.sort(scene.shapes, warnings, motions.moving)
         distinct = tuple(instancing.distinct(scene.shapes))
         return cls(
-            scene=scene,
+            camera=scene.camera,
+            film=scene.film,
+            integrator=scene.integrator,
+            sampler=scene.sampler,
+            spp=scene.spp,
+            noise=scene.noise,
+            seed=scene.seed,
+            lights=scene.lights,
+            listed=scene.shapes,
             shapes=distinct,
             placed=tuple(placed),
             prototypes=tuple(prototypes),
@@ -80,7 +99,7 @@ class SceneIndex:
     @property
     def media(self) -> tuple[Medium, ...]:
         """The media of a scene."""
-        return tuple(_media(self.scene, self.shapes))
+        return tuple(_media(self.camera, self.shapes))
 
     @property
     def emitting(self) -> tuple[Medium, ...]:
@@ -90,7 +109,7 @@ class SceneIndex:
     @property
     def free_panes(self) -> bool:
         """Whether the scene has thin glass that paths cross without a step."""
-        return self.scene.integrator.free_panes and any(cls.is_pane for cls in self.leaves)
+        return self.integrator.free_panes and any(cls.is_pane for cls in self.leaves)
 
     @property
     def grids(self) -> GridFeatures:
@@ -125,7 +144,7 @@ class SceneIndex:
     @property
     def light_paths(self) -> bool:
         """Whether paths start at lights."""
-        return isinstance(self.scene.integrator, ParticleTracer)
+        return isinstance(self.integrator, ParticleTracer)
 
     @property
     def weighed(self) -> float:
@@ -138,13 +157,13 @@ class SceneIndex:
     @property
     def balanced(self) -> float:
         """The number of light paths for each camera sample that share weights (MIS) with it."""
-        wanted: Any = self.scene.integrator.light_paths
+        wanted: Any = self.integrator.light_paths
         return wanted if (self.joined or self.merged) and self.lights_reach else 0
 
     @property
     def lit_ghosts(self) -> bool:
         """Whether light paths are ghosts of the lens: light that comes directly from lights."""
-        camera, integrator, before = self.scene.camera, self.scene.integrator, self.lit_before
+        camera, integrator, before = self.camera, self.integrator, self.lit_before
         wanted = camera.has_ghosts
         ghosts = camera.traced_lens is not None and (wanted if before is None else before)
         alone = isinstance(integrator, (Path, Direct)) and not integrator.guiding
@@ -153,7 +172,7 @@ class SceneIndex:
     @property
     def samples(self) -> int:
         """The number of samples of the whole film."""
-        return self.scene.spp * self.scene.film.width * self.scene.film.height
+        return self.spp * self.film.width * self.film.height
 
     @property
     def lights_reach(self) -> bool:
@@ -163,22 +182,22 @@ class SceneIndex:
     @property
     def may_have_light_paths(self) -> bool:
         """Whether the integrator starts paths at lights where `lights_reach`."""
-        integrator = self.scene.integrator
+        integrator = self.integrator
         wanted = bool(integrator.light_paths) or integrator.guiding
         return isinstance(integrator, Auto | ParticleTracer) or wanted
 
     @property
     def joined(self) -> bool:
         """Whether light paths are connected to the camera."""
-        if not isinstance(self.scene.integrator, Vcm):
-            return self.scene.camera.is_connected(self.mode)
-        wanted = self.scene.integrator.light_tracing
-        return wanted and self.scene.camera.is_connected(self.mode)
+        if not isinstance(self.integrator, Vcm):
+            return self.camera.is_connected(self.mode)
+        wanted = self.integrator.light_tracing
+        return wanted and self.camera.is_connected(self.mode)
 
     @property
     def merged(self) -> bool:
         """Whether light paths store photons, which camera paths gather."""
-        integrator = self.scene.integrator
+        integrator = self.integrator
         if not isinstance(integrator, Vcm) or self.shifts or not self.lights_reach:
             return False
         return integrator.merging and integrator.max_depth not in (1, 2)
@@ -186,7 +205,7 @@ class SceneIndex:
     @property
     def guided(self) -> bool:
         """Whether a guide for camera paths is trained by light paths."""
-        return self.scene.integrator.guiding and not self.weighed and self.lights_reach
+        return self.integrator.guiding and not self.weighed and self.lights_reach
 
     @property
     def shifts(self) -> bool:
@@ -196,7 +215,7 @@ class SceneIndex:
     @property
     def layers(self) -> tuple[str, ...]:
         """The layers of the film, in the order of LAYERS."""
-        return tuple(name for name in LAYERS if name in self.scene.film.layers)
+        return tuple(name for name in LAYERS if name in self.film.layers)
 
     @property
     def light_layers(self) -> bool:
@@ -206,8 +225,8 @@ class SceneIndex:
     @property
     def splatting(self) -> bool:
         """Whether a sample adds to all pixels within the filter's reach, not only to its pixel."""
-        film = self.scene.film
-        wanted = film.filtering != "importance" and self.scene.noise is None
+        film = self.film
+        wanted = film.filtering != "importance" and self.noise is None
         wanted = wanted and not self.light_layers
         reaches = film.filter.reach > 0 and wanted
         return reaches or self.light_paths
@@ -215,7 +234,7 @@ class SceneIndex:
     @property
     def spread(self) -> tuple[int, int]:
         """The filter along an axis [pixels]: number of pixels that a sample adds to, and reach."""
-        return self.scene.film.filter.taps, self.scene.film.filter.reach
+        return self.film.filter.taps, self.film.filter.reach
 
     @property
     def filter_taps(self) -> int:
@@ -233,12 +252,12 @@ class SceneIndex:
     @property
     def adaptive(self) -> bool:
         """Whether noisy pixels get more samples."""
-        return self.scene.noise is not None
+        return self.noise is not None
 
     @property
     def mode(self) -> str:
         """The mode of the kernels."""
-        return self.scene.film.mode
+        return self.film.mode
 
     @property
     def spectral(self) -> bool:
@@ -268,15 +287,15 @@ def _leaf_kinds(shapes_: tuple[Shape, ...]) -> tuple[type[mt.Material], ...]:
     return custom_materials.ordered(kinds) or (mt.Diffuse,)
 
 
-def _media(scene: Scene, shapes_: tuple[Shape, ...]) -> list[Medium]:
+def _media(camera: Camera, shapes_: tuple[Shape, ...]) -> list[Medium]:
     """The media of a scene, each once."""
     media = [m for shape in shapes_ for m in (shape.interior, shape.exterior)]
-    return list(dict.fromkeys(m for m in (scene.camera.medium, *media) if m is not None))
+    return list(dict.fromkeys(m for m in (camera.medium, *media) if m is not None))
 
 
 def _phase_kinds(scene: Scene, shapes_: tuple[Shape, ...]) -> tuple[type[Scatterer], ...]:
     """The kinds of phase functions of a scene, in the order of their table."""
-    scattering = (medium for medium in _media(scene, shapes_) if medium.scatters)
+    scattering = (medium for medium in _media(scene.camera, shapes_) if medium.scatters)
     spectral = scene.film.mode == "spectral"
     phases = (phase for medium in scattering for phase in medium.collisions(spectral))
     kinds = {type(leaf) for phase in phases for leaf in phase.leaves}

@@ -32,7 +32,7 @@ INTEGRATORS = {"direct": "path", "vcm": "path"}  # kinds that have the kernels o
 
 def of_camera(index: SceneIndex) -> CameraFeatures:
     """Return the features of a scene's camera."""
-    camera = index.scene.camera
+    camera = index.camera
     return CameraFeatures(
         kind=camera.kind,
         disperses=index.spectral and bool(camera.dispersive_glasses),
@@ -43,12 +43,12 @@ def of_camera(index: SceneIndex) -> CameraFeatures:
 
 def of_film(index: SceneIndex, layers: LayerFeatures) -> FilmFeatures:
     """Return the features of the camera's film, which has these layers."""
-    film = index.scene.film
+    film = index.film
     return FilmFeatures(
         filter=FilterFeatures(film.filter.kind, index.filter_taps, index.filter_reach),
         layers=layers,
         bands=bool(film.bands),
-        alpha=index.scene.film.alpha,
+        alpha=index.film.alpha,
     )
 
 
@@ -58,10 +58,10 @@ def of_transport(index: SceneIndex, profile: int, *, aimed: bool) -> TransportFe
     profile: where in `distributions` the values of the pixel filter begin; aimed: whether light
     paths aim at something.
     """
-    integrator, weighed = index.scene.integrator.kind, index.weighed > 0
+    integrator, weighed = index.integrator.kind, index.weighed > 0
     return TransportFeatures(
         integrator=INTEGRATORS.get(integrator, integrator),
-        sampler=index.scene.sampler.kind,
+        sampler=index.sampler.kind,
         light_paths=index.light_paths,
         weighed=weighed,
         joined=index.joined and (index.light_paths or weighed),

@@ -42,7 +42,7 @@ def lower_names(
 
     Raises SceneError for more shapes than a matte can tell apart.
     """
-    layers, things = index.layers, index.scene.shapes
+    layers, things = index.layers, index.listed
     names: dict[str, tuple[str, ...]] = {}
     features = LayerFeatures(layers, present=bool(layers))
     if "crypto_object" in layers:
@@ -102,7 +102,7 @@ def _materials(shapes: Iterable[Shape]) -> tuple[dict[int, int], list[mt.Materia
 
 def _groups(index: SceneIndex, geometry: Geometry, lights: LightRows) -> list[str]:
     """The group of each row of `lights`."""
-    lamps = index.scene.lights
+    lamps = index.lights
     groups = [lamps[i].group or REST for i in row_order(lamps)]
     groups += [REST] * (next(iter(lights.first), len(lights.rows)) - len(groups))  # of media
     ends = (*lights.first, len(lights.rows))[1:]

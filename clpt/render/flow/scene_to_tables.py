@@ -144,7 +144,7 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
 
     texture_budget: as of `lower`. Raises SceneError for parameters that cannot be encoded.
     """
-    index, film = found.index, found.index.scene.film
+    index, film = found.index, found.index.film
     ends = film.lambda_min, film.lambda_max
     wavelengths = density(index) if index.spectral else Density(*ends)
     encoder = Encoder(index.mode, *ends, sensor(film), wavelengths, texture_budget, cache)
@@ -178,7 +178,7 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
         layer_names=names,
         glass_rows=rows.glasses,
         warnings=warnings,
-        integrator=index.scene.integrator,
+        integrator=index.integrator,
         reason=found.reason,
         candidates=index.candidates,
         samples=index.samples,
@@ -206,7 +206,7 @@ class _Surfaces:
 def _encode_surfaces(found: Analysis, encoder: Encoder) -> _Surfaces:
     """Append shapes, materials, media and lights."""
     index = found.index
-    filters.encode_filter(index.scene.film.filter, encoder.store, index.splatting)
+    filters.encode_filter(index.film.filter, encoder.store, index.splatting)
     materials = _begin_materials(found, encoder)
     moves = spheres_move(index)
     geometry = encode_geometry(found.geometry, encoder, materials, spheres_move=moves)
@@ -288,7 +288,7 @@ def _lower_motion(found: Analysis, lights: LightRows, encoder: Encoder) -> int:
     if not index.motions:
         return 0
     rows += [-1] * ((*lights.first, len(lights.rows))[0] - len(rows))  # bricks of media
-    return lower_motion(index.motions, len(index.scene.shapes), rows, encoder.store)
+    return lower_motion(index.motions, len(index.listed), rows, encoder.store)
 
 
 def _lower_tangents(geometry: Geometry, encoder: Encoder) -> int:
@@ -307,7 +307,7 @@ def _lower_profile(index: SceneIndex, encoder: Encoder) -> int:
     """Append the filter's values for light paths, if any; return their place in `distributions`."""
     if not index.weighed:
         return 0
-    return filters.encode_profile(index.scene.film.filter, encoder.store, index.splatting)
+    return filters.encode_profile(index.film.filter, encoder.store, index.splatting)
 
 
 def _lower_density(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool]:
@@ -388,7 +388,7 @@ def _lower_lights(
     for medium in index.emitting:
         media.word(medium)
     emitters = geometry.emitters
-    lights = light_rows(index.scene.lights, emitters, encoder, sources, tree_from, media.lights)
+    lights = light_rows(index.lights, emitters, encoder, sources, tree_from, media.lights)
     encoder.store.append("lights", lights.rows.view(np.uint32))
     if lights.tree is not None:
         encoder.store.append("lights", lights.tree)
@@ -401,7 +401,7 @@ def _lower_lights(
 
 def _encode_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
     """Append the camera; return the rows in `spectra` of its glasses that disperse."""
-    camera, film = index.scene.camera, index.scene.film
+    camera, film = index.camera, index.film
     glasses = camera.dispersive_glasses
     rows = tuple(encoder.spectra.row(glass) for glass in glasses) if index.spectral else ()
     words = encode_camera(camera, film.width, film.height, rows)
@@ -411,7 +411,7 @@ def _encode_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
 
 def _lower_ambient(index: SceneIndex, encoder: Encoder) -> int:
     """Append the ambient light of an integrator; return its first word, 0 if there is none."""
-    ambient = index.scene.integrator.ambient
+    ambient = index.integrator.ambient
     if ambient is None:
         return 0
     return encoder.store.append("light_params", encoder.emission_words(ambient))
@@ -419,12 +419,10 @@ def _lower_ambient(index: SceneIndex, encoder: Encoder) -> int:
 
 def _warnings(index: SceneIndex) -> list[str]:
     """Return warnings of parts of the scene that are not rendered as it says."""
-    film, integrator = index.scene.film, index.scene.integrator
+    film, integrator = index.film, index.integrator
     warnings = list(index.warnings)
-    if index.mode == "rgb" and index.scene.camera.dispersive_glasses:
-        warnings.append(
-            f"{index.scene.camera.kind}.glass: in RGB mode all wavelengths have one focus"
-        )
+    if index.mode == "rgb" and index.camera.dispersive_glasses:
+        warnings.append(f"{index.camera.kind}.glass: in RGB mode all wavelengths have one focus")
     if index.mode == "rgb" and any(map(_disperses, index.shapes)):
         warnings.append("in rgb mode glass does not disperse: ask for the spectral mode")
     if index.motions:
@@ -441,7 +439,7 @@ def _warnings(index: SceneIndex) -> list[str]:
             f"film.sensor sees nothing from {film.lambda_min:g} to {film.lambda_max:g} nm, so the"
             " picture is black; ask for film.bands"
         )
-    if not index.scene.lights and next(emissions(index), None) is None:
+    if not index.lights and next(emissions(index), None) is None:
         warnings.append("no light in the scene, so the picture is black: add one to `lights`")
     if film.mode == "rgb" and mt.Fluorescent in index.leaves:
         warnings.append("in rgb mode fluorescent paint has its colour under D65, at most white")
@@ -464,7 +462,7 @@ def _of_motion(index: SceneIndex) -> list[str]:
     """Return warnings of grids of media that stay where a shape moves."""
     warnings: list[str] = []
     for i in index.motions.shapes:
-        shape = index.scene.shapes[i]
+        shape = index.listed[i]
         media = (medium for s in shape.members for medium in (s.interior, s.exterior))
         if any(medium is not None and medium.lattice is not None for medium in media):
             warnings.append(
@@ -475,7 +473,7 @@ def _of_motion(index: SceneIndex) -> list[str]:
 
 def _left_to_the_camera(index: SceneIndex) -> list[str]:
     """Return warnings of light that only paths from the camera find, not light paths or photons."""
-    camera, integrator = index.scene.camera, index.scene.integrator
+    camera, integrator = index.camera, index.integrator
     kind, warnings = integrator.kind, []
     if integrator.light_tracing and not index.joined:
         names = " and ".join(CONNECTED)
@@ -497,7 +495,7 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
         warnings += [
             f"{kind}.light_paths: none start at lights[{i}], whose light does not fall with "
             "distance"
-            for i, light in enumerate(index.scene.lights)
+            for i, light in enumerate(index.lights)
             if light.reach == "placed" and not light.falloff
         ]
     return warnings

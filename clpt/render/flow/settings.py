@@ -62,7 +62,7 @@ def settings_of(
     if index.merged:
         _set_photons(settings, index, geometry, sphere[1], found.disperses)
     if index.guided:
-        paths = settings["guide_paths"] = index.scene.integrator.guide_paths or guides.PATHS
+        paths = settings["guide_paths"] = index.integrator.guide_paths or guides.PATHS
         settings["photon_cells"], side = guides.cells_for(paths)
         settings["guide_side"] = side * sphere[1]
     settings["mis_area_unit"] = mis_area_unit(sphere[1])
@@ -74,7 +74,7 @@ def settings_of(
     settings["single_count"] = geometry.single_count
     settings["shape_count"] = len(geometry.rows)
     settings["tanh_min"], settings["tanh_max"] = tanh_ends(density.lo, density.hi)
-    film = index.scene.film
+    film = index.film
     matrix = output_matrix(film, index.mode)
     scale = settings["film_scale"] = film_scale(film, light_level(index, lights, sphere))
     settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
@@ -93,7 +93,7 @@ def _set_places(settings: NDArray[np.void], found: Found) -> None:
 
 def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
     """Write the size of the film, and which of its pixels and wavelengths are rendered."""
-    film = index.scene.film
+    film = index.film
     width, height = film.size
     settings["width"], settings["height"] = width, height
     settings["crop_x"], settings["crop_y"] = (0, 0) if film.crop is None else film.crop[:2]
@@ -101,16 +101,16 @@ def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
     margin = settings["margin"] = 0 if index.light_paths else index.filter_reach
     settings["tiles_x"] = -(-(width + 2 * margin) // 4)
     settings["padded_pixels"] = 16 * settings["tiles_x"] * -(-(height + 2 * margin) // 4)
-    settings["alpha"] = index.scene.film.alpha
+    settings["alpha"] = index.film.alpha
     settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
     settings["bands"] = film.bands
 
 
 def _set_paths(settings: NDArray[np.void], index: SceneIndex) -> None:
     """Write what the sampler and the integrator say of paths."""
-    scene, integrator = index.scene, index.scene.integrator
-    settings["seed"] = scene.seed
-    settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
+    integrator = index.integrator
+    settings["seed"] = index.seed
+    settings["sample_bits"] = min((max(index.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
     depth = integrator.max_depth
     settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
     settings["rr_depth"] = min(integrator.rr_depth, DEEPEST)
@@ -149,11 +149,11 @@ def _set_photons(
     disperses: bool,
 ) -> None:
     """Write what merging needs; the wavefront adds how many light paths leave photons."""
-    integrator, film = index.scene.integrator, index.scene.film
+    integrator, film = index.integrator, index.film
     assert isinstance(integrator, Vcm)
     settings["max_depth"] = min(int(settings["max_depth"]), photons.DEEPEST)
     settings["radius"] = integrator.radius or photons.first_radius(
-        index.scene.camera, geometry, (film.width, film.height), scene_radius
+        index.camera, geometry, (film.width, film.height), scene_radius
     )
     settings["photon_places"] = photons.places(integrator)
     held = photons.pixels(integrator, int(settings["padded_pixels"]))

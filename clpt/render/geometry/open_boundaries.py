@@ -76,7 +76,7 @@ def _largest_hole(shape: Shape, cached: LoweringCache | None) -> float:
 def hole_around(index: SceneIndex, inside: object, cached: LoweringCache | None) -> float:
     """Return the size of the largest hole in all shapes around an inside, over their area."""
     around: list[tuple[float, Shape]] = []
-    for shape in every(index.scene.shapes, lambda shape: True):
+    for shape in every(index.listed, lambda shape: True):
         around += [(1.0, shape)] * any(inside == other for other in _insides(shape))
         around += [(-1.0, shape)] * (shape.exterior is inside)
     if len(around) == 1:

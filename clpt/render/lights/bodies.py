@@ -122,8 +122,8 @@ def _body(medium: Medium, index: SceneIndex, look: Look) -> BodyLight | None:
     Its boundaries must be closed, at rest and null, and must fill a box well.
     """
     cached = look.cache
-    elsewhere = {index.scene.camera.medium, *(shape.exterior for shape in index.shapes)}
-    around = [shape for shape in every(index.scene.shapes) if shape.interior is medium]
+    elsewhere = {index.camera.medium, *(shape.exterior for shape in index.shapes)}
+    around = [shape for shape in every(index.listed) if shape.interior is medium]
     if medium in elsewhere or not around or not all(_encloses(shape) for shape in around):
         return None
     if hole_around(index, medium, cached) > HOLE:

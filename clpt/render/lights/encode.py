@@ -225,9 +225,9 @@ def light_level(
         away = np.square((bounds.low + bounds.high) / 2.0 - centre).sum(axis=1)
         square = np.where(bounds.placed, np.maximum(away, radius**2), radius**2)
         arrives = float((lights.power / (4.0 * np.pi * square)).sum())
-    look = Look.of(index.scene.film)
+    look = Look.of(index.film)
     media = [medium.light for medium in index.emitting if medium.light is not None]
     glow = [brightness(light, look) * radius for light in media]
-    ambient = index.scene.integrator.ambient
+    ambient = index.integrator.ambient
     around = 0.0 if ambient is None else brightness(ambient, look)
     return max(lights.radiance, arrives, around, *glow)

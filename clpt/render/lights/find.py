@@ -99,7 +99,7 @@ def sources_of(index: SceneIndex, geometry: Geometry, scene_radius: float, look:
     """
     volumes = volume_lights(index, look)
     around = _around(index, geometry) if index.motions else None
-    return measured(index.scene.lights, geometry.emitters, scene_radius, look, volumes, around)
+    return measured(index.lights, geometry.emitters, scene_radius, look, volumes, around)
 
 
 def measured(

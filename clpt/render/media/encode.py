@@ -85,7 +85,7 @@ class MediumWords:
         self._sealed, self._glows = sealed, glows
         self._words: dict[Medium, int] = {}
         self.lights: list[tuple[int, BrickLights | BodyLight]] = []  # by their medium's word
-        self._light_row = len(index.scene.lights)  # in `lights`, of the next brick or body
+        self._light_row = len(index.lights)  # in `lights`, of the next brick or body
         self._has_media = bool(index.media)  # False for an integrator that sees none
 
     def word(self, medium: Medium | None) -> int:

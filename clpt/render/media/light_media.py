@@ -120,7 +120,7 @@ def around(
         )
     )
     far = sphere[0] + INFINITY * sphere[1] * np.ones(3)
-    order = row_order(index.scene.lights)
+    order = row_order(index.lights)
     lamps = [_around_lamp(i, index, boundaries, far, unknown) for i in order]
     return lamps + [
         _around_emitter(emitter, boundaries, geometry, unknown) for emitter in geometry.emitters
@@ -135,7 +135,7 @@ def _around_lamp(
     far (3,): a point that stands for infinity; unknown: the message, with room for the light's
     name, where a boundary is open, else "".
     """
-    name, lamp = f"lights[{i}]", index.scene.lights[i]
+    name, lamp = f"lights[{i}]", index.lights[i]
     if unknown:
         raise Unknown(unknown.format(name))
     if lamp.reach == "placed":
@@ -189,9 +189,7 @@ class _Boundaries:
 
     def __init__(self, index: SceneIndex, cache: LoweringCache):
         self.nested, self.cache, self.motions = index.nested, cache, index.motions
-        self.shapes = surroundings.boundaries(
-            index.scene.shapes, matter_of if self.nested else None
-        )
+        self.shapes = surroundings.boundaries(index.listed, matter_of if self.nested else None)
         self.times = self.motions.looks()
         self.still = surroundings.stands_still(self.shapes)
         self.elsewhere = () if self.nested else self._around_camera(index)
@@ -201,11 +199,11 @@ class _Boundaries:
 
         That medium then fills all space without another medium.
         """
-        camera = index.scene.camera
+        camera = index.camera
         if camera.medium is None:
             return ()
         time = surroundings.moment(camera)
-        origin = surroundings.camera_origin(camera, index.scene.film, time)
+        origin = surroundings.camera_origin(camera, index.film, time)
         media = surroundings.media_at(self.shapes, origin, time, self.cache)
         return () if camera.medium in media else (camera.medium,)
 

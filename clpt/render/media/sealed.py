@@ -38,14 +38,14 @@ def sealed_media(index: SceneIndex, cache: LoweringCache | None = None) -> froze
     Where a ray cannot meet every light, no medium is sealed. cache: it keeps the triangles of
     boundaries.
     """
-    if index.nested or any(light.reach != "infinite" for light in index.scene.lights):
+    if index.nested or any(light.reach != "infinite" for light in index.lights):
         return frozenset()
     bodies: dict[Medium, list[Shape]] = {}
-    for shape in every(index.scene.shapes):
+    for shape in every(index.listed):
         if shape.interior is not None:
             bodies.setdefault(shape.interior, []).append(shape)
-    exteriors = {shape.exterior for shape in index.shapes} | {index.scene.camera.medium}
-    shapes = every(index.scene.shapes, lambda shape: shape.emission is not None)
+    exteriors = {shape.exterior for shape in index.shapes} | {index.camera.medium}
+    shapes = every(index.listed, lambda shape: shape.emission is not None)
     lamps = [box(shape, cache) for shape in shapes if shape.emission is not None]
     if len(lamps) > MOST_COMPARED:
         return frozenset()
@@ -81,7 +81,7 @@ def escape_lamps(
     k is 0 to MOST_AIMS, and 0 where no escape ray is sent. cache: it keeps the triangles of lamps.
     """
     shapes = list(
-        every(index.scene.shapes, lambda shape: shape.emission is not None or bounds_media(shape))
+        every(index.listed, lambda shape: shape.emission is not None or bounds_media(shape))
     )
     lamps = [shape for shape in shapes if shape.emission is not None]
     if not lamps or not _can_escape(index, sealed) or not _refract_alike(shapes, sealed):
@@ -95,7 +95,7 @@ def escape_lamps(
 
 def _can_escape(index: SceneIndex, sealed: frozenset[Medium]) -> bool:
     """Return whether the integrator and the media of a scene allow escape rays."""
-    plain = isinstance(index.scene.integrator, Path) and not index.weighed and not index.guided
+    plain = isinstance(index.integrator, Path) and not index.weighed and not index.guided
     all_sealed = bool(sealed) and all(medium in sealed for medium in index.media)
     homogeneous = all(medium.lattice is None for medium in index.media)
     simple = not index.motions and not index.dyed and not index.shifts

@@ -81,7 +81,7 @@ class Density:
 
 def density(index: SceneIndex) -> Density:
     """Return the density that `Film.wavelengths` names or, by default, that suits the scene."""
-    film = index.scene.film
+    film = index.film
     lo, hi = _support(film)
     visible = Density(lo, hi)
     nodes = np.linspace(lo, hi, int(np.ceil((hi - lo) / STEP - 1e-9)) + 1)
@@ -142,7 +142,7 @@ def _glow(index: SceneIndex, nodes: Floats) -> tuple[Floats, Floats]:
 
     The matrix times the light at the absorbed wavelengths [nm] is the emission at the nodes (n,).
     """
-    film = index.scene.film
+    film = index.film
     cells = int(np.ceil((film.lambda_max - film.lambda_min) / STEP - 1e-9))
     absorbed = np.linspace(film.lambda_min, film.lambda_max, cells + 1)
     matrices = {id(m): m for shape in index.shapes for m in _fluorescent(shape.material)}
@@ -168,9 +168,9 @@ def _fluorescent(material: object) -> Iterator[Reradiation]:
 def emissions(index: SceneIndex) -> Iterator[Spectrum]:
     """Yield the emissions of a scene's lights; an image of colours stands for D65."""
     sources: list[Any] = [
-        *index.scene.lights,
+        *index.lights,
         *(shape.emission for shape in index.shapes),
-        index.scene.integrator,
+        index.integrator,
     ]
     for source in sources:
         if source is None:

@@ -79,7 +79,7 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
     an image light that is broken.
     """
     index = lit.index
-    given = index.scene.integrator
+    given = index.integrator
     if not given.leaves_choice:
         return index, ""
     if former is None:
@@ -99,7 +99,7 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
         chosen = Path(light_paths=0, guiding=True, guide_paths=given.guide_paths)
         reason = "directions are guided"
     chosen = replace(chosen, **shared(given, chosen))
-    index = replace(index, scene=replace(index.scene, integrator=chosen))
+    index = replace(index, integrator=chosen)
     return replace(index, candidates=_candidates(index, chosen) if former is None else ()), reason
 
 
@@ -126,16 +126,16 @@ def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]
 
 def _may_be_met(index: SceneIndex) -> bool:
     """Whether a ray can meet every light."""
-    return all(light.reach in ("surface", "infinite") for light in index.scene.lights)
+    return all(light.reach in ("surface", "infinite") for light in index.lights)
 
 
 def _choice(lit: Lit) -> tuple[Integrator, str]:
     """The integrator but for its depths, and why; what is cheap to know is asked first."""
     index, geometry = lit.index, lit.geometry
-    integrator, without = index.scene.integrator, Path(light_paths=0)
+    integrator, without = index.integrator, Path(light_paths=0)
     if not index.lights_reach:
         return without, index.lit_media
-    if not index.scene.camera.is_connected(index.mode):
+    if not index.camera.is_connected(index.mode):
         return without, "points cannot be joined to this camera"
     fewest = FEWEST - index.free_panes  # a pane on the way costs no depth
     if 0 <= integrator.max_depth < fewest:
@@ -184,9 +184,7 @@ def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
     bounds = light_bounds.concatenated([one.bounds for one in lit.sources.every])
     spots = bounds.theta_o + bounds.theta_e < ALL_AROUND
     index, shutter = lit.index, lit.index.motions.shutter
-    eye = surroundings.camera_origin(
-        index.scene.camera, index.scene.film, (shutter.open + shutter.close) / 2.0
-    )
+    eye = surroundings.camera_origin(index.camera, index.film, (shutter.open + shutter.close) / 2.0)
     small = []
     for name, place, _, rows in _small_rows(lit):
         far = 0.0 if place is None else float(np.linalg.norm(place - eye))
@@ -249,7 +247,7 @@ def _covered(
 
 def _sees_clear(index: SceneIndex, geometry: Geometry) -> bool:
     """Whether mirrors and clear things fill enough of the picture: as if nothing hid them."""
-    view = index.scene.camera.view_of(index.scene.film.width, index.scene.film.height)
+    view = index.camera.view_of(index.film.width, index.film.height)
     assert view is not None, "a camera that can be joined has a point"
     directions = _cone(view.axis, math.cos(view.angle), RAYS)
     for pieces in sharp_pieces(geometry, index.motions.shapes, lambda one: is_sharp(one, CLEAR)):
@@ -289,7 +287,7 @@ def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, flo
     """Yield small lights as `_small_lights` does, each with its rows in `lights`."""
     motions, geometry = lit.index.motions, lit.geometry
     sources, (middle, radius) = lit.sources, lit.sphere
-    lamps, share = lit.index.scene.lights, sources.power / max(sources.power.sum(), 1e-300)
+    lamps, share = lit.index.lights, sources.power / max(sources.power.sum(), 1e-300)
     for row, i in enumerate(sources.order):
         lamp = lamps[i]
         if isinstance(lamp, (Envmap, CubeMap)):
