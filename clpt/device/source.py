@@ -227,11 +227,12 @@ class _File:
     """A file in the text: its label in errors, and its head comment.
 
     generated: whether it is no file on disk, so that its lines count as in the text; lines: their
-    number so far.
+    number so far; described: whether the text gets its head comment, which a twin does without.
     """
 
     label: str
     generated: bool
+    described: bool = True
     header: tuple[Row, ...] = ()
     lines: int = 0
 
@@ -251,9 +252,10 @@ class _Assembly:
         generated = name.startswith(_GENERATED)
         for part in self._read(name, includer, line):
             is_pasted = part is self.virtual.get(name) and "##" in part.text
-            self._append(part, generated, self.library or is_pasted)
+            file = _File(part.file, generated, described=not name.endswith(TWIN))
+            self._append(part, file, self.library or is_pasted)
 
-    def _append(self, part: Part, generated: bool, keeps_all: bool) -> None:
+    def _append(self, part: Part, file: _File, keeps_all: bool) -> None:
         """Append a part of a file with its includes inserted.
 
         keeps_all: whether unused definitions stay.
@@ -262,11 +264,10 @@ class _Assembly:
             pieces = _pieces(part.text, part.line)
         except _BadRow as error:
             self._fail(part.file, error.line, str(error))
-        file = _File(part.file, generated)
         for number, piece in enumerate(pieces):
             kept = taken(piece.rows, self.macros)
-            if number == 0 and kept and kept[0].is_comment and not (keeps_all or generated):
-                file.header, kept = kept[:1], kept[1:]
+            if number == 0 and kept and kept[0].is_comment and not (keeps_all or file.generated):
+                file.header, kept = kept[: file.described], kept[1:]
             self.pieces.append((file, whole(kept) if keeps_all else paragraphs(kept)))
             include = piece.include and _QUOTED.match(piece.include.argument)
             if piece.include and include and include[1] not in self.names:
