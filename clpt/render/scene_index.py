@@ -35,9 +35,10 @@ class SceneIndex:
     the coordinates of their group. placed: shapes that are lowered as they are. prototypes: shapes
     that instances share. leaves: classes of leaf materials, in the order of material words.
     normal_mapped: whether a material has a normal or a bump map. warnings: of instances that became
-    triangles. motions: of shapes, lights and the camera. lit_media: why no path can start at some light in a medium; "" if paths can.
-    lit_before: whether light paths were ghosts of a lens before an edit; None without an edit.
-    candidates: integrators for a trial, the chosen integrator first; empty without a trial.
+    triangles. motions: of shapes, lights and the camera. lit_media: why no path can start at some
+    light in a medium; "" if paths can. lit_before: whether light paths were ghosts of a lens before
+    an edit; None without an edit. candidates: integrators for a trial, the chosen integrator first;
+    empty without a trial.
     """
 
     camera: Camera
