@@ -136,7 +136,7 @@ def test_a_scene_is_followed(tmp_path: Path) -> None:
             "    def look(self):\n        x: Unseen = steps.lower(self)\n"
             "class Unseen:\n    def __init__(self, scene: Scene): pass\n",
             "clpt/render/steps.py": "def lower(index): return camera(index), lights(1)\n"
-            "def camera(index): return index.camera\n"
+            "def camera(index): return index.scene.camera\n"
             "def lights(count: int): return DeviceScene\n"
             "def never(scene: Scene): pass\n",
         },
