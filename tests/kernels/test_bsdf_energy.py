@@ -47,6 +47,19 @@ def test_principled_metal_and_glass_make_no_energy(share):
         checks.energy_is_not_made(probe, params, rng)
 
 
+@pytest.mark.parametrize("coat, metal", [(1e-3, 0.3), (0.2, 1e-3)])
+def test_white_metal_under_a_coat_gains_a_twentieth(coat, metal):
+    rng, probe = np.random.default_rng(11), Probe(m.CoatedConductor, "rgb")
+    white_metal = {"specular_reflectance": 1.0, "eta": 0.0, "k": 1.0}
+    glass = {"coat_ior": 1.5, "ext_ior": 1.0, "distribution": 1}
+    alphas = {"coat_alpha": coat, "alpha_u": metal, "alpha_v": metal}
+    fixed = {**white_metal, **glass, **alphas}
+    for params in settings(m.CoatedConductor, "rgb", rng, 1, **fixed):
+        mean, error = checks.albedos(probe, params, rng, (1.0, 30.0, 60.0))
+        assert np.all(mean < 1.06 + 4.0 * error)
+        assert mean.max() > 1.02, "the page of materials tells of a gain that is gone"
+
+
 LOSSLESS = {
     m.Diffuse: ({}, (1.0, 60.0, 88.0)),
     m.Conductor: ({"eta": 0.0, "k": 1.0}, (1.0, 60.0, 88.0)),
