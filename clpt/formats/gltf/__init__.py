@@ -10,6 +10,7 @@ from typing import Any
 
 from clpt.choices import Missing
 from clpt.errors import SceneError, nearest
+from clpt.formats import framing
 from clpt.formats.gltf import (
     animation,
     cameras_lights,
@@ -21,7 +22,6 @@ from clpt.formats.gltf import (
     nodes,
 )
 from clpt.formats.gltf.document import Document, Scale
-from clpt.formats.meshes import framing
 from clpt.formats.meshes.mesh import MeshFile
 from clpt.scene import Scene
 from clpt.scene.shapes import Mesh

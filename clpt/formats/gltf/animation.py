@@ -164,7 +164,7 @@ def scene_over_shutter(load: Callable[[float], Scene], time: float, length: floa
     if any(len(other.shapes) != len(scene.shapes) for other in scenes):
         warnings.append("shutter: shapes come or go while it is open, so that nothing moves")
         return dataclasses.replace(scene, warnings=warnings)
-    added = scene.extra["studio"]  # what stands still, see clpt.formats.meshes.framing
+    added = scene.extra["studio"]  # what stands still, see clpt.formats.framing
     own = len(scene.shapes) - added["shapes"]
     groups: dict[int, Group] = {}
     shapes: list[Any] = []
