@@ -17,7 +17,7 @@ from clpt.render.geometry.find import Geometry
 from clpt.render.lights.encode import LightRows
 from clpt.render.lights.find import row_order
 from clpt.render.records import LayerFeatures
-from clpt.render.records.layer_names import LayerNames
+from clpt.render.records.film import LayerNames
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.records.tables import TableStore
 from clpt.render.scene_index import SceneIndex
