@@ -47,8 +47,8 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     without it nodes have their own transforms, and materials, lights and cameras their own numbers.
     `camera` and `scene` choose by number or name.
     `shutter` [s] is how long light comes to the film from `time` on, while nodes move.
-    `variant` chooses among material variants. `lumens`: of a watt, as cameras_lights.py has
-    it. `multiple_scattering`: 1 keeps what facets reflect to each other.
+    `variant` chooses among material variants. `lumens`: of a watt, see cameras_lights.py.
+    `multiple_scattering`: 1 keeps what facets reflect to each other.
     missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
     """
     if "shutter" in variables:
@@ -58,9 +58,13 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
         time = _seconds(path, variables.pop("time", 0.0))
         if length > 0.0:
             return animation.scene_over_shutter(
-                lambda t: load(path, missing, **variables, time=t), time, length
+                lambda t: _load(path, missing, {**variables, "time": t}), time, length
             )
         variables["time"] = time
+    return _load(path, missing, variables)
+
+
+def _load(path: Path, missing: Missing, variables: dict[str, Any]) -> Scene:
     document, graph = _open(path, variables, missing)
     chosen = cameras_lights.chosen_camera(graph, _text(variables.get("camera")))
     shapes = meshes.shapes(graph)
