@@ -59,6 +59,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/front_motion.cl": lambda f, _: either(f.motion.camera, "cameras/front_motion.cl"),
     "generated/ghosts.cl": lambda f, _: either(f.transport.lit_ghosts, "cameras/ghosts.cl"),
+    "generated/first_cone.cl": lambda f, _: either(not f.camera.listed, "textures/first_cone.cl"),
     "generated/first_ray.cl": lambda f, _: (
         f"cameras/first_ray{'_weighted' * f.camera.weighs}.cl",
     ),
