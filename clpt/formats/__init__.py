@@ -27,6 +27,10 @@ FORMATS = {  # the module whose `load` reads files of a suffix, imported when it
     ".pbrt.gz": "pbrt",
     ".glb": "gltf",
     ".gltf": "gltf",
+    ".usd": "usd",
+    ".usda": "usd",
+    ".usdc": "usd",
+    ".usdz": "usd",
     ".obj": "meshes.framing",
     ".ply": "meshes.framing",
     ".stl": "meshes.framing",
@@ -35,11 +39,11 @@ FORMATS = {  # the module whose `load` reads files of a suffix, imported when it
     ".nvdb": "volumes.framing",
     ".vol": "volumes.framing",
 }
-WITH_VARIABLES = ("mitsuba", "gltf")
+WITH_VARIABLES = ("mitsuba", "gltf", "usd")
 
 # The scene of a folder: the first of these, else the one with the folder's name, else the only one.
 IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
-SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf")
+SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
 MOST_COMPARED, CLOSE = 4096, 0.7  # names of a folder, and how near one is that is meant
 MOST_NAMED = 8  # scenes of a folder that a message names
 ARGUMENTS = ("kinds", "progress", "missing_textures", "budget")  # of `load`, beside variables
@@ -94,12 +98,13 @@ def _load(
         known = " ".join(FORMATS)
         raise SceneError(f"unknown format {path.suffix!r}; known: {known}", file=path)
     if "camera" in variables and kind not in WITH_VARIABLES:
-        message = f"only .xml and glTF have cameras to choose from, no {variables['camera']!r}; "
+        message = "only .xml, glTF and USD have cameras to choose from, no "
+        message += f"{variables['camera']!r}; "
         message += "--camera AZIMUTH,ELEVATION such as 45,20 looks at all of a scene"
         raise SceneError(message, file=path)
     if variables and kind not in WITH_VARIABLES:
         name = min(variables)
-        message = f"only .xml and glTF have variables, so {name!r} means nothing"
+        message = f"only .xml, glTF and USD have variables, so {name!r} means nothing"
         near = difflib.get_close_matches(name, ARGUMENTS)
         raise SceneError(message + (nearest(name, ARGUMENTS) if near else ""), file=path)
     if kinds and kind != "native":
