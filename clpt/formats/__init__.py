@@ -192,9 +192,9 @@ def locate(path: str | Path, /) -> Path:
             return _inside(path)
         if path.is_file():
             return path
-        own = brought(path)
-        if own != path:
-            return locate(own)
+        bundled = brought(path)
+        if bundled != path:
+            return locate(bundled)
     except SceneError:
         raise
     except (OSError, ValueError) as error:
@@ -205,9 +205,11 @@ def locate(path: str | Path, /) -> Path:
 def brought(path: str | os.PathLike[str], /) -> Path:
     """Return the path; of one that begins with `scenes` and is not there, clpt's own if any."""
     path = Path(path)
-    own = own_scenes.scenes_folder().parent / path
-    mine = path.parts[:1] == ("scenes",) and ".." not in path.parts and os.path.exists(own)
-    return own if mine and not os.path.exists(path) else path
+    bundled = own_scenes.scenes_folder().parent / path
+    is_bundled = (
+        path.parts[:1] == ("scenes",) and ".." not in path.parts and os.path.exists(bundled)
+    )
+    return bundled if is_bundled and not os.path.exists(path) else path
 
 
 def _nearest_file(path: Path) -> str:
@@ -220,9 +222,9 @@ def _nearest_file(path: Path) -> str:
         path = path.parent
     try:
         names = [
-            one.name
-            for one in itertools.islice(path.parent.iterdir(), MOST_COMPARED)
-            if one.is_dir() or one.name.lower().endswith(tuple(FORMATS))
+            entry.name
+            for entry in itertools.islice(path.parent.iterdir(), MOST_COMPARED)
+            if entry.is_dir() or entry.name.lower().endswith(tuple(FORMATS))
         ]
     except OSError:
         names = []
@@ -245,9 +247,9 @@ def _meant(here: list[str], path: Path) -> str:
 def _inside(folder: Path) -> Path:
     """Return the scene of a folder, see IN_FOLDERS."""
     scenes = sorted(file for file in folder.iterdir() if file.name.lower().endswith(SCENES))
-    own = [file for file in scenes if file.name.split(".")[0] == folder.resolve().name]
+    same_name = [file for file in scenes if file.name.split(".")[0] == folder.resolve().name]
     named = [folder / name for name in IN_FOLDERS if (folder / name).is_file()]
-    for files in (named[:1], own, scenes):
+    for files in (named[:1], same_name, scenes):
         if len(files) == 1:
             return files[0]
     if not scenes:

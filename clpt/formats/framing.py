@@ -30,7 +30,7 @@ def load_mesh(path: Path, missing: Missing = "error") -> Scene:
 
 
 def show(
-    things: Sequence[shapes.Shape],
+    contents: Sequence[shapes.Shape],
     *,
     file: Path,
     camera: cameras.Camera | None = None,
@@ -39,7 +39,7 @@ def show(
 ) -> Scene:
     """Return a scene of the shapes of a file; see `Scene.studio` for what is missing."""
     try:
-        scene = Scene.studio(things, camera=camera, lights=own_lights, up=up, name=file.stem)
+        scene = Scene.studio(contents, camera=camera, lights=own_lights, up=up, name=file.stem)
     except SceneError as error:
         raise SceneError(error.message, file=file) from None
     scene.extra["format"] = file.suffix.lower()[1:]
@@ -57,13 +57,13 @@ def load_density(path: Path) -> Scene:
     What a density means differs from program to program, so it is scaled to be as thick as DEPTH.
     Raises SceneError for what is no density, and for one that is 0 everywhere.
     """
-    found = volumes.read(path)
-    to_world = np.asarray(found.to_world, float)
-    steps = np.linalg.norm(to_world[:3, :3], axis=0) / found.values.shape  # of a cell, [m]
-    columns = [float(found.values.sum(axis=i, dtype=float).max()) * steps[i] for i in range(3)]
+    density = volumes.read(path)
+    to_world = np.asarray(density.to_world, float)
+    steps = np.linalg.norm(to_world[:3, :3], axis=0) / density.values.shape  # of a cell, [m]
+    columns = [float(density.values.sum(axis=i, dtype=float).max()) * steps[i] for i in range(3)]
     if not min(columns) > 0.0:
         raise SceneError("its density is 0 everywhere: nothing would be seen", file=path)
-    cloud = media.Grid(density=found, sigma_t=DEPTH / float(np.mean(columns)), albedo=0.99)
+    cloud = media.Grid(density=density, sigma_t=DEPTH / float(np.mean(columns)), albedo=0.99)
     box = shapes.Cube(
         to_world=to_world @ TO_BOX, material=materials.Null(), interior=cloud, name=path.stem
     )

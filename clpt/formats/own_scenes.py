@@ -56,7 +56,7 @@ def every() -> Iterator[OwnScene]:
 
 def nearest_paths(path: Path) -> list[str]:
     """Return the paths that somebody may mean who gives this one, which is not there."""
-    known = {own.removeprefix(f"{SCENES}/"): own for own in paths()}
+    known = {known_path.removeprefix(f"{SCENES}/"): known_path for known_path in paths()}
     parts = path.parts[1:] if path.parts[:1] == (SCENES,) else path.parts
     if not parts or path.is_absolute():
         return []

@@ -108,7 +108,7 @@ def distinct(shapes_: Iterable[Shape]) -> Iterator[Shape]:
 
 
 def sort(
-    things: Sequence[Shape], warnings: list[str], moving: Collection[int] = ()
+    shapes: Sequence[Shape], warnings: list[str], moving: Collection[int] = ()
 ) -> tuple[list[Placed], list[Prototype]]:
     """Return the shapes that are lowered as they are, and those that are shared.
 
@@ -119,19 +119,19 @@ def sort(
     placed: list[Placed] = []
     prototypes: list[Prototype] = []
     groups: dict[int, tuple[Group, list[int]]] = {}
-    for number, given in enumerate(things):
-        thing = _met_as(given)
-        if isinstance(thing, Instance):
-            groups.setdefault(id(thing.group), (thing.group, []))[1].append(number)
-        elif number in moving and thing.kind not in shape_records.ANALYTIC:
-            prototypes.append(_alone(thing, number))
+    for number, member in enumerate(shapes):
+        as_met = _met_as(member)
+        if isinstance(as_met, Instance):
+            groups.setdefault(id(as_met.group), (as_met.group, []))[1].append(number)
+        elif number in moving and as_met.kind not in shape_records.ANALYTIC:
+            prototypes.append(_alone(as_met, number))
         else:
-            placed.append(Placed(thing, number))
+            placed.append(Placed(as_met, number))
     for group, numbers in groups.values():
-        to_world = matrices([things[number] for number in numbers])
+        to_world = matrices([shapes[number] for number in numbers])
         shared = []
-        for given in group.shapes:
-            shape = _met_as(given, to_world)
+        for member in group.shapes:
+            shape = _met_as(member, to_world)
             whole = Prototype((shape,), to_world, np.array(numbers, np.int32))
             if shape.kind in shape_records.ANALYTIC:
                 placed += _analytic(shape, whole, prototypes, warnings, moving)

@@ -174,32 +174,32 @@ def _opening(shape: Any, shutter: Shutter) -> Any:
     return replace(triangles.at_time(shape, shutter.open), **changes)
 
 
-def _check(thing: Any, where: str) -> None:
-    if not isinstance(thing.motion, (Keys, type(None))):
-        raise SceneError(f"must be Keys, not {thing.motion!r}", where=f"{where}.motion")
+def _check(movable: Any, where: str) -> None:
+    if not isinstance(movable.motion, (Keys, type(None))):
+        raise SceneError(f"must be Keys, not {movable.motion!r}", where=f"{where}.motion")
 
 
-def _rest(thing: Any, shutter: Shutter) -> Any:
+def _rest(movable: Any, shutter: Shutter) -> Any:
     """A shape, light or camera without keys, if it does not move while the shutter is open."""
-    if thing.motion is None or _moves(thing.motion, shutter):
-        return thing
-    matrix = thing.motion.at(shutter.open)
-    angular = isinstance(thing, Camera) and not isinstance(thing, (Matrix, Orthographic))
+    if movable.motion is None or _moves(movable.motion, shutter):
+        return movable
+    matrix = movable.motion.at(shutter.open)
+    angular = isinstance(movable, Camera) and not isinstance(movable, (Matrix, Orthographic))
     if angular and not _keeps_lengths(matrix):  # which its `to_world` must
-        return replace(thing, motion=Keys((0.0, 1.0), (matrix, matrix)))
-    if isinstance(thing, Matrix):
-        return replace(thing, motion=None, view=thing.view @ transforms.inverse(matrix))
-    if isinstance(thing, ROUND) and not is_even(thing.motion):
-        still = replace(thing, motion=None)  # which an instance may stretch
-        return Instance(group=Group((still,), thing.kind), to_world=matrix, name=thing.name)
-    if hasattr(thing, "to_world"):
-        return replace(thing, motion=None, to_world=matrix @ np.asarray(thing.to_world))
+        return replace(movable, motion=Keys((0.0, 1.0), (matrix, matrix)))
+    if isinstance(movable, Matrix):
+        return replace(movable, motion=None, view=movable.view @ transforms.inverse(matrix))
+    if isinstance(movable, ROUND) and not is_even(movable.motion):
+        still = replace(movable, motion=None)  # which an instance may stretch
+        return Instance(group=Group((still,), movable.kind), to_world=matrix, name=movable.name)
+    if hasattr(movable, "to_world"):
+        return replace(movable, motion=None, to_world=matrix @ np.asarray(movable.to_world))
     changes: dict[str, Any] = {"motion": None}
-    if hasattr(thing, "position"):
-        changes["position"] = tuple(transforms.transform_points(matrix, thing.position))
-    if hasattr(thing, "direction"):
-        changes["direction"] = tuple(transforms.transform_vectors(matrix, thing.direction))
-    return replace(thing, **changes)
+    if hasattr(movable, "position"):
+        changes["position"] = tuple(transforms.transform_points(matrix, movable.position))
+    if hasattr(movable, "direction"):
+        changes["direction"] = tuple(transforms.transform_vectors(matrix, movable.direction))
+    return replace(movable, **changes)
 
 
 def _keeps_lengths(matrix: NDArray[np.float64]) -> bool:

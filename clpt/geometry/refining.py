@@ -149,8 +149,8 @@ def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
         raise SceneError(message + "triangles; raise displacement_edge", where=name)
     budget.check(PER_TRIANGLE * len(faces) * 4**levels, f"{name}: its displacement")
     if normals is None:
-        places, welded, own = _welded(points, faces)
-        normals = _smooth(places, welded)[own]
+        places, welded, numbers = _welded(points, faces)
+        normals = _smooth(places, welded)[numbers]
     for _ in range(levels):
         budget.check_time()
         edges, faces = _halved(faces, len(points))
@@ -160,10 +160,10 @@ def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
     image = mesh.displacement
     assert image is not None
     moved = points + mesh.displacement_scale * heights(image, uvs)[:, None] * normals
-    _, welded, own = _welded(points, faces)
-    shares = np.bincount(own)
-    mean = np.stack([np.bincount(own, moved[:, i]) / shares for i in range(3)], axis=1)
-    return mean[own], faces, _smooth(mean, welded)[own], uvs
+    _, welded, numbers = _welded(points, faces)
+    shares = np.bincount(numbers)
+    mean = np.stack([np.bincount(numbers, moved[:, i]) / shares for i in range(3)], axis=1)
+    return mean[numbers], faces, _smooth(mean, welded)[numbers], uvs
 
 
 def _smooth(points: Floats, faces: Integers) -> Floats:

@@ -114,9 +114,9 @@ def _cuts(spans: NDArray[np.float64]) -> NDArray[np.int64]:
     least = np.maximum(np.ceil(_turn(spans) / BEND), 1.0).astype(np.int64)
     turning = np.flatnonzero(least > 1)
     for _ in range(ROUNDS):  # where a cubic turns most within little of its length
-        own = least[turning]
-        span = np.repeat(turning, own)
-        begin = (np.arange(len(span)) - np.repeat(np.cumsum(own) - own, own)) / least[span]
+        turns = least[turning]
+        span = np.repeat(turning, turns)
+        begin = (np.arange(len(span)) - np.repeat(np.cumsum(turns) - turns, turns)) / least[span]
         turn = _turn(_between(spans[span], begin, begin + 1.0 / least[span]))
         turning = np.unique(span[turn > 1.5 * BEND])
         turning = turning[least[turning] < MOST_CUTS]
@@ -124,10 +124,10 @@ def _cuts(spans: NDArray[np.float64]) -> NDArray[np.int64]:
     length = np.linalg.norm(np.diff(spans[..., :3], axis=1), axis=2)
     low, high = spans[..., :3].min(axis=1), spans[..., :3].max(axis=1)
     x, y, z = (high - low).T
-    own = spans[..., 3].mean(axis=1) * np.maximum(length.sum(axis=1), 1e-300)
+    turns = spans[..., 3].mean(axis=1) * np.maximum(length.sum(axis=1), 1e-300)
     slender = SLENDER
     while True:
-        wanted = np.ceil((x * y + y * z + z * x) / (slender * np.maximum(own, 1e-300)))
+        wanted = np.ceil((x * y + y * z + z * x) / (slender * np.maximum(turns, 1e-300)))
         cuts = np.clip(np.maximum(least, wanted), 1, MOST_CUTS).astype(np.int64)
         if cuts.sum() <= MANY or (wanted <= least).all():
             return cuts

@@ -91,14 +91,14 @@ def _load(path: Path, missing: Missing, variables: dict[str, Any]) -> Scene:
 def _provenance(document: Document) -> dict[str, Any]:
     """Return the names of several scenes, and who made the file, for people."""
     scenes = document.root.children("scenes")
-    found: dict[str, Any] = {"scenes": [], "asset": {}}
+    provenance: dict[str, Any] = {"scenes": [], "asset": {}}
     with suppress(SceneError):  # texts that are none harm no picture
         if len(scenes) > 1:
-            found["scenes"] = [scene.text("name", str(i)) for i, scene in enumerate(scenes)]
+            provenance["scenes"] = [scene.text("name", str(i)) for i, scene in enumerate(scenes)]
     for key in ("generator", "copyright"):
         with suppress(SceneError):
-            found["asset"] |= {key: document.root.needed("asset").text(key)}
-    return found
+            provenance["asset"] |= {key: document.root.needed("asset").text(key)}
+    return provenance
 
 
 def read_mesh(path: Path) -> MeshFile:
@@ -156,10 +156,10 @@ def _text(value: object) -> str | None:
 
 
 def _number(
-    path: Path, given: dict[str, Any], name: str, usual: float, low: float, high: float
+    path: Path, variables: dict[str, Any], name: str, usual: float, low: float, high: float
 ) -> float:
     """A variable as a number within its limits. Raises SceneError."""
-    value = given.get(name, usual)
+    value = variables.get(name, usual)
     try:
         number = float(value)
     except (TypeError, ValueError):

@@ -94,10 +94,10 @@ def rigid(element: Element, node: Matrix) -> Matrix:
     if transforms.is_singular(node):
         raise element.error("its node's transform flattens space")
     u, _, v = np.linalg.svd(node[:3, :3])
-    made = np.eye(4)
-    made[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
-    made[:3, 3] = node[:3, 3]
-    return made
+    matrix = np.eye(4)
+    matrix[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
+    matrix[:3, 3] = node[:3, 3]
+    return matrix
 
 
 def _planes(lens: Element, needed: bool) -> dict[str, Any]:
@@ -123,8 +123,8 @@ def lumens_of(document: Document) -> float | None:
     extension, generator = document.root.extension(LIGHTS), ""
     with suppress(SceneError):
         generator = document.root.needed("asset").text("generator", "")
-    found = BLENDER.match(generator)
-    if extension is None or found is None or (int(found[1]), int(found[2])) < WITH_MODES:
+    version = BLENDER.match(generator)
+    if extension is None or version is None or (int(version[1]), int(version[2])) < WITH_MODES:
         return None
     strengths = [element.number("intensity", 1.0) for element in extension.children("lights")]
     return LUMENS if max(strengths, default=0.0) >= DIMMEST else 1.0
@@ -149,12 +149,14 @@ def lights_of(graph: Graph) -> list[Light]:
     elements = [] if extension is None else extension.children("lights")
     lights = []
     for index in graph.shown:
-        own = graph.node(index).extension(LIGHTS)
-        if own is None:
+        reference = graph.node(index).extension(LIGHTS)
+        if reference is None:
             continue
-        number = own.integer("light")
+        number = reference.integer("light")
         if number >= len(elements):
-            raise own.error(f"there is no light {number}; the file has {len(elements)}", "light")
+            raise reference.error(
+                f"there is no light {number}; the file has {len(elements)}", "light"
+            )
         lights.append(light(elements[number], graph.to_world[index]))
     return lights
 

@@ -35,10 +35,10 @@ def attributes(primitive: Element, compressed: Element) -> Geometry:
         if name not in ids:
             arrays[name] = accessors.floats(accessor, types(name))
             continue
-        found = mesh.get_attribute_by_unique_id(ids.integer(name, high=2**32 - 1))
-        if found is None:
+        decoded = mesh.get_attribute_by_unique_id(ids.integer(name, high=2**32 - 1))
+        if decoded is None:
             raise ids.error("the compressed data has no such attribute", name)
-        values = np.asarray(found["data"])
+        values = np.asarray(decoded["data"])
         columns = accessors.width(accessor, types(name))
         if values.ndim != 2 or values.shape[1] != columns:
             raise ids.error(f"holds {values.shape[1:]} numbers a vertex, not {columns}", name)
@@ -64,8 +64,8 @@ def _decoded(compressed: Element) -> Any:
         faces = _claimed_faces(data)
     except IndexError:
         raise compressed.error("its data end before the triangles") from None
-    what = f"{compressed.path} of {faces} triangles"
-    budget.check(PER_TRIANGLE * faces, what, compressed.document.file)
+    described = f"{compressed.path} of {faces} triangles"
+    budget.check(PER_TRIANGLE * faces, described, compressed.document.file)
     try:
         mesh = DracoPy.decode(data)
     except Exception as error:  # DracoPy raises its own kinds, of no common base

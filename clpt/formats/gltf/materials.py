@@ -277,8 +277,8 @@ def body(element: Element) -> Element | None:
     volume = element.extension(VOLUME)
     if volume is None or volume.number("thicknessFactor", 0.0, low=0.0) == 0.0:
         return None
-    given = {factor: element.extension(name) for name, factor in SHARES.items()}
-    shares = [e.number(factor, 0.0) for factor, e in given.items() if e is not None]
+    scattering = {factor: element.extension(name) for name, factor in SHARES.items()}
+    shares = [e.number(factor, 0.0) for factor, e in scattering.items() if e is not None]
     return volume if any(shares) else None
 
 
@@ -314,9 +314,12 @@ def medium(element: Element | None) -> Homogeneous | None:
     taken = extinction(volume)
     if not any(colour) or taken == 0.0:
         return None
-    made = Homogeneous.from_albedo(colour, 1.0, max(-STEEPEST, min(g, STEEPEST)))
+    unit_medium = Homogeneous.from_albedo(colour, 1.0, max(-STEEPEST, min(g, STEEPEST)))
     return Homogeneous(
-        name=element.text("name", ""), phase=made.phase, albedo=made.albedo, sigma_t=taken
+        name=element.text("name", ""),
+        phase=unit_medium.phase,
+        albedo=unit_medium.albedo,
+        sigma_t=taken,
     )
 
 
@@ -326,8 +329,8 @@ VARIANTS = "KHR_materials_variants"
 def variant_names(document: Document) -> list[str]:
     """Return the names of a file's variants."""
     extension = document.root.extension(VARIANTS)
-    found = [] if extension is None else extension.children("variants")
-    return [one.text("name", str(i)) for i, one in enumerate(found)]
+    variants = [] if extension is None else extension.children("variants")
+    return [variant.text("name", str(i)) for i, variant in enumerate(variants)]
 
 
 def chosen_variant(document: Document, wanted: str | None) -> int | None:

@@ -91,7 +91,7 @@ def _all(document: Document) -> dict[str, Future[images.Stored]]:
     distinct = {source.path: source for source in sources if source is not None}
     decode = budget.carried(_decoded)
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        return {path: pool.submit(decode, one) for path, one in distinct.items()}
+        return {path: pool.submit(decode, shared) for path, shared in distinct.items()}
 
 
 def _decoded(source: Element) -> images.Stored:
@@ -99,9 +99,9 @@ def _decoded(source: Element) -> images.Stored:
     inside = "uri" not in source
     data = bytes(accessors.view(source)[0]) if inside else source.document.resource(source)
     try:
-        made = images.decoded(data, FORMATS, profiled=False)
-        budget.take(made.values.nbytes, "the images", source.document.file)
-        return made
+        image = images.decoded(data, FORMATS, profiled=False)
+        budget.take(image.values.nbytes, "the images", source.document.file)
+        return image
     except SceneError as error:
         raise error if error.where else source.error(error.message) from None
     except Exception as error:  # Pillow raises its own, from struct.error to SyntaxError
@@ -120,12 +120,12 @@ def _sampling(texture: Element) -> dict[str, str]:
         if number not in WRAPS:
             raise sampler.error(f"{number} is no way to wrap", key)
         wraps[key] = WRAPS[number]
-    found: dict[str, str] = {"wrap": wraps["wrapS"]}
+    settings: dict[str, str] = {"wrap": wraps["wrapS"]}
     if wraps["wrapT"] != wraps["wrapS"]:
-        found["wrap_v"] = wraps["wrapT"]
+        settings["wrap_v"] = wraps["wrapT"]
     if sampler.integer("magFilter", 9729) == NEAREST:
-        found["filter"] = "nearest"
-    return found
+        settings["filter"] = "nearest"
+    return settings
 
 
 def _transform(element: Element) -> NDArray[np.float64]:

@@ -20,11 +20,11 @@ def find(folder: Path, name: str) -> Path | None:
     if len(name) > 1 and name[0] == name[-1] and name[0] in "\"'":
         name = name[1:-1].strip()
     for known in dict.fromkeys((name, name.replace("\\ ", " "), name.replace("\\", "/"))):
-        if known and (found := _resolved(folder, known)) is not None:
-            return input_files.named("mesh", folder, found)
+        if known and (path := _resolved(folder, known)) is not None:
+            return input_files.named("mesh", folder, path)
     last = name.replace("\\", "/").rpartition("/")[2]
-    found = _resolved(folder, last) if last else None
-    return None if found is None else input_files.named("mesh", folder, found)
+    path = _resolved(folder, last) if last else None
+    return None if path is None else input_files.named("mesh", folder, path)
 
 
 def _resolved(folder: Path, name: str) -> Path | None:

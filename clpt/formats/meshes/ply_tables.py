@@ -72,11 +72,11 @@ def read_tables(data: bytes) -> tuple[Header, Columns]:
 
 
 def _header(data: bytes) -> Header:
-    found = HEADER.match(data[:LONGEST_HEADER])
-    if found is None:
+    header = HEADER.match(data[:LONGEST_HEADER])
+    if header is None:
         raise SceneError("it has no header")
     order, elements, textures = None, [], []
-    for number, line in enumerate(data[: found.start("end")].splitlines()[1:], 2):
+    for number, line in enumerate(data[: header.start("end")].splitlines()[1:], 2):
         words = text.decode(line).split()
         match words:
             case ["format", name, _] if name in FORMATS:
@@ -100,7 +100,7 @@ def _header(data: bytes) -> Header:
         names = [column.name for column in element.properties]
         if len(set(names)) < len(names) or (element.count and not names):
             raise SceneError(f"its element {element.name[:40]!r} has no columns, or one twice")
-    return Header(order, elements, textures, found.end())
+    return Header(order, elements, textures, header.end())
 
 
 def _whole(name: str) -> bool:
@@ -228,7 +228,7 @@ def _gathered(
     """Return the columns of rows that have been walked over; at: where each row begins."""
     raw = np.frombuffer(data, np.uint8)
     lists = iter(rows.lists)
-    made: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
     for column in element.properties:
         dtype = np.dtype(order + column.type)
         size = dtype.itemsize
@@ -237,12 +237,12 @@ def _gathered(
             first, counts = np.array(places, np.int64), np.array(lengths, np.int64)
             total, starts = int(counts.sum()), np.cumsum(counts) - counts
             own = np.repeat(first - size * starts, counts) + size * np.arange(total)
-            made[column.name] = counts, _at(raw, own, dtype)
+            columns[column.name] = counts, _at(raw, own, dtype)
             at = first + size * counts
         else:
-            made[column.name] = _at(raw, at, dtype)
+            columns[column.name] = _at(raw, at, dtype)
             at = at + size
-    return made
+    return columns
 
 
 def _at(raw: NDArray[np.uint8], places: NDArray[np.int64], dtype: np.dtype[Any]) -> NDArray[Any]:
@@ -282,8 +282,8 @@ def _told_words(lines: list[bytes], elements: list[Element]) -> NDArray[np.float
     for element in elements:
         row = dataclasses.replace(element, count=1)
         for line in lines[at : at + element.count]:
-            own = np.array(line.split(), np.float64)
-            words.append(own[: _ascii_rows(own, row)[1]])
+            numbers = np.array(line.split(), np.float64)
+            words.append(numbers[: _ascii_rows(numbers, row)[1]])
         at += element.count
     return np.concatenate([*words, np.zeros(0)])
 
@@ -322,13 +322,13 @@ def _empty(element: Element) -> dict[str, Any]:
 
 def _joined(element: Element, rows: dict[str, Any]) -> dict[str, Any]:
     """Columns of lengths and values, row by row, as `_binary` has them."""
-    made: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
     for column in element.properties:
         lengths, values = rows[column.name]
         joined = np.concatenate(values or [np.zeros(0)])
         whole = (np.array(lengths, np.int64), joined)
-        made[column.name] = whole if column.length else _typed(joined, column)
-    return made
+        columns[column.name] = whole if column.length else _typed(joined, column)
+    return columns
 
 
 def _typed(values: NDArray[Any], column: Property) -> NDArray[Any]:

@@ -139,7 +139,7 @@ def _scene(path: Path, document: Document, context: Context) -> Scene:
 
 
 def _lights(props: Properties, context: Context) -> list[Light]:
-    lamps = [attempt(partial(emitter, one, context), None) for one in props.objects("emitter")]
+    lamps = [attempt(partial(emitter, e, context), None) for e in props.objects("emitter")]
     return [lamp for lamp in lamps if lamp is not None]
 
 

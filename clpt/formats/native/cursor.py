@@ -71,13 +71,13 @@ class Cursor(Located):
             if key not in self.value:
                 raise self.error(f"needs the parameter {key!r}")
 
-    def expect(self, kind: type, what: str = "") -> Any:
+    def expect(self, kind: type, expected: str = "") -> Any:
         """Return the value, which must be of a type."""
         if isinstance(self.value, DuplicateKey):
             raise self.error(f"the key {self.value.key!r} is given twice")
         if not isinstance(self.value, kind):
-            found = NAMES.get(type(self.value), "something else")
-            raise self.error(f"must be {what or NAMES[kind]}, not {found}")
+            actual = NAMES.get(type(self.value), "something else")
+            raise self.error(f"must be {expected or NAMES[kind]}, not {actual}")
         return self.value
 
     def at(self, key: str | int) -> Cursor:

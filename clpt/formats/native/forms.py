@@ -108,8 +108,8 @@ def write(value: object, param: Param, writer: Writer) -> Any:
 def schema(param: Param) -> Schema:
     """Return the JSON Schema of a parameter's values."""
     form = form_of(param).schema
-    made = form(param) if callable(form) else form
-    return {"anyOf": [made, ref("texture")]} if param.textured else made
+    form_schema = form(param) if callable(form) else form
+    return {"anyOf": [form_schema, ref("texture")]} if param.textured else form_schema
 
 
 def words(param: Param) -> str:
@@ -158,10 +158,12 @@ def array(cursor: Cursor, width: int, dtype: type) -> np.ndarray | None:
     """Return rows of numbers (n, width), or None for null."""
     if cursor.value is None:
         return None
-    given = cursor.expect(list)
+    entries = cursor.expect(list)
     try:
-        values = np.asarray(given, np.float64).reshape(-1, width)
-        valid = len(values) == len(given) and not any(isinstance(v, (int, float)) for v in given)
+        values = np.asarray(entries, np.float64).reshape(-1, width)
+        valid = len(values) == len(entries) and not any(
+            isinstance(v, (int, float)) for v in entries
+        )
     except (ValueError, TypeError, OverflowError):
         valid = False
     if not valid:
@@ -196,8 +198,8 @@ def _numbers(cursor: Cursor) -> tuple[float, ...]:
 
 
 def _angular(cursor: Cursor) -> Any:
-    given = cursor.expect(list)
-    rows = any(isinstance(entry, list) for entry in given)
+    entries = cursor.expect(list)
+    rows = any(isinstance(entry, list) for entry in entries)
     return [row.numbers() for row in cursor.entries()] if rows else cursor.numbers()
 
 

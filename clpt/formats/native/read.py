@@ -177,15 +177,15 @@ class _Reader:
         cls = kinds("light")[kind_name(cursor, "light", kinds("light"))]
         if cls in shape_files.FILES and "file" in cursor.value:
             shape_files.check_only_in_file(cursor, cls)
-            made, file = self.object_of(cursor, cls, ("type", "file")), cursor.at("file")
+            light, file = self.object_of(cursor, cls, ("type", "file")), cursor.at("file")
             path, known = find_file(file), shape_files.FILES[cls]
             with file.locating():
                 values = known.read(path) if known.read else {}
                 if self.version == 1:
-                    return dataclasses.replace(made, **{**values, "candela": None})
+                    return dataclasses.replace(light, **{**values, "candela": None})
                 if self.version is None and CANDELA not in self.warnings:
                     self.warnings.append(CANDELA)
-                return known.join(made, values)
+                return known.join(light, values)
         return self.kind(cursor, "light")
 
     def area_light(self, cursor: Cursor) -> Any:
@@ -229,8 +229,8 @@ class _Reader:
         if name not in known:
             cursor = self._entry(table, f"{family} name", name, referrer)
             known[name] = None
-            made = self.kind(cursor, family)
-            known[name] = made if "name" in cursor.value else dataclasses.replace(made, name=name)
+            kind = self.kind(cursor, family)
+            known[name] = kind if "name" in cursor.value else dataclasses.replace(kind, name=name)
         if known[name] is None:
             raise referrer.error(f"the {family} {name!r} refers to itself")
         return known[name]
@@ -254,12 +254,12 @@ class _Reader:
             raise referrer.error(f"the group {name!r} contains itself")
         return group
 
-    def _entry(self, table: str, what: str, name: str, referrer: Cursor) -> Cursor:
+    def _entry(self, table: str, noun: str, name: str, referrer: Cursor) -> Cursor:
         """Return the entry of a table of the scene. Raises UnknownKindError."""
         entries = self.root.value.get(table, {})
         known = entries if isinstance(entries, dict) else ()
         if name not in known:
-            raise UnknownKindError(what, name, known, **referrer.location())
+            raise UnknownKindError(noun, name, known, **referrer.location())
         return self.root.at(table).at(name)
 
     def shape(self, cursor: Cursor) -> list[shapes.Shape]:

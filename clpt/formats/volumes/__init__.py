@@ -33,9 +33,9 @@ def read(path: str | Path, grid: str = "") -> Volume:
         message = f"unknown format {path.suffix!r} of a density; known: {' '.join(READERS)}"
         raise SceneError(message, file=path)
     with _reading(path):
-        made = reader(path, grid)
-        check_density(made.values, "")
-    return made
+        volume = reader(path, grid)
+        check_density(volume.values, "")
+    return volume
 
 
 def names(path: str | Path) -> tuple[str, ...]:

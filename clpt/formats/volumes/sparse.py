@@ -41,10 +41,10 @@ def blosc_unpacker() -> Callable[[bytes | memoryview, int], bytes]:
         if size > most or held > len(packed):
             raise SceneError("is damaged: a packed part is larger than the grid")
         try:
-            made: bytes = blosc.decompress(bytes(packed))
+            unpacked_bytes: bytes = blosc.decompress(bytes(packed))
         except Exception as error:  # the package has a class of its own
             raise SceneError(f"is damaged: {error}") from None
-        return made
+        return unpacked_bytes
 
     return unpacked
 
