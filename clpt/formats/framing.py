@@ -37,7 +37,7 @@ def show(
     own_lights: Sequence[lights.Light] = (),
     up: Up = "y",
 ) -> Scene:
-    """Return a scene of the shapes of a file; see `Scene.studio` for what is missing."""
+    """Return a scene of the shapes of a file; `Scene.studio` adds missing cameras and lights."""
     try:
         scene = Scene.studio(contents, camera=camera, lights=own_lights, up=up, name=file.stem)
     except SceneError as error:
@@ -54,8 +54,8 @@ TO_BOX = transforms.translate([0.5, 0.5, 0.5]) @ transforms.scale(0.5)  # from a
 def load_density(path: Path) -> Scene:
     """Read a bare density and put it into the studio, whatever its size, position and density.
 
-    What a density means differs from program to program, so it is scaled to be as thick as DEPTH.
-    Raises SceneError for what is no density, and for one that is 0 everywhere.
+    Programs give densities different units, so it is scaled to be as thick as DEPTH.
+    Raises SceneError for a file without a density, and for a density that is 0 everywhere.
     """
     density = volumes.read(path)
     to_world = np.asarray(density.to_world, float)

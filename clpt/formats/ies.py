@@ -21,9 +21,9 @@ from clpt.scene.textures import Bitmap
 ROWS, COLUMNS = 360, 720  # of the image: half degrees
 MOST_VALUES = 1 << 22
 AROUND = ((0, 90), (0, 180), (0, 360), (90, 270))
-NEW = ("IESNA:", "IES:")  # begin files of 1995 and later; IESNA91 or nothing begins older ones
+NEW = ("IESNA:", "IES:")  # begin files of 1995 and later; IESNA91 or nothing begins older files
 TYPES = {2: "B", 3: "A"}  # of photometry, about axes that lie; 1 is C, about the vertical
-# keys of what follows TILT, in their order
+# names of the numbers after TILT, in their order
 HEADER = (
     "lamps", "lumens", "multiplier", "vertical", "horizontal", "photometry", "units", "width",
     "length", "height", "ballast", "ballast_lamp", "watts",
@@ -67,7 +67,7 @@ class Photometry:
 
 
 def read(path: Path) -> Photometry:
-    """Read an IES file. Raises SceneError with the line of what is broken or not supported."""
+    """Read an IES file. Raises SceneError with the line that is broken or not supported."""
     return _Reader(path).photometry()
 
 
@@ -162,8 +162,8 @@ class _Reader:
         """Return horizontal angles and candela (h, v) that go around wholly, or cover a half or a
         quarter.
 
-        Some files leave out 360, which repeats 0: even steps, of which one more ends there, say so.
-        Raises SceneError.
+        Some files leave out 360, which repeats 0: their even steps would end there with another
+        step. Raises SceneError.
         """
         if len(angles) == 1:
             return angles, candela

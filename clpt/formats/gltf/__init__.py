@@ -41,15 +41,15 @@ __all__ = ["load", "read_mesh"]
 
 
 def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
-    """Read a glTF file; a camera or light that it lacks is added, as for a bare mesh.
+    """Read a glTF file; a missing camera or light is added, as for a bare mesh.
 
     variables: `time` [s] of an animation (the first, or the `animation` of that number or name);
     without it nodes have their own transforms, and materials, lights and cameras their own numbers.
     `camera` and `scene` choose by number or name.
     `shutter` [s] is how long light comes to the film from `time` on, while nodes move.
     `variant` chooses among material variants. `lumens`: of a watt, see cameras_lights.py.
-    `multiple_scattering`: 1 keeps what facets reflect to each other.
-    missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
+    `multiple_scattering`: 1 keeps the light that facets reflect to each other.
+    missing: see clpt.load. Raises SceneError with the JSON path of the wrong value.
     """
     if "shutter" in variables:
         length = _seconds(path, variables.pop("shutter"), "shutter")

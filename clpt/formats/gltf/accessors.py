@@ -58,7 +58,7 @@ def width(accessor: Element, types: tuple[str, ...]) -> int:
 
 
 def stored(accessor: Element, types: tuple[str, ...]) -> NDArray[Any]:
-    """Return an accessor's values (n, width) as they are stored, with the sparse ones."""
+    """Return an accessor's values (n, width) as they are stored, with sparse substitutions."""
     width(accessor, types)
     form = _form(accessor)
     described = f"{accessor.path} of {form.count} elements"
@@ -73,7 +73,7 @@ def stored(accessor: Element, types: tuple[str, ...]) -> NDArray[Any]:
 
 
 def check(accessor: Element) -> None:
-    """Raise SceneError for an invalid accessor, or one that exceeds its buffer view."""
+    """Raise SceneError for an accessor that is invalid or exceeds its buffer view."""
     form = _form(accessor)
     sparse = accessor.child("sparse")
     if sparse is not None:

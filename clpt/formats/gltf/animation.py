@@ -35,8 +35,8 @@ INTERPOLATIONS = ("LINEAR", "STEP", "CUBICSPLINE")
 def pose(document: Document, chosen: str | None, time: float) -> dict[tuple[int, str], Floats]:
     """Return the values by (node, "rotation" or the like) that an animation sets at a time [s].
 
-    chosen: its number or name; the first one if None. What pointers point to elsewhere is written
-    into the document. Raises SceneError if there is no such animation.
+    chosen: its number or name; None: the first animation. Values that pointers set elsewhere are
+    written into the document. Raises SceneError if there is no such animation.
     """
     pose_values: dict[tuple[int, str], Floats] = {}
     for channel in _chosen(document, chosen).children("channels"):
@@ -67,7 +67,7 @@ def descriptions(document: Document) -> list[str]:
 def _length(animation: Element) -> str:
     """Return how long an animation takes, for people; nothing where the file does not say."""
     ends: list[float] = []
-    with suppress(SceneError):  # one that is broken is told when it is chosen
+    with suppress(SceneError):  # a broken animation is reported when it is chosen
         for sampler in animation.children("samplers"):
             times = sampler.entry("input", "accessors")
             ends += () if times is None else times.numbers("max", None, ())
@@ -148,8 +148,8 @@ def _values(sampler: Element, key: str, types: tuple[str, ...]) -> Floats:
     return floats(accessor, types).astype(np.float64)
 
 
-KEYS = 9  # in the time for which the shutter is open
-NEAR = 1e-3  # of a mesh's size, by which a vertex may be off its way between keys
+KEYS = 9  # while the shutter is open
+NEAR = 1e-3  # largest distance of a vertex from its path between keys, over the mesh's size
 
 
 def scene_over_shutter(load: Callable[[float], Scene], time: float, length: float) -> Scene:
@@ -262,7 +262,7 @@ def _moving(ways: Sequence[Any], times: Matrix, warnings: list[str], where: str)
 POINTER = "KHR_animation_pointer"
 OF_NODES = ("translation", "rotation", "scale", "weights")
 TABLES = ("materials", "cameras", "meshes", "extensions")  # whose numbers may change
-LISTS = ("weights",)  # of which even a single number is a list
+LISTS = ("weights",)  # even a single number of them is a list
 
 
 def parts(channel: Element) -> list[str]:
@@ -284,10 +284,10 @@ def node_path(names: list[str]) -> tuple[int, str] | None:
 
 
 def put(root: Element, names: list[str], values: NDArray[np.float64]) -> bool:
-    """Write values where a pointer points to; return whether there is such a place.
+    """Write values where a pointer points to; return False if the document has no such member.
 
-    Objects on the way that the file leaves out, as their numbers are the usual ones, are added. A
-    texture that the file leaves out is not, as it needs an image.
+    Omitted objects on the path are added, as their numbers have defaults. An omitted texture is
+    not, as it needs an image.
     """
     if names[0] not in TABLES or len(names) < 3 or (names[0] == "meshes" and names[2:] != [*LISTS]):
         return False

@@ -94,7 +94,7 @@ def _claimed_faces(data: bytes) -> int:
 
 
 class _Stream:
-    """Reads a header's bytes one after the other; beyond the end is an IndexError."""
+    """Reads a header's bytes in order; beyond the end is an IndexError."""
 
     def __init__(self, data: bytes, at: int):
         self.data, self.at = data, at
@@ -119,7 +119,7 @@ class _Stream:
         if depth > DEEPEST:
             raise IndexError
         for _ in range(self.number()):
-            for length in (self.byte, self.number):  # of a name, and of what it names
+            for length in (self.byte, self.number):  # of a name, and of its value
                 size = length()
                 self.at += size
         for _ in range(self.number()):

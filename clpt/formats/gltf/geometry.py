@@ -13,7 +13,7 @@ from clpt.files import budget
 from clpt.formats.gltf.accessors import floats, normalised
 from clpt.formats.gltf.document import Element
 
-TYPES = {  # of the accessors of an attribute, by what its name begins with
+TYPES = {  # of the accessors of an attribute, by the first part of its name
     "POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TANGENT": ("VEC4",), "TEXCOORD": ("VEC2",),
     "COLOR": ("VEC3", "VEC4"), "JOINTS": ("VEC4",), "WEIGHTS": ("VEC4",),
 }  # fmt: skip

@@ -124,7 +124,7 @@ class Surface:
 
 @dataclass
 class Posed:
-    """A mesh's primitives in one pose, and each node that shows them, with its transform."""
+    """A mesh's primitives in a pose, and each node that shows them, with its transform."""
 
     parts: list[Mesh]
     copies: list[tuple[Element, Matrix]] = field(default_factory=list)

@@ -94,7 +94,7 @@ class _Triangles:
         return corners
 
     def three(self, code: int) -> tuple[int, int, int]:
-        """Return a triangle that shares no edge with those before."""
+        """Return a triangle that shares no edge with earlier triangles."""
         known = len(self.vertices)  # those that this triangle adds cannot be meant
         if code < 0xFE:
             pair = self.table[code & 15]
@@ -109,7 +109,7 @@ class _Triangles:
         return a, b, c
 
     def corner(self, number: int, known: int) -> int:
-        """Return a vertex: a new one, one spelled out, or one of the `known` first."""
+        """Return a vertex: a new vertex, an explicit vertex, or a vertex of the `known` first."""
         if number == 0:
             return self.fresh()
         if number == 15:
@@ -126,7 +126,7 @@ class _Triangles:
         return value
 
     def explicit(self, push: bool = False) -> int:
-        """Return an index given by its difference from the last such one."""
+        """Return an index that is stored as its difference from the last explicit index."""
         value = shift = 0
         for _ in range(5):
             byte = self.byte()
@@ -316,7 +316,7 @@ def _groups(
 
 
 def _sentinels(stream: Bytes, bits: int) -> list[int]:
-    """Count the deltas before each byte, `bits` wide, whose bits are all one."""
+    """Count the deltas before each byte, `bits` wide, whose bits are all 1."""
     values = np.arange(256)
     per_byte = sum(
         (values >> shift & (1 << bits) - 1) == (1 << bits) - 1 for shift in range(0, 8, bits)

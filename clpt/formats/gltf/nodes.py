@@ -34,7 +34,7 @@ class Graph:
 
 
 def graph(document: Document, chosen: str | None, pose: Pose) -> Graph:
-    """Return the nodes of the chosen scene, or of the default one; `pose` overrides transforms.
+    """Return the nodes of the chosen or default scene; `pose` overrides transforms.
 
     Without any scene all nodes are shown. Raises SceneError for a node that has two parents or is
     its own ancestor, and for an invalid transform.

@@ -17,10 +17,10 @@ DENSE = 8  # numbers between a mesh's first and last vertex, per corner, that a 
 
 @dataclass
 class Part:
-    """The triangles of one material: its number, -1 for none; faces (m, 3) name the vertices.
+    """The triangles of a material: its number, -1 for none; faces (m, 3) name the vertices.
 
-    vertices, colours (n, 3), normals (n, 3) and uvs (n, 2), the last three None where the file has
-    none. bare: how many triangles have no uvs where others have some; their uvs are 0.
+    vertices, colours (n, 3), normals (n, 3) and uvs (n, 2); the last three are None if the file has
+    none. bare: number of triangles without uvs beside others with uvs; their uvs are 0.
     """
 
     material: int
@@ -33,7 +33,7 @@ class Part:
 
 
 def parts(contents: Contents, *, whole: bool = False) -> Iterator[Part]:
-    """Yield the triangles of each material; whole: all of them as one, smoothing groups ignored."""
+    """Yield the triangles of each material; whole: yield all together, without smoothing groups."""
     triangles, polygon = triangulate(contents.vertices, contents.counts, contents.corners[:, 0])
     if not len(triangles):
         return
@@ -114,7 +114,7 @@ def _unique(corners: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.i
         vertex = np.unique(vertex, return_inverse=True)[1].reshape(-1)
     else:
         vertex -= low
-    # Most vertices have one uv and one normal: a table finds them without sorting.
+    # Most vertices have a single uv and normal: a table finds them without sorting.
     table = np.full(int(vertex.max()) + 1, -1, np.int64)
     table[vertex] = np.arange(len(vertex))
     like = table[vertex]

@@ -39,7 +39,7 @@ GREY = TwoSided(front=Diffuse(reflectance=0.6, name="grey"))
 
 @dataclass
 class MeshFile:
-    """The meshes of a file, and warnings of what was left out."""
+    """The meshes of a file, and warnings of omissions."""
 
     meshes: list[Mesh]
     warnings: list[str] = field(default_factory=list)
@@ -69,7 +69,7 @@ def read_mesh(path: Path, *, materials: bool = True, missing: Missing = "error")
 
 
 def join(meshes: list[Mesh]) -> Mesh:
-    """Return one mesh that holds all triangles, in world space, with the first one's material."""
+    """Return a mesh of all triangles, in world space, with the material of the first mesh."""
     first = meshes[0]
     if len(meshes) == 1 and np.array_equal(np.asarray(first.to_world), np.eye(4)):
         return first
@@ -95,7 +95,7 @@ def join(meshes: list[Mesh]) -> Mesh:
 
 
 def has_area(mesh: Mesh) -> bool:
-    """Return whether one of a mesh's triangles has an area."""
+    """Return whether any triangle of a mesh has an area."""
     for first in range(0, len(mesh.faces), CHUNK):
         corners = mesh.vertices[mesh.faces[first : first + CHUNK]].astype(np.float64)
         if np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any():
@@ -107,7 +107,8 @@ def has_area(mesh: Mesh) -> bool:
 class Arrays:
     """The arrays of a mesh in a file: vertices (n, 3), faces (m, 3), normals (n, 3), uvs (n, 2).
 
-    attributes: further ones (n, width), one row a vertex, or a face where face_ begins the name.
+    attributes: further arrays (n, width) with a row for each vertex, or face if face_ begins the
+    name.
     """
 
     vertices: NDArray[Any]
@@ -219,7 +220,7 @@ def _pictured(path: Path, image: str, otherwise: Material, warnings: list[str]) 
 
 
 def _obj(path: Path, library: mtl.Library | None, warnings: list[str]) -> list[Mesh]:
-    """Read an OBJ file: a mesh for each material, or all in one where there is no library."""
+    """Read an OBJ file: a mesh for each material, or a single mesh without a library."""
     contents = obj.read(path)
     if library is not None:
         for names in contents.libraries:
@@ -266,14 +267,14 @@ def _some(names: list[str]) -> str:
 
 
 def _is_image(texture: Texture) -> bool:
-    """Return whether a texture is one of a file."""
+    """Return whether a texture is an image file."""
     return isinstance(texture, Bitmap) and isinstance(texture.image, Path)
 
 
 def _vertex_colours(
     colours: NDArray[np.float32] | None, scale: float, warnings: list[str]
 ) -> dict[str, NDArray[np.float32]]:
-    """Return sRGB colours of vertices up to `scale` as an attribute, linear; none where no one."""
+    """Return sRGB colours of vertices up to `scale` as a linear attribute, if there are any."""
     if colours is None or np.isnan(colours).all():
         return {}
     if np.isnan(colours).any():
@@ -288,7 +289,7 @@ def _usable_normals(
     """Return unit normals; those of adjacent faces where the file's are zero or not finite."""
     length = np.linalg.norm(normals.astype(np.float64), axis=1, keepdims=True)
     bad = ~(np.isfinite(length) & (length > 0.0))[:, 0]
-    # What is of length one stays as it is to the last bit, so that a saved mesh is read unchanged.
+    # Unit normals stay as they are to the last bit, so that a saved mesh is read unchanged.
     exact = np.abs(length - 1.0) < 1e-6
     with np.errstate(divide="ignore", invalid="ignore"):
         unit = np.where(exact, normals, normals / length)

@@ -52,7 +52,7 @@ OPTIONS = {  # how many words follow
     "-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-bm": 1, "-boost": 1, "-texres": 1,
     **dict.fromkeys(WORDS, 1),
 }  # fmt: skip
-WHOLE = {"-s": WHITE, "-o": BLACK, "-t": BLACK}  # of which the last numbers may be left out
+WHOLE = {"-s": WHITE, "-o": BLACK, "-t": BLACK}  # defaults of their last numbers
 UNUSED = {  # options that are left out, and their values that ask for nothing
     "-t": (BLACK,), "-boost": ((0.0,),), "-cc": ("off",), "-type": (), "-imfchan": (*CHANNELS,),
 }  # fmt: skip
@@ -133,7 +133,7 @@ class Library:
     folder: Path
     missing: Missing = "error"
     statements: dict[str, Statements] = field(default_factory=dict)
-    short: dict[str, str] = field(default_factory=dict)  # names without comments -> whole ones
+    short: dict[str, str] = field(default_factory=dict)  # names without comments -> whole names
     absent: list[str] = field(default_factory=list)
     left_out: dict[str, None] = field(default_factory=dict)
     remarks: dict[str, list[str]] = field(default_factory=dict)  # to the materials' names
@@ -187,7 +187,7 @@ class Library:
 
 @dataclass
 class _Maker:
-    """Makes one material of its statements."""
+    """Makes a material of its statements."""
 
     library: Library
     name: str
@@ -374,7 +374,7 @@ class _Maker:
                 words = words[1:]
             value = statement_d.numbers(words)[0]
         elif (through := self.number("tr", None)) is not None:
-            if through >= 1.0:  # MeshLab and others write it of what is opaque
+            if through >= 1.0:  # MeshLab and others write it for opaque materials
                 self.remark("Tr 1 without d is taken as opaque")
             value = 1.0 - through if through < 1.0 else 1.0
         value = min(max(value, 0.0), 1.0)
@@ -499,9 +499,9 @@ class _Maker:
     def bitmap(
         self, statement: Statement, *, raw: bool = False, even: bool = False
     ) -> tuple[Bitmap, Options]:
-        """Return the image of a statement and its options; grey where missing ones are grey.
+        """Return the image of a statement and its options; grey if missing images are grey.
 
-        even: grey is a normal map that bends nothing.
+        even: the stand-in is a flat normal map.
         """
         name, options = _options(statement, statement.rest)
         path = self.find(statement, name)

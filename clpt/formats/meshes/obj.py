@@ -110,10 +110,10 @@ class _Reader:
     def __post_init__(self) -> None:
         if b"\r" in self.data:
             self.data = self.data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-        # Each line has a newline on both sides, even if the last one is continued.
+        # Each line has a newline on both sides, even if the last line is continued.
         self.data = b"".join((b"\n", self.data, b"\n\n")).translate(BLANKS)
         self.lines = self.data
-        if b"\\\n" in self.data:  # the same length: a place in the one is that in the other
+        if b"\\\n" in self.data:  # the same length: positions agree
             self.data = CONTINUED.sub(_joined, self.data)
 
     def read(self) -> None:
@@ -203,7 +203,7 @@ class _Reader:
         self.now = {name: labels[-1] for name, (_, labels) in changes.items()}
 
     def numbers(self, at: int, kind: int, plain: Bytes, lines: _Lines) -> None:
-        """Read the lines of one kind of numbers."""
+        """Read the lines of a kind of numbers."""
         rows = np.flatnonzero(lines.kind == kind)
         if not len(rows):
             return
@@ -221,7 +221,7 @@ class _Reader:
     def each_number(
         self, at: int, kind: int, plain: Bytes, lines: _Lines, rows: Integers
     ) -> Floats32:
-        """Return the numbers of lines, read one by one. Raises SceneError for the first bad one."""
+        """Return the numbers of lines, read singly. Raises SceneError for the first bad number."""
         values: list[float] = []
         for start, stop in zip(lines.start[rows].tolist(), lines.stop[rows].tolist(), strict=True):
             line = plain[start:stop].tobytes()
@@ -291,10 +291,10 @@ class _Reader:
         raise AssertionError("every corner is right")
 
     def names(self, piece: Bytes, lines: _Lines) -> dict[str, tuple[list[int], list[int]]]:
-        """Read the other lines of a piece.
+        """Read the lines of a piece that are neither numbers nor faces.
 
-        Return the lines at which materials and smoothing groups change, and what holds before the
-        first and after each.
+        Return the lines of changes of materials and smoothing groups, and the labels before the
+        first change and after each change.
         """
         changes: dict[str, tuple[list[int], list[int]]]
         changes = {name: ([], [label]) for name, label in self.now.items()}
@@ -322,7 +322,7 @@ class _Reader:
 
 
 def _joined(match: re.Match[bytes]) -> bytes:
-    """Return blanks for what continues a line, and a comment as it is."""
+    """Return blanks for the continuation of a line, and a comment as it is."""
     return b"  " if match[0].startswith(b"\\") else match[0]
 
 

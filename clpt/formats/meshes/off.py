@@ -62,7 +62,7 @@ class _Numbers:
         return int(value)
 
     def rest(self) -> int:
-        """Return how many numbers are left on the line of the last one taken."""
+        """Return how many numbers are left on the line of the last number taken."""
         return int(self.ends[np.searchsorted(self.ends, self.at)]) - self.at
 
     def width(self) -> int:
@@ -131,7 +131,7 @@ def _vertices(
 
 
 def _lines(numbers: _Numbers, count: int) -> Integers:
-    """Return where the next lines begin, and the last one ends; fewer where the file ends."""
+    """Return where the next lines begin, and the last line ends; fewer at the end of the file."""
     line = int(np.searchsorted(numbers.ends, numbers.at, "right"))
     return np.r_[numbers.at, numbers.ends[line : line + count]]
 

@@ -27,11 +27,11 @@ ELEMENTS = ("vertex", "face", "tristrips")
 RESTART = -1  # between the strips of a list
 LEFT_OUT = ("material_index", "ambient_red", "specular_red", "specular_power")
 PER_BYTE = 8  # bytes of memory for each of the file, while it is read
-MOST_CORNERS = 1 << 16  # of one polygon
+MOST_CORNERS = 1 << 16  # of a polygon
 
 
 def read(path: Path) -> Triangles:
-    """Read a file. Raises SceneError for one that is broken, or has no vertices or faces."""
+    """Read a file. Raises SceneError if it is broken, or has no vertices or faces."""
     data = text.plain(read_bytes(path))
     budget.check(PER_BYTE * len(data), "its tables", path)
     try:
@@ -91,7 +91,7 @@ def _corners(face: dict[str, Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]
 
 
 def _strips(table: dict[str, Any]) -> NDArray[np.int64]:
-    """Return the triangles (m, 3) of lists of strips: each vertex makes one with the two before it.
+    """Return the triangles (m, 3) of lists of strips: of each vertex with the two before it.
 
     -1 begins another strip; triangles that name a vertex twice only join two parts.
     """
@@ -144,7 +144,7 @@ def _with_corner_uvs(
 
 
 def _left_out(tables: Columns) -> list[str]:
-    """Return warnings of what a file has that would be seen, and that is not read."""
+    """Return warnings of a file's visible properties that are not read."""
     messages = [f"element {name[:40]!r} left out" for name in tables if name not in ELEMENTS]
     for element in ("vertex", "face"):
         columns = _plain(tables.get(element, {}))

@@ -1,6 +1,6 @@
 """Tables of PLY files (Turk 1994): ascii and binary of both byte orders.
 
-Rows of the same length are read in one go. A table is {column: values}; a list column is a pair of
+Rows of equal length are read at once. A table is {column: values}; a list column is a pair of
 lengths, and all values in a row.
 """
 
@@ -30,7 +30,7 @@ HEADER = re.compile(
     re.DOTALL,
 )
 LONGEST_HEADER = 1 << 16
-EVEN = 1 << 12  # values of a list whose rows are read in one go
+EVEN = 1 << 12  # values of a list whose rows are read at once
 
 
 @dataclass
@@ -104,7 +104,7 @@ def _header(data: bytes) -> Header:
 
 
 def _whole(name: str) -> bool:
-    """Return whether a type is one of whole numbers."""
+    """Return whether a type is a whole number."""
     return TYPES.get(name, "f")[0] != "f"
 
 
@@ -158,7 +158,7 @@ def _even_rows(
 
 
 def _number(data: bytes, at: int, dtype: str, size: int) -> int:
-    """Return how many values a list has; size: bytes of one, all of which must be in the file."""
+    """Return how many values a list has, all within the file; size: bytes of each value."""
     first = at + np.dtype(dtype).itemsize
     if first > len(data):
         raise SceneError("it ends too early")
@@ -168,7 +168,7 @@ def _number(data: bytes, at: int, dtype: str, size: int) -> int:
 
 
 def _check_length(count: int, size: int, left: int) -> None:
-    """Raise SceneError for a list that is longer than what is left of the file [bytes]."""
+    """Raise SceneError for a list that is longer than the rest of the file [bytes]."""
     if count < 0:
         raise SceneError(f"a list has {count} values")
     if count * size > left:
@@ -236,8 +236,8 @@ def _gathered(
             *_, places, lengths = next(lists)
             first, counts = np.array(places, np.int64), np.array(lengths, np.int64)
             total, starts = int(counts.sum()), np.cumsum(counts) - counts
-            own = np.repeat(first - size * starts, counts) + size * np.arange(total)
-            columns[column.name] = counts, _at(raw, own, dtype)
+            positions = np.repeat(first - size * starts, counts) + size * np.arange(total)
+            columns[column.name] = counts, _at(raw, positions, dtype)
             at = first + size * counts
         else:
             columns[column.name] = _at(raw, at, dtype)

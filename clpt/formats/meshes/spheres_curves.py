@@ -42,7 +42,7 @@ PER_BYTE = 64  # bytes of memory for each of the file, while it is read
 def read_strands(path: Path) -> dict[str, Any]:
     """Return `points` (n, 4) float32 and `lengths` (k,) int64, as `Curves` takes them.
 
-    Raises SceneError with the line for what is no row of four numbers, and for an empty file.
+    Raises SceneError with the line that is not four numbers, and for an empty file.
     """
     data = text.plain(input_files.read_bytes(path))
     budget.check(PER_BYTE * len(data), "its points", path)

@@ -21,7 +21,7 @@ from clpt.geometry.polygons import triangulate
 HEAD = 84  # bytes of a binary file before its triangles: a comment, and their number
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 CHUNK = 1 << 24  # bytes of a text whose words are told apart at a time
-BEGINNING = 1 << 12  # bytes in which a text has its first words
+BEGINNING = 1 << 12  # bytes that hold the first words of a text
 WORDS = re.compile(rb"\b(solid|facet)\b", re.IGNORECASE)
 # "solid", or "endsolid", and a name up to the end of the line or the first facet; in lower case.
 SOLID = re.compile(rb"solid(?:(?<!\Ssolid)|(?<=endsolid))\b((?:(?!\bfacet[ \t]+normal\b)[^\n])*)")
@@ -37,7 +37,7 @@ OWN, RED, GREEN, BLUE = 1 << 15, 10, 5, 0  # of an attribute: a flag, and shifts
 
 
 def read(path: Path) -> list[Triangles]:
-    """Read the solids of a file. Raises SceneError with the line of what is broken."""
+    """Read the solids of a file. Raises SceneError with the broken line."""
     data = read_bytes(path)
     budget.check(PER_BYTE * len(data), "its triangles", path)
     try:
@@ -134,7 +134,7 @@ def _facets(data: bytes) -> NDArray[np.float64] | None:
 
 
 def _loops(data: bytes, line: int) -> Triangles:
-    """As `_facets`, line by line; loops may have more corners than 3. line: the first one's number.
+    """As `_facets`, line by line; loops may have more than 3 corners. line: number of the first.
 
     Raises SceneError with the line.
     """

@@ -73,10 +73,10 @@ def attributes(triangles: Triangles) -> dict[str, NDArray[np.float32]]:
 
 
 def linear(colours: NDArray[Any]) -> NDArray[np.float32]:
-    """Return colours as they are stored as linear ones: floats are linear already.
+    """Return stored colours as linear colours: floats are linear already.
 
-    Whole numbers are shares of 255 if their type or their values are those of a byte, else of 65535
-    or of their type's largest number.
+    Whole numbers are shares of 255 if their type or their values fit a byte, else of 65535 or of
+    their type's largest number.
     """
     if colours.dtype.kind not in "iu":
         return colours.astype(np.float32)

@@ -71,7 +71,7 @@ def plain(value: object) -> Any:
 
 @dataclass(frozen=True)
 class Form:
-    """One form: what it accepts in words, its schema, and how it is read and written.
+    """A form of parameters: its description, its schema, its reader and its writer.
 
     The schema and the words may depend on the parameter. A value of None is written as null.
     """
@@ -422,7 +422,7 @@ FORMS: dict[str, Form] = {
         "list of media, or of their names",
         {"type": "array", "items": {"anyOf": [ref("medium"), NAME_OF_MEDIUM]}, "minItems": 1},
         lambda cursor, reader: tuple(reader.medium(entry) for entry in cursor.entries()),
-        lambda value, writer: [writer.medium(one) for one in value],
+        lambda value, writer: [writer.medium(medium) for medium in value],
     ),
     "phase": Form(
         "phase function",

@@ -164,7 +164,7 @@ FIELDS: dict[str, dict[str, Any]] = {  # what steps of several values have, with
 
 
 def matrix(cursor: Cursor, size: int) -> transforms.Matrix:
-    """Return a transform, (size, size) float64; one of 3x3 acts on (u, v, 1)."""
+    """Return a transform, (size, size) float64; 3x3 acts on (u, v, 1)."""
     value = cursor.value
     if isinstance(value, list) and all(isinstance(row, list) for row in value):
         rows = np.array([row.numbers(size) for row in cursor.entries(size)])
@@ -183,7 +183,7 @@ def matrix(cursor: Cursor, size: int) -> transforms.Matrix:
 
 
 def _one_step(value: dict[str, Any]) -> str:
-    """Return what to say of a step that does not have one name."""
+    """Return the error message for a step without a single name."""
     names = [name for name in value if name in STEPS]
     inside = [name for name in value if name not in STEPS]
     for name in names:

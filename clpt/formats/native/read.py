@@ -1,4 +1,4 @@
-"""scene.json, one-to-one with the dataclasses of clpt.scene: a kind reads what it declares."""
+"""Reader of scene.json, a mirror of clpt.scene: the parameters that a kind declares are read."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def load(
 
 
 class _Reader:
-    """Reads one file; keeps materials and groups by name, so that shapes share them."""
+    """Reads a file; keeps materials and groups by name, so that shapes share them."""
 
     def __init__(self, root: Cursor, outside: Iterable[type[materials.Material]], missing: Missing):
         self.root, self.missing = root, missing
@@ -61,7 +61,7 @@ class _Reader:
             if cls.kind in {**kinds("material"), **self.outside}:
                 raise SceneError(f"there are two kinds of materials {cls.kind!r}; rename yours")
             self.outside[cls.kind] = cls
-        # None while one is being read: it refers to itself then
+        # None while an entry is being read: it then refers to itself
         self.materials: dict[str, materials.Material | None] = {}
         self.media: dict[str, media.Medium | None] = {}
         self.volumes: dict[str, Volume] = {}
@@ -104,7 +104,7 @@ class _Reader:
             return Scene(**parts, warnings=self.warnings, extra={"format": "native"})
 
     def kind(self, cursor: Cursor, category: str) -> Any:
-        """Read an object of one of a category's kinds."""
+        """Read an object of any kind of a category."""
         table = kinds(category)
         if category == "material":
             table |= self.outside
@@ -127,7 +127,7 @@ class _Reader:
             return cls(**values)
 
     def image(self, cursor: Cursor) -> Any:
-        """Return the path of an image; grey where there is none and missing ones are grey."""
+        """Return the path of an image; grey if it is missing and missing images are grey."""
         try:
             return find_file(cursor)
         except SceneError:
@@ -197,7 +197,7 @@ class _Reader:
         return self.kind(cursor, "light")
 
     def material(self, cursor: Cursor) -> Any:
-        """Read a material, or find the one of that name; null is none."""
+        """Read a material, or find it by its name; null is None."""
         if cursor.value is None:
             return None
         if not isinstance(cursor.value, dict):
@@ -211,7 +211,7 @@ class _Reader:
         return self._named(self.materials, "materials", "material", name, referrer)
 
     def medium(self, cursor: Cursor) -> Any:
-        """Read a medium, or find the one of that name; null is none."""
+        """Read a medium, or find it by its name; null is None."""
         if cursor.value is None:
             return None
         if isinstance(cursor.value, dict):

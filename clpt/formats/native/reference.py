@@ -210,7 +210,7 @@ def xml(cls: type[Kind]) -> str:
     if cls not in MITSUBA:
         return ""
     lines = [f'<{MITSUBA[cls]} type="{cls.kind.replace("_", "")}">']
-    if "distribution" in params(cls):  # Mitsuba's default is another one
+    if "distribution" in params(cls):  # Mitsuba has another default
         lines.append(f'    <string name="distribution" value="{defaults(cls)["distribution"]}"/>')
     for name, value in _chosen(cls).items():
         number = params(cls)[name].role.name == "real" or name.endswith("_ior")
@@ -239,7 +239,7 @@ def _blocks(text: str, code: str, element: str) -> str:
 
 
 def _picture(category: str, cls: type[Kind]) -> str:
-    """Return the kind's picture and its caption, where `docs.pictures` has one."""
+    """Return the kind's picture and its caption, if `docs.pictures` has a picture."""
     caption = _captions().get(f"{category}/{cls.kind}")
     if caption is None:
         return ""

@@ -99,7 +99,7 @@ def _category(category: str) -> Schema:
 
 
 def _kind(cls: type[Kind]) -> Schema:
-    """An object of one kind."""
+    """Return the schema of an object of a kind."""
     default = defaults(cls)
     properties: Schema = {"type": {"const": cls.kind}}
     for name, param in params(cls).items():
@@ -116,7 +116,7 @@ def _kind(cls: type[Kind]) -> Schema:
 
 
 def _untyped(cls: type[Kind]) -> Schema:
-    """An object that is always of one kind."""
+    """Return the schema of an object whose kind is implied, so that it has no `type`."""
     typed = _kind(cls)
     del typed["properties"]["type"], typed["required"]
     return typed

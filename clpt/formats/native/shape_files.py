@@ -30,8 +30,8 @@ class ShapeFile:
     """A kind of file that a shape may name by its key `file`.
 
     accepts, meaning: for the schema and the reference; replaces: the parameters that the file
-    holds; read: returns these, None where one file makes several shapes; join: returns the kind
-    with what `read` has returned.
+    holds; read: returns these, None if a file makes several shapes; join: returns the kind with
+    the parameters that `read` has returned.
     """
 
     accepts: str
@@ -115,7 +115,7 @@ def read_transforms(cursor: Cursor) -> np.ndarray:
 
 
 def _with_tangents(shape: shapes.Mesh) -> dict[str, Any]:
-    """A mesh's attributes, with the tangents as one of them: what is per vertex stays together."""
+    """Return a mesh's attributes and its tangents, as both are arrays per vertex."""
     attributes = dict(shape.attributes)
     return attributes if shape.tangents is None else {**attributes, TANGENTS: shape.tangents}
 

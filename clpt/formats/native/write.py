@@ -66,7 +66,7 @@ def write_medium(medium: Medium, digits: int) -> str:
 
 
 class _Writer:
-    """Writes one scene; materials, groups and arrays that several shapes share are written once."""
+    """Writes a scene; materials, groups and arrays that several shapes share are written once."""
 
     def __init__(self, path: Path, copies: bool = False):
         self.path, self.copies = path, copies
@@ -82,7 +82,7 @@ class _Writer:
         self.shared: set[int] = set()  # those of them that have no name
         self.groups: dict[str, Any] = {}
         self.group_names: dict[int, str] = {}
-        self.files: dict[Any, str] = {}  # names by what they hold
+        self.files: dict[Any, str] = {}  # names by their contents
 
     def scene(self, scene: Scene) -> dict[str, Any]:
         """Write the whole file."""
@@ -120,7 +120,7 @@ class _Writer:
         return written
 
     def instances(self, run: Sequence[Any]) -> dict[str, Any]:
-        """Write instances of one group, their matrices as .npy."""
+        """Write instances of a group, their matrices as .npy."""
         group = self.group(run[0].group)
         name = self.file_name(group, "npy")
         matrices = np.stack([np.asarray(instance.to_world, np.float64)[:3] for instance in run])
@@ -137,9 +137,9 @@ class _Writer:
         return self.group_names[id(group)]
 
     def kind(self, kind: Kind) -> dict[str, Any]:
-        """Return the object that stands for a thing; parameters with their defaults are left out.
+        """Return the JSON object of a kind; parameters with their defaults are left out.
 
-        The material of a shape is always written: without one a mesh has that of its file.
+        The material of a shape is always written: a mesh without a material has its file's.
         """
         cls, kind = type(kind), _on_host(kind)
         if self.copies and issubclass(cls, materials.Material) and not _is_known(cls):
@@ -158,7 +158,7 @@ class _Writer:
         return written
 
     def untyped(self, kind: Kind) -> dict[str, Any]:
-        """Return the object that stands for a thing where only one kind can stand."""
+        """Return the JSON object of a kind that is implied, without its `type`."""
         written = self.kind(kind)
         del written["type"]
         return written
@@ -168,11 +168,11 @@ class _Writer:
         return self.untyped(layer)
 
     def material(self, material: materials.Material) -> Any:
-        """Return a material, or its name in the table of named ones."""
+        """Return a material, or its name in the table of named materials."""
         return self._named(material, self.materials)
 
     def medium(self, medium: object) -> Any:
-        """Return a medium, or its name in the table of named ones."""
+        """Return a medium, or its name in the table of named media."""
         return self._named(medium, self.media)
 
     def _named(self, kind: Any, table: dict[str, Any]) -> Any:
@@ -194,7 +194,7 @@ class _Writer:
         return f"{self.path.stem}.{label}{len(self.files)}.{suffix}"
 
     def image(self, image: Any) -> str:
-        """Return the name of an image's file; an array is written to one."""
+        """Return the name of an image's file; an array is written to a file."""
         spectral = isinstance(image, spectral_exr.SpectralImage)
         if not spectral and not isinstance(image, np.ndarray):
             return (
@@ -289,9 +289,9 @@ class _Writer:
 
 
 def _shared(scene: Scene) -> set[int]:
-    """Return the ids of nameless materials and media that stand at several places.
+    """Return the ids of nameless materials and media that are used several times.
 
-    It matters that they are one: a medium may have several shapes around it.
+    Their identity matters: a medium may have several shapes around it.
     """
     counts: Counter[int] = Counter()
     waiting: list[Any] = [scene.camera, *scene.shapes]

@@ -1,9 +1,9 @@
 """NanoVDB files (.nvdb) of version 32: fog volumes of real numbers, without OpenVDB.
 
 A file is a row of segments: a header, the metadata of each grid, the grids, each perhaps packed. A
-grid is a tree in one buffer: a root with tiles, upper nodes of 32^3 lower ones, lower nodes of 16^3
-leaves, leaves of 8^3 values. Offsets are in bytes from the node that holds them. All of them are
-checked: a file may lie.
+grid is a tree in a buffer: a root with tiles, upper nodes of 32^3 lower nodes, lower nodes of
+16^3 leaves, leaves of 8^3 values. Offsets are in bytes from the node that holds them. All of them
+are checked: a file may lie.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ BARE = b"NanoVDB1"  # a grid without segments
 MAJOR = 32
 CODECS = ("none", "ZIP", "BLOSC")
 METADATA, GRID, TREE, TILE = 176, 672, 64, 32
-DEFLATE = 1032  # bytes at most that one of deflate stands for
+DEFLATE = 1032  # most bytes that a compressed byte of deflate stands for
 UPPER, LOWER = 270_400, 33_856
 UPPER_TABLE, LOWER_TABLE = 8_256, 1_088  # where a node's children are told
 MINIMUM, FLAGS, CODES = 80, 15, 96  # of a leaf whose numbers are packed
@@ -74,7 +74,7 @@ class _Entry:
 
 
 def read(path: Path, grid: str = "") -> Volume:
-    """Return the values (nx, ny, nz) float32 of a grid, and its box; one layer is put around.
+    """Return the values (nx, ny, nz) float32 of a grid with a layer around them, and its box.
 
     grid: its name, "" is "density", else the first. Raises SceneError, OSError.
     """
@@ -160,7 +160,7 @@ def _unpacked(data: bytes, entry: _Entry) -> bytes:
 
 
 def _volume(grid: bytes) -> Volume:
-    """The box of the active values of a grid, with a layer of what is outside around it."""
+    """Return the box of a grid's active values, with a layer of its outside values around it."""
     sort, kind = struct.unpack_from("<2I", grid, 632)
     name = TYPES[kind] if kind < len(TYPES) else str(kind)
     if name not in LAYOUTS:

@@ -28,8 +28,8 @@ HALF = "_HalfFloat"
 TYPES = {"Tree_float_5_4_3": "f", "Tree_double_5_4_3": "d"}  # of numbers
 UPPER, LOWER, LEAF = 32, 16, 8  # children, or values, along a side
 MASK = LEAF**3 // 8  # bytes
-PER_LEAF = 6 * LEAF**3  # bytes of a leaf's values, and of which of them it stores
-# What a node tells of its inactive values, before its active ones.
+PER_LEAF = 6 * LEAF**3  # bytes of a leaf's values and of its mask
+# A node's flag for its inactive values, before its active values.
 ONE_INACTIVE, TWO_INACTIVE, MASKED, ALL_VALUES = (2, 4, 5), 5, (3, 4, 5), 6
 
 
@@ -45,7 +45,7 @@ class _Entry:
 
 
 class _Bytes:
-    """Reads a file's bytes one after the other."""
+    """Reads a file's bytes in order."""
 
     def __init__(self, data: bytes, at: int = 0):
         self.data, self.at = data, at
@@ -77,7 +77,7 @@ class _Bytes:
 
 
 def read(path: Path, grid: str = "") -> Volume:
-    """Return the values (nx, ny, nz) float32 of a grid, and its box; one layer is put around.
+    """Return the values (nx, ny, nz) float32 of a grid with a layer around them, and its box.
 
     grid: its name, "" is "density", else the first. Raises SceneError, OSError.
     """
@@ -114,7 +114,7 @@ def _entries(data: bytes) -> Iterator[_Entry]:
 
 
 def _volume(data: bytes, entries: list[_Entry], entry: _Entry) -> Volume:
-    """The box of the active values of a grid, with a layer of what is outside around it."""
+    """Return the box of a grid's active values, with a layer of its outside values around it."""
     kind = entry.kind.removesuffix(HALF)
     if kind not in TYPES:
         known = ", ".join(TYPES)
@@ -206,7 +206,7 @@ class _Tree:
         self.masks = np.concatenate([*masks, np.zeros(0, np.uint8)]).reshape(-1, MASK)
 
     def _place(self, places: set[tuple[int, ...]]) -> NDArray[np.int64]:
-        """Read the lowest index (3,) of one of the root's tiles or nodes, which overlap nowhere."""
+        """Read the lowest index (3,) of a tile or node of the root; they do not overlap."""
         low = self._stream.take("3i")
         if low in places or any(n % (UPPER * LOWER * LEAF) for n in low):
             raise SceneError("is damaged: two of its nodes have one place")
@@ -214,7 +214,7 @@ class _Tree:
         return np.array(low, np.int64)
 
     def box(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the lowest and the highest index (3,) of what is active."""
+        """Return the lowest and the highest index (3,) of active values."""
         lows, highs = [part[0] for part in self._active], [part[1] for part in self._active]
         step = 1 << 14
         for first in range(0, self.leaves, step):
