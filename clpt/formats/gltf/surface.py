@@ -16,10 +16,10 @@ from clpt.formats.gltf.document import ROUNDING, Element
 from clpt.formats.gltf.textures import texture
 from clpt.scene import gltf_material
 from clpt.scene.gltf_material import WHITE
+from clpt.scene.insides import dispersed
 from clpt.scene.materials import GltfSurface
 from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product, turned
 from clpt.scene.values import TexturedNumber
-from clpt.spectra import Cauchy
 
 CLEARCOAT = "KHR_materials_clearcoat"
 DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"
@@ -238,8 +238,7 @@ def _body(element: Element, values: dict[str, Any]) -> None:
     strength = 0.0 if dispersion is None else dispersion.number("dispersion", 0.0, low=0.0)
     ior = values.get("ior", 1.5)
     if strength > 0.0 and ior > 1.0:
-        spread = (ior - 1.0) / max(20.0 / strength, LEAST_ABBE)
-        values["ior"] = Cauchy(ior - 1.5168 * spread, 0.523655 * spread)
+        values["ior"] = dispersed(ior, max(20.0 / strength, LEAST_ABBE))
 
 
 def _specular_color(element: Element, values: dict[str, Any]) -> None:

@@ -9,8 +9,8 @@ import math
 from typing import Any
 
 from clpt.formats.gltf.document import Element
+from clpt.scene.insides import absorbed
 from clpt.scene.media import Homogeneous
-from clpt.spectra import RGBUnbounded
 
 VOLUME = "KHR_materials_volume"
 SCATTER = ("KHR_materials_volume_scatter", "KHR_materials_scatter")  # the same draft's two names
@@ -19,8 +19,6 @@ SHARES = {  # of light that goes through a surface
     "KHR_materials_transmission": "transmissionFactor",
     "KHR_materials_diffuse_transmission": "diffuseTransmissionFactor",
 }
-DARKEST = 1e-4  # attenuation colour: black would absorb all at once
-DENSEST = 1e6  # [1/m]
 STEEPEST = 0.99  # mean cosine: at 1 nothing would be scattered
 
 
@@ -43,8 +41,7 @@ def extinction(volume: Element) -> Any:
     if distance == 0.0:
         raise volume.error("must be above 0", "attenuationDistance")
     left = volume.numbers("attenuationColor", 3, (1.0, 1.0, 1.0), low=0.0, high=1.0)
-    a = tuple(min(-math.log(max(v, DARKEST)) / distance, DENSEST) for v in left)
-    return a[0] if a[0] == a[1] == a[2] else RGBUnbounded(*a)
+    return absorbed(left, distance)
 
 
 def medium(element: Element | None) -> Homogeneous | None:
