@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from clpt.measured import Measurement, MerlTable, fit
-from clpt.render.records.parameter_words import array_size
+from clpt.render.records.materials import array_size
 from clpt.scene import roles
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, device_params

@@ -16,7 +16,7 @@ import numpy as np
 from clpt.errors import SceneError
 from clpt.render.materials.encoder import Encoder
 from clpt.render.materials.normal_maps import NormalPerturbation
-from clpt.render.records.parameter_words import MIXTURE, NORMAL_MAP_WORDS
+from clpt.render.records.materials import MIXTURE, NORMAL_MAP_WORDS
 from clpt.render.scene_index import any_of
 from clpt.scene import materials as mt
 from clpt.scene import roles
