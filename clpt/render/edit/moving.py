@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from clpt import bvh, transforms
 from clpt.arrays import Points, on_device
 from clpt.geometry import analytic, shapes, strands, triangles
-from clpt.geometry.tessellate import keeps_its_kind
+from clpt.geometry.analytic import keeps_its_kind
 from clpt.records import SHAPE, SHAPE_BITS
 from clpt.render.edit.moving_parts import (
     Boxes,

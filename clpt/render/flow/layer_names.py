@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
 from clpt.geometry import instancing
-from clpt.geometry.primitive_rows import primitive_rows
+from clpt.geometry.instancing import primitive_rows
 from clpt.geometry.shapes import geometry as geometry_of
 from clpt.records import SHAPE_BITS
 from clpt.render.geometry.find import Geometry

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats, on_device
 from clpt.geometry import analytic, shapes
-from clpt.geometry.tessellate import keeps_its_kind
+from clpt.geometry.analytic import keeps_its_kind
 from clpt.geometry.winding import box
 from clpt.render.geometry.open_boundaries import HOLE, hole_around
 from clpt.render.geometry.surroundings import every
