@@ -15,13 +15,13 @@ from clpt.formats.gltf.document import ROUNDING, Document, Element
 from clpt.formats.gltf.textures import texture
 from clpt.scene import gltf_material
 from clpt.scene.gltf_material import WHITE
+from clpt.scene.insides import absorbed, dispersed
 from clpt.scene.lights import Area
 from clpt.scene.materials import Diffuse, GltfSurface, Material
 from clpt.scene.media import Homogeneous
 from clpt.scene.params import Texture
 from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product, turned
 from clpt.scene.values import Textured, TexturedNumber
-from clpt.spectra import Cauchy, RGBUnbounded
 
 CLEARCOAT = "KHR_materials_clearcoat"
 DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"
@@ -240,8 +240,7 @@ def _body(element: Element, values: dict[str, Any]) -> None:
     strength = 0.0 if dispersion is None else dispersion.number("dispersion", 0.0, low=0.0)
     ior = values.get("ior", 1.5)
     if strength > 0.0 and ior > 1.0:
-        spread = (ior - 1.0) / max(20.0 / strength, LEAST_ABBE)
-        values["ior"] = Cauchy(ior - 1.5168 * spread, 0.523655 * spread)
+        values["ior"] = dispersed(ior, max(20.0 / strength, LEAST_ABBE))
 
 
 def _specular_color(element: Element, values: dict[str, Any]) -> None:
@@ -267,8 +266,6 @@ SHARES = {  # of light that goes through a surface
     "KHR_materials_transmission": "transmissionFactor",
     "KHR_materials_diffuse_transmission": "diffuseTransmissionFactor",
 }
-DARKEST = 1e-4  # attenuation colour: black would absorb all at once
-DENSEST = 1e6  # [1/m]
 STEEPEST = 0.99  # mean cosine: at 1 nothing would be scattered
 
 
@@ -291,8 +288,7 @@ def extinction(volume: Element) -> Any:
     if distance == 0.0:
         raise volume.error("must be above 0", "attenuationDistance")
     left = volume.numbers("attenuationColor", 3, (1.0, 1.0, 1.0), low=0.0, high=1.0)
-    a = tuple(min(-math.log(max(v, DARKEST)) / distance, DENSEST) for v in left)
-    return a[0] if a[0] == a[1] == a[2] else RGBUnbounded(*a)
+    return absorbed(left, distance)
 
 
 def medium(element: Element | None) -> Homogeneous | None:
