@@ -1,4 +1,4 @@
-"""A camera's lens in scene.json: a name, a file, or its surfaces [mm]."""
+"""Lenses of cameras and sensors of films in scene.json: names, files, or numbers."""
 
 from __future__ import annotations
 
@@ -7,21 +7,87 @@ from typing import Any
 from clpt import lenses, spectra
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor
-from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, Schema, object_of, ref
+from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, Schema, object_of, ref, rows
 from clpt.formats.native.spectra import find_file
 from clpt.lenses import Coat, Prescription, Surface
 from clpt.lenses.glasses import by_number
-from clpt.scene.roles import INDEX
-from clpt.spectra import Constant, Spectrum
+from clpt.scene.roles import INDEX, Spectral
+from clpt.spectra import Constant, Sensor, Spectrum
+from clpt.spectra.sensors import OBSERVERS
 
-WORDS = (
+SENSOR_WORDS = (
+    '`cie1931`, `cie1964`, `{"file": name}` or `{"curves": [three spectra]}`,'
+    " the latter two perhaps with a `matrix`"
+)
+
+
+def read_sensor(cursor: Cursor) -> Any:
+    """Return a film's sensor: a name, or a Sensor. Raises SceneError."""
+    if isinstance(cursor.value, str):
+        return cursor.value
+    cursor.expect(dict, "a name or a sensor")
+    cursor.check_keys("sensor", ("file", "curves", "matrix"))
+    if ("file" in cursor.value) == ("curves" in cursor.value):
+        raise cursor.error("a sensor has either a 'file' or 'curves'")
+    if "file" in cursor.value:
+        curves = spectra.read_sensor(find_file(cursor.at("file"))).curves
+    else:
+        red, green, blue = (_curve(entry) for entry in cursor.at("curves").entries(3))
+        curves = (red, green, blue)
+    matrix = None
+    if "matrix" in cursor.value:
+        matrix = tuple(tuple(row.numbers(3)) for row in cursor.at("matrix").entries(3))
+    with cursor.locating():
+        return Sensor(curves, matrix)
+
+
+CURVE = Spectral("curve", colour=None)  # of a sensor, over the wavelength
+
+
+def _curve(cursor: Cursor) -> Spectrum:
+    value = json_spectra.read(cursor, CURVE)
+    return value if isinstance(value, Spectrum) else spectra.Constant(value)
+
+
+def write_sensor(sensor: Sensor | str) -> Any:
+    """Return what stands for a film's sensor in JSON, such that `read` gives it back."""
+    if isinstance(sensor, str):
+        return sensor
+    written: dict[str, Any] = {
+        "curves": [json_spectra.write(curve, CURVE) for curve in sensor.curves]
+    }
+    return written if sensor.matrix is None else {**written, "matrix": sensor.matrix}
+
+
+def _sensor_schema() -> Schema:
+    curve = {"anyOf": [NUMBER, ref("spectrum")]}
+    curves = {"type": "array", "items": curve, "minItems": 3, "maxItems": 3}
+    matrix = {**rows(3, count=3), "description": "from responses to XYZ; fitted if not given"}
+    file = {**STRING, "description": "wavelengths [nm] and three values a row"}
+    return {
+        "anyOf": [
+            {"enum": list(OBSERVERS)},
+            {
+                "anyOf": [
+                    object_of({"file": file, "matrix": matrix}, ["file"]),
+                    object_of({"curves": curves, "matrix": matrix}, ["curves"]),
+                ]
+            },
+        ]
+    }
+
+
+SENSOR_SCHEMA = _sensor_schema()
+
+
+LENS_WORDS = (
     "a name of the library, the name of a `.dat`, `.zmx` or `.txt` file, or"
     ' `{"surfaces": [...]}`, see [lenses](lenses.md)'
 )
 LENGTHS = ("radius", "thickness", "semi_diameter", "conic")
 
 
-def read(cursor: Cursor) -> Prescription | str:
+def read_lens(cursor: Cursor) -> Prescription | str:
     """Return a lens: its name in the library, or what it is made of. Raises SceneError."""
     if isinstance(cursor.value, str):
         if cursor.value in lenses.names():
@@ -77,7 +143,7 @@ def _coat(cursor: Cursor) -> Coat:
     return Coat(index, cursor.at("thickness").number())
 
 
-def write(lens: Prescription | str) -> Any:
+def write_lens(lens: Prescription | str) -> Any:
     """Return what stands for a lens in JSON, such that `read` gives it back."""
     if isinstance(lens, str):
         return lens
@@ -101,7 +167,7 @@ def _written(surface: Surface) -> dict[str, Any]:
     return made
 
 
-def _schema() -> Schema:
+def _lens_schema() -> Schema:
     index = {"anyOf": [ref("spectrum_index"), {**NUMBERS, "minItems": 2, "maxItems": 2}]}
     film = object_of(
         {"index": ref("spectrum_index"), "thickness": {**NUMBER, "description": "[nm]"}},
@@ -127,4 +193,4 @@ def _schema() -> Schema:
     return {"anyOf": [{**STRING, "description": "of the library, or a file"}, whole]}
 
 
-SCHEMA = _schema()
+LENS_SCHEMA = _lens_schema()

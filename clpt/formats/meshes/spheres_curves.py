@@ -1,4 +1,4 @@
-"""Files of curves, as Mitsuba's: x y z and the radius on a line, a blank line between strands."""
+"""Files of many spheres (.npz), and of curves as Mitsuba has them."""
 
 from __future__ import annotations
 
@@ -8,12 +8,38 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.files import budget, input_files, output_files, text
+from clpt.files import budget, input_files, numpy_files, output_files, text
+from clpt.scene.shapes import Spheres
+from clpt.scene.textures import ATTRIBUTES
+
+ARRAYS = ("centers", "radii")
+
+
+def read_spheres(path: Path) -> dict[str, Any]:
+    """Return the parameters of `spheres` that are in a file. Raises SceneError."""
+    found = numpy_files.arrays(path)
+    for name in found:
+        if name not in ARRAYS and not name.startswith(ATTRIBUTES):
+            message = (
+                f"holds {name!r}; there may be centers, radii and attributes {ATTRIBUTES[0]}..."
+            )
+            raise SceneError(message, file=path)
+    if "centers" not in found:
+        raise SceneError("has no array 'centers'", file=path)
+    given: dict[str, Any] = {name: found.pop(name) for name in ARRAYS if name in found}
+    return {**given, "attributes": found}
+
+
+def write_spheres(path: Path, spheres: Spheres) -> None:
+    """Write what `read` returns of spheres. Raises OSError."""
+    with output_files.replacing(path) as partial:
+        np.savez(partial, centers=spheres.centers, radii=spheres.radii, **spheres.attributes)
+
 
 PER_BYTE = 64  # bytes of memory for each of the file, while it is read
 
 
-def read(path: Path) -> dict[str, Any]:
+def read_strands(path: Path) -> dict[str, Any]:
     """Return `points` (n, 4) float32 and `lengths` (k,) int64, as `Curves` takes them.
 
     Raises SceneError with the line for what is no row of four numbers, and for an empty file.
@@ -43,7 +69,7 @@ def read(path: Path) -> dict[str, Any]:
         return {"points": points.astype(np.float32), "lengths": ends - starts + 1}
 
 
-def write(path: Path, points: object, lengths: Any) -> None:
+def write_strands(path: Path, points: object, lengths: Any) -> None:
     """Write strands such that `read` gives the same float32 back."""
     rows = [" ".join(f"{x:.9g}" for x in row) for row in np.asarray(points, np.float32).tolist()]
     ends = np.cumsum(lengths if len(lengths) else [len(rows)])
