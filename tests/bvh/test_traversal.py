@@ -261,7 +261,8 @@ def test_tree_over_shapes(device, count, layout):
     nearest = t.min(1, initial=np.inf)
     sure = (np.abs(b**2 - c) > 1e-5).all(1) & (np.abs(t - 1e-4) > 1e-4).all(1)
 
-    program = dev.build(device, dev.assemble("test", {"test": SPHERES.format(step=layout.removeprefix("shapes_"))}))
+    text = SPHERES.format(step=layout.removeprefix("shapes_"))
+    program = dev.build(device, dev.assemble("test", {"test": text}))
     kernel = program.kernel("closest")
     hits, met = np.zeros((2000, 2), np.float32), np.zeros(2000, np.int32)
     upload, download = _buffers(device)
