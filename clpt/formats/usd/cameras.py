@@ -8,7 +8,7 @@ from typing import Any
 from pxr import Usd, UsdGeom
 
 from clpt import transforms
-from clpt.formats.gltf.cameras import FROM_GLTF, size
+from clpt.formats.gltf.cameras_lights import FROM_GLTF, size
 from clpt.formats.usd.document import Document
 from clpt.scene.cameras import Camera, Orthographic, Perspective, ThinLens
 

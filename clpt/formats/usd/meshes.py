@@ -16,8 +16,7 @@ from clpt.formats.usd import primvars
 from clpt.formats.usd.document import Document, rows
 from clpt.formats.usd.materials import Surface, surface
 from clpt.formats.usd.primvars import Primvar, Topology
-from clpt.geometry.normals import smooth_normals
-from clpt.geometry.polygons import triangulate
+from clpt.geometry.polygons import smooth_normals, triangulate
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import SECOND_UV
 

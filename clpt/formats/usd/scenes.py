@@ -11,7 +11,7 @@ from pxr import Tf, Usd, UsdUtils
 
 from clpt.errors import SceneError, nearest
 from clpt.files import input_files
-from clpt.formats.meshes import framing
+from clpt.formats import framing
 from clpt.formats.usd import cameras, gprims, lights, walk
 from clpt.formats.usd.document import Document
 from clpt.scene import Scene
