@@ -60,6 +60,7 @@ def _insides(shape: Shape) -> Iterator[Any]:
         return
     for part in mt.parts(shape.material):
         thin = isinstance(part, mt.GltfSurface) and part.thin
+        thin |= isinstance(part, mt.Openpbr) and part.thin_walled
         if part.absorption != CLEAR and not thin:
             yield part.absorption
 
