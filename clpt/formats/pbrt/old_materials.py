@@ -16,7 +16,7 @@ from clpt.errors import UnknownKindError
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.scattering import both, hair, rough, subsurface
 from clpt.formats.pbrt.spectra import named, spectrum
-from clpt.formats.pbrt.state import Contents, Definition, State
+from clpt.formats.pbrt.state import Contents, Definition, Maker, State
 from clpt.formats.pbrt.textures import map_values, textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
@@ -301,7 +301,7 @@ def _number(value: Values, params: Parameters, state: State) -> Values:
     return float(np.clip(rgb.mean(), 0.0, 1.0))
 
 
-MAKERS: dict[str, Callable[[Parameters, State], Material]] = {
+MAKERS: dict[str, Maker[Material]] = {
     "matte": _matte,
     "mirror": _mirror,
     "glass": _glass,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -320,7 +319,7 @@ class _Reader(TransformDirectives):
         self.state.inside, self.state.outside = inside, outside
 
 
-DIRECTIVES: dict[str, Callable[[_Reader], None]] = {
+DIRECTIVES = {
     "ActiveTransform": _Reader.active_transform,
     "AreaLightSource": _Reader.area_light_source,
     "Attribute": _Reader.attribute,

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from clpt.scene.materials import Material
 from clpt.scene.motion import Keys
 
 BYTES = 1024  # of a directive in memory, about
+T = TypeVar("T")
 DEEPEST = 32  # files that include each other
 
 
@@ -141,6 +142,9 @@ class Shared:
         if self.made[key] is None:
             raise source.error("refers to itself")
         return self.made[key]
+
+
+Maker = Callable[[Parameters, "State"], T]  # makes a part of the scene of a definition
 
 
 @dataclass(eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,26 +26,22 @@ def inflated(packed: bytes | memoryview, most: int) -> bytes:
         raise SceneError(f"is damaged: {error}") from None
 
 
-def blosc_unpacker() -> Callable[[bytes | memoryview, int], bytes]:
-    """Return what unpacks Blosc's bytes into at most so many. Raises SceneError without it."""
+def blosc_unpacked(packed: bytes | memoryview, most: int) -> bytes:
+    """Return at most `most` bytes that Blosc has packed. Raises SceneError without the package."""
     try:
         import blosc
     except ImportError:
         message = "is packed by Blosc: pip install 'clpt[volumes]', or convert it with ZIP"
         raise SceneError(message) from None
-
-    def unpacked(packed: bytes | memoryview, most: int) -> bytes:
-        if len(packed) < BLOSC_HEADER:
-            raise SceneError("is damaged: a packed part has no head")
-        size, _, held = struct.unpack_from("<3I", packed, 4)
-        if size > most or held > len(packed):
-            raise SceneError("is damaged: a packed part is larger than the grid")
-        try:
-            unpacked_bytes: bytes = blosc.decompress(bytes(packed))
-        except Exception as error:  # the package has a class of its own
-            raise SceneError(f"is damaged: {error}") from None
-        return unpacked_bytes
-
+    if len(packed) < BLOSC_HEADER:
+        raise SceneError("is damaged: a packed part has no head")
+    size, _, held = struct.unpack_from("<3I", packed, 4)
+    if size > most or held > len(packed):
+        raise SceneError("is damaged: a packed part is larger than the grid")
+    try:
+        unpacked: bytes = blosc.decompress(bytes(packed))
+    except Exception as error:  # the package has a class of its own
+        raise SceneError(f"is damaged: {error}") from None
     return unpacked
 
 
