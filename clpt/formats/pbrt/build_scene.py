@@ -227,7 +227,7 @@ def lights(contents: Contents) -> list[Light]:
 def check_unused_materials(contents: Contents) -> None:
     """Make the named materials that no shape has, for their errors and warnings."""
     for name, versions in contents.shared.materials.items():
-        for definition in versions:
+        for _, definition in versions:
             definition.state.material_of(name, definition)
 
 

@@ -51,7 +51,7 @@ def is_known(kind: str) -> bool:
 
 def has_mirrors(contents: Contents) -> bool:
     """Return whether some material has a specular (delta) lobe."""
-    definitions = [item for versions in contents.shared.materials.values() for item in versions]
+    definitions = [item for versions in contents.shared.materials.values() for _, item in versions]
     parts = [contents.shapes, *contents.objects.values()]
     used = [item.state.material for part in parts for item in part]
     definitions += [item for item in used if isinstance(item, Definition)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import struct
 import zlib
@@ -26,13 +27,17 @@ def inflated(packed: bytes | memoryview, most: int) -> bytes:
         raise SceneError(f"is damaged: {error}") from None
 
 
-def blosc_unpacked(packed: bytes | memoryview, most: int) -> bytes:
-    """Return at most `most` bytes that Blosc has packed. Raises SceneError without the package."""
-    try:
-        import blosc
-    except ImportError:
+def check_blosc() -> None:
+    """Raise SceneError unless the package `blosc` is installed."""
+    if importlib.util.find_spec("blosc") is None:
         message = "is packed by Blosc: pip install 'clpt[volumes]', or convert it with ZIP"
-        raise SceneError(message) from None
+        raise SceneError(message)
+
+
+def blosc_unpacked(packed: bytes | memoryview, most: int) -> bytes:
+    """Return at most `most` bytes that Blosc has packed; the package `blosc` must be there."""
+    import blosc
+
     if len(packed) < BLOSC_HEADER:
         raise SceneError("is damaged: a packed part has no head")
     size, _, held = struct.unpack_from("<3I", packed, 4)
