@@ -10,7 +10,7 @@ from clpt.formats.gltf.textures import texture
 from clpt.scene import gltf_material
 from clpt.scene.lights import Area
 from clpt.scene.materials import Diffuse, GltfSurface, Material
-from clpt.scene.params import Texture
+from clpt.scene.texture_values import Texture
 from clpt.scene.textures import MeshAttribute, Product
 from clpt.scene.values import Textured
 
