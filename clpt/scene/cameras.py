@@ -107,7 +107,7 @@ class Camera(Kind):
         return None
 
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
-        """Return the members of its record in `clpt.render.records.camera_rows` by name.
+        """Return the members of its record in `clpt.render.records.camera` by name.
 
         A traced lens has only those that need no table. width, height: of the film [pixels].
         Raises SceneError for planes, a matrix, a glass or a lens that cannot be used.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
-from clpt.scene import roles
+from clpt.scene import insides, roles
 from clpt.scene.energy import check_reradiation
 from clpt.scene.params import (
     Kind,
@@ -90,6 +90,17 @@ METAL = Shorthand(
 )
 ROUGH, ROUGH_EVENLY = _roughness(("alpha_u", "alpha_v")), _roughness(("alpha",))
 ANISOTROPY = _renamed("anisotropy", "anisotropic", "another word for `anisotropic`, as in glTF")
+TRANSMISSION_COLOR = Shorthand(
+    {
+        "transmission_color": Param(
+            roles.REFLECTANCE, "what is let through, or with a depth its colour there",
+            low=0.0, high=1.0, textured=True,
+        ),
+        "transmission_depth": Param(roles.REAL, "where light has it; 0: at once", "m", 0.0),
+    },
+    ("transmission_tint", "absorption"),
+    insides.spelled,
+)  # fmt: skip
 TRANSMISSION = _renamed("transmission", "spec_trans", "another word for `spec_trans`, as in glTF")
 
 
@@ -606,6 +617,90 @@ class GltfSurface(Material):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Openpbr(Material):
+    """OpenPBR Surface 1.1, see docs/materials.md; front side.
+
+    Both sides where light goes through; `thin_walled`: a sheet, both sides of which are alike. The
+    parameters are those of the specification; `specular_ior` counts as at least the coat's.
+    """
+
+    shorthands = (TRANSMISSION_COLOR,)
+    if TYPE_CHECKING:  # arguments only: they stand for others
+        transmission_color: InitVar[Textured | None] = None
+        transmission_depth: InitVar[float | None] = None
+
+    uses_lobe_sample = True
+    refracts = True
+    chromatic = True
+    needs_wavelengths = True
+
+    base_weight: TexturedNumber = _share(1.0, "factor on the base's colour")
+    base_color: Textured = reflectance(0.8, "colour of the base, and of metal head-on")
+    base_metalness: TexturedNumber = _share(0.0, "share of the metal", lobe=True)
+    base_diffuse_roughness: TexturedNumber = _share(0.0, "of diffuse reflection")
+    specular_weight: TexturedNumber = real(
+        1.0, "factor on the dielectric's reflection head-on, by its index; on metal at most 1",
+        low=0.0, high=25.0, textured=True,
+    )  # fmt: skip
+    specular_color: Textured = reflectance(
+        1.0, "factor on the dielectric's reflection; on metal at 82 degrees"
+    )
+    specular_roughness: TexturedNumber = _share(0.3, "of facets; its square is their alpha")
+    specular_roughness_anisotropy: TexturedNumber = _share(
+        0.0, "how much rougher the tangent's direction is", lobe=True
+    )
+    specular_ior: IndexLike = index(1.5, "index of the dielectric")
+    transmission_weight: TexturedNumber = _share(
+        0.0, "share of what enters the dielectric that is let through", lobe=True
+    )
+    transmission_tint: Textured = reflectance(1.0, "factor on what is let through, at the surface")
+    absorption: SpectrumLike = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
+    subsurface_weight: TexturedNumber = _share(
+        0.0, "share of the rest that is scattered below the surface", lobe=True
+    )
+    subsurface_color: Textured = reflectance(0.8, "albedo of what is scattered there")
+    subsurface_scatter_anisotropy: TexturedNumber = real(
+        0.0, "thin-walled: 1: all of it goes through, -1: none", "", -1.0, 1.0, textured=True
+    )
+    subsurface_inside: bool = flag(
+        False, "whether it goes into a body, which the shape's `interior` scatters"
+    )
+    coat_weight: TexturedNumber = _share(0.0, "share of the surface that has a coat", lobe=True)
+    coat_color: Textured = reflectance(1.0, "what is left of light that goes in and out head-on")
+    coat_roughness: TexturedNumber = _share(
+        0.0, "of the coat's facets; it makes those below rougher"
+    )
+    coat_roughness_anisotropy: TexturedNumber = _share(0.0, "how much rougher along the tangent")
+    coat_ior: TexturedNumber = real(1.6, "index of the coat", low=1.0, high=3.0, textured=True)
+    coat_darkening: TexturedNumber = _share(
+        1.0, "how much of the darkening by reflections within the coat is kept"
+    )
+    fuzz_weight: TexturedNumber = _share(0.0, "share of the surface that has fibres", lobe=True)
+    fuzz_color: Textured = reflectance(1.0, "factor on the fibres' light")
+    fuzz_roughness: TexturedNumber = _share(0.5, "how much fibres lean; at least 0.1")
+    thin_film_weight: TexturedNumber = _share(0.0, "share of the facets that has a film", lobe=True)
+    thin_film_thickness: TexturedNumber = real(
+        0.5, "thickness of the film", "um", 0.0, 100.0, textured=True
+    )
+    thin_film_ior: float = real(1.4, "index of the film", low=1.0, high=5.0)
+    thin_walled: bool = flag(False, "whether light goes straight through, as there is no volume")
+
+    @property
+    def inside_index(self) -> IndexLike:
+        return Constant(1.0) if self.thin_walled else self.specular_ior
+
+    @property
+    def transmits(self) -> bool:
+        below = self.thin_walled or self.subsurface_inside
+        return self.transmission_weight != 0.0 or (below and self.subsurface_weight != 0.0)
+
+    @property
+    def uses_tangents(self) -> bool:
+        stretched = self.coat_weight != 0.0 and self.coat_roughness_anisotropy != 0.0
+        return self.specular_roughness_anisotropy != 0.0 or stretched
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Grating(Material):
     """A diffraction grating: every order leaves in its own direction, by wavelength.
 
@@ -834,6 +929,7 @@ LEAVES = (
     PrincipledThin,
     DiffuseTransmission,
     GltfSurface,
+    Openpbr,
     Grating,
     Fluorescent,
     Hair,

@@ -1,6 +1,6 @@
 """Roles of parameters: what a value may be, and what it means.
 
-A role is an object, and tables have an entry for each: `clpt.render.records.parameter_words` says
+A role is an object, and tables have an entry for each: `clpt.render.records.materials` says
 how a value stands in kernels, `clpt.render.materials.encoder` how it becomes words,
 `clpt.render.materials.cases` how kernels load it, `clpt.formats.native.forms` how it is written
 in scene.json, and `clpt.testing.settings` draws a value for a test.

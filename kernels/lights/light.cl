@@ -9,7 +9,7 @@
  *   real     <kind>_pdf(<Kind> l, Scene scene, vec3 hemisphere, vec3 d);                  of sample, [1/sr]
  *
  * where `hemisphere` is the unit normal of the hemisphere to which the surface sends light, 0 if to the sphere.
- * The struct <Kind> is made from the dataclass (clpt/render/records/light_rows.py, where lights with images have
+ * The struct <Kind> is made from the dataclass (clpt/render/records/lights.py, where lights with images have
  * Records of their own, and LightSample too); its rows lie in `light_params`. `emission_load` reads an emission;
  * `texture_point_nowhere` stands for the point of a light that has no texture.
  */

@@ -1,5 +1,5 @@
 /* What light paths have left in each part of a row, as sums of the parts so far: see transport/guiding/guide.cl. */
-#include "bvh/no_vectorize.cl"
+#include "bvh/hints.cl"
 #include "transport/guiding/bins.cl"
 
 kernel NO_VECTORIZE void guide_sum(global uint *restrict guide)

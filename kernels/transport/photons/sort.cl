@@ -2,7 +2,7 @@
  *
  * numbers: of the cell of each place, PHOTON_NONE where there is no photon. cells: one word more than there are cells;
  * in the end those of cell k are order[cells[k]] and further, below order[cells[k + 1]], in ascending order. */
-#include "bvh/no_vectorize.cl"
+#include "bvh/hints.cl"
 #include "generated/photon_numbers.cl"
 
 /* How many photons are in each cell; cells: zeros. */
