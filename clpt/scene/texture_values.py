@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar, Literal, Protocol, TypeGuard
+from typing import Any, ClassVar, Literal, Protocol, TypeGuard, cast
 
 import numpy as np
 
@@ -14,14 +14,14 @@ from clpt import spectra
 from clpt.arrays import Floats
 from clpt.scene.params import Kind, fields_of, params
 from clpt.scene.roles import FACTOR, REAL, REFLECTANCE, Role
-from clpt.spectra import Constant, Tabulated, cie
+from clpt.spectra import Constant, Spectrum, Tabulated, cie
 from clpt.spectra.spectrum import d65, primaries
 
 
 class Look(Protocol):
     """The weights of emissions for a film, see `clpt.render.spectra.look.Look`."""
 
-    def brightness(self, light: Any) -> float:
+    def brightness(self, light: Spectrum) -> float:
         """Return the weight of a spectrum."""
 
     def levels(self, image: Any) -> Floats:
@@ -118,43 +118,44 @@ def is_texture(value: object) -> TypeGuard[Texture]:
     return isinstance(value, Texture)
 
 
-def folded(value: Any, role: Role) -> Any:
+def folded(value: object, role: Role) -> Any:
     """Return a value with its constants combined in a role, see `Texture.folded`."""
     return value.folded(role) if is_texture(value) else value
 
 
-def separated(value: Any, role: Role) -> Any:
+def separated(value: object, role: Role) -> Any:
     """Return a value with RGB products as sums, see `Texture.separated`."""
     return value.separated(role) if is_texture(value) else value
 
 
-def channel_factors(value: Any, channel: int) -> list[Any]:
+def channel_factors(value: object, channel: int) -> list[Any]:
     """Return the factors of a channel of a value, see `Texture.channel_factors`."""
     if is_texture(value):
         return value.channel_factors(channel)
+    assert isinstance(value, Spectrum)
     return [float(value.to_rgb("unbounded")[channel])]
 
 
-def constant_number(value: Any, role: Role) -> float | None:
+def constant_number(value: object, role: Role) -> float | None:
     """Return the number of a constant in a role; None for a texture, a colour and a spectrum."""
     if isinstance(value, (int, float)):
         return float(value)
     if isinstance(value, Constant):
         return float(value.value)
-    if role is REAL and not is_texture(value):
+    if role is REAL and isinstance(value, Spectrum):
         return float(spectra.luminance(value.to_rgb("unbounded")))
     return None
 
 
-def mean(value: Any, look: Look) -> float:
+def mean(value: object, look: Look) -> float:
     """Return the mean brightness of a value as an emission; a number is itself."""
     if is_texture(value):
         return value.mean(look)
-    return float(value) if isinstance(value, (int, float)) else look.brightness(value)
+    return look.brightness(value) if isinstance(value, Spectrum) else float(cast(float, value))
 
 
 def brightness_at(
-    value: Any, look: Look, uv: Floats, area: Floats, attributes: Attributes
+    value: object, look: Look, uv: Floats, area: Floats, attributes: Attributes
 ) -> Floats:
     """Return the brightness of a value at uv, see `Texture.brightness_at`."""
     if is_texture(value):

@@ -91,7 +91,7 @@ class TextureTable:
         self._folded: dict[tuple[int, Role], Any] = {}
         self._alive: list[Any] = []  # textures whose ids are keys
 
-    def folded(self, value: Any, role: Role) -> Any:
+    def folded(self, value: object, role: Role) -> Any:
         """Return a value with constants combined and RGB products separated, see `Texture`."""
         key = id(value), role
         if is_texture(value) and key not in self._folded:
