@@ -14,26 +14,26 @@ from clpt.choices import Missing
 from clpt.errors import LONGEST_WARNING, SceneError, nearest, one_line
 from clpt.files import budget as budgets
 from clpt.files.budget import Budget
-from clpt.formats import blockers, own_scenes
+from clpt.formats import own_scenes, reading
 
 if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
     from clpt.scene import Scene
     from clpt.scene.materials import Material
 
-FORMATS = {  # the module whose `load` reads files of a suffix, imported when it is used
+FORMATS = {  # what reads files of a suffix: a module, imported on use, or a part of framing.py
     ".json": "native",
     ".xml": "mitsuba",
     ".pbrt": "pbrt",
     ".pbrt.gz": "pbrt",
     ".glb": "gltf",
     ".gltf": "gltf",
-    ".obj": "meshes.framing",
-    ".ply": "meshes.framing",
-    ".stl": "meshes.framing",
-    ".off": "meshes.framing",
-    ".vdb": "volumes.framing",
-    ".nvdb": "volumes.framing",
-    ".vol": "volumes.framing",
+    ".obj": "mesh",
+    ".ply": "mesh",
+    ".stl": "mesh",
+    ".off": "mesh",
+    ".vdb": "density",
+    ".nvdb": "density",
+    ".vol": "density",
 }
 WITH_VARIABLES = ("mitsuba", "gltf")
 
@@ -104,18 +104,20 @@ def _load(
         raise SceneError(message + (nearest(name, ARGUMENTS) if near else ""), file=path)
     if kinds and kind != "native":
         raise SceneError("only a scene.json can have kinds that are not clpt's own", file=path)
-    loader = importlib.import_module(f"clpt.formats.{kind}").load
     if missing_textures not in get_args(Missing):
         raise SceneError(f"missing_textures is 'error' or 'grey', not {missing_textures!r}")
+    if kind in ("mesh", "density"):
+        from clpt.formats import framing
+
+        if kind == "mesh":
+            return framing.load_mesh(path, missing_textures)
+        return framing.load_density(path)
+    loader = importlib.import_module(f"clpt.formats.{kind}").load
     if kind == "native":
         return loader(path, kinds, missing_textures)
     if kind == "pbrt":
         return loader(path, progress, missing_textures)
-    if kind in WITH_VARIABLES:
-        return loader(path, missing_textures, **variables)
-    if kind == "meshes.framing":
-        return loader(path, missing_textures)
-    return loader(path)
+    return loader(path, missing_textures, **variables)
 
 
 def errors_of(path: str | Path, /, **variables: Any) -> list[SceneError]:
@@ -124,7 +126,7 @@ def errors_of(path: str | Path, /, **variables: Any) -> list[SceneError]:
     path: of a scene of any format; of Mitsuba's and PBRT's materials, textures, shapes, lights and
     parameters each have their own. variables: see `load`.
     """
-    with blockers.collecting() as errors:
+    with reading.collecting() as errors:
         try:
             load(path, **variables)
         except SceneError as error:

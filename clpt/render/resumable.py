@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import logging
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from clpt.render.film_renderer import FilmRenderer
 from clpt.render.makers.contents import Contents
 from clpt.render.makers.locking import synchronized
 from clpt.render.makers.maker import Held
+from clpt.render.makers.planning import Changes
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene.fingerprint import Plain
 from clpt.version import VERSION
@@ -109,9 +109,9 @@ class ResumableRenderer(FilmRenderer):
 
         What is "auto" may depend on how many samples are wanted, which the film did not know.
         """
-        way = self._maker.home.other_way(origin)
-        if way is not None:
-            self._maker.follow(way, partial(self._apply, what="load_state"))
+        integrator = self._maker.home.other_integrator(origin)
+        if integrator is not None:
+            self._write(self._maker.plan(Changes(integrator=integrator)), "load_state")
 
     @synchronized
     def _origin(self) -> Origin:

@@ -57,9 +57,9 @@ class LightBounds:
 class Light(Kind):
     """Base of all lights.
 
-    reach: "surface" for what emits from a shape; "placed" for a light with a position; "distant"
-    for one that shines on the whole scene, and that no ray can meet; "infinite" for one that a ray
-    meets when it leaves the scene.
+    reach: "surface" for a light on a shape; "placed" for a light with a position; "distant" for a
+    light that shines on the whole scene and that no ray can meet; "infinite" for a light that a
+    ray meets when it leaves the scene.
     """
 
     reach: ClassVar[Reach] = "placed"
@@ -101,7 +101,7 @@ def _to_the_eye(doc: str, unit: str) -> Any:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lamp(Light):
-    """Base of the lights whose emission is one spectrum.
+    """Base of the lights with a single spectrum as their emission.
 
     A strength of STRENGTHS beside it makes the emission a colour alone.
     """
@@ -124,7 +124,7 @@ class Lamp(Light):
             if _grey(values[name]) is None:
                 message = f"gives a colour, as {name} does: leave one out, or make {name} a number"
                 raise SceneError(message, where=f"{self.kind}.temperature")
-        strengths = [one for one in STRENGTHS if values.get(one) is not None]
+        strengths = [strength for strength in STRENGTHS if values.get(strength) is not None]
         if not strengths:
             return
         where = f"{self.kind}.{strengths[0]}"
@@ -191,7 +191,7 @@ def with_emission(light: Light, area: float = 0.0) -> Light:
 
 
 TEMPERATURE = "temperature"
-STRENGTHS = ("power", "lumens", "candela", "lux", "nits")  # a lamp has one of them at most
+STRENGTHS = ("power", "lumens", "candela", "lux", "nits")  # a lamp has at most a single strength
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -214,7 +214,7 @@ class Area(PoweredLamp):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DirectionalArea(PoweredLamp):
-    """A surface that emits from its front side along its normal only: a flat one sends out a beam.
+    """A surface that emits from its front side along its normal only: a flat surface emits a beam.
 
     Only the `particle_tracer` finds it. The camera does not see it shine.
     """
@@ -227,7 +227,7 @@ class DirectionalArea(PoweredLamp):
     lux: float | None = _to_the_eye("illuminance of a surface across the beam", "lx")
 
     def extent(self, area: float) -> float:
-        """Return the area of a flat surface, from which its light goes straight ahead [m^2]."""
+        """Return the area of a flat surface [m^2]: all its light leaves along the normal."""
         return area
 
 

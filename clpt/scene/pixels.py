@@ -27,8 +27,8 @@ def spectral_image(texture: object, role: Role) -> SpectralImage | None:
 def pixels(texture: Bitmap, role: Role, side: int | None = None) -> Floats32:
     """Return a bitmap's image, (h, w, 1 or 3) float32, top row first; for REAL (h, w, 1).
 
-    role: of spectra it chooses the colour that stands for them; side: about how many texels along
-    each side are enough, of which the others are left out. Raises SceneError if it cannot be read
+    role: it chooses the colour of spectra; side: about how many texels along each side are
+    enough; the others are left out. Raises SceneError if it cannot be read
     or is no image.
     """
     spectral = spectral_image(texture, role)

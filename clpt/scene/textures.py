@@ -12,7 +12,7 @@ from clpt.scene.params import Kind, choice, factor, fields_of, host, real, refle
 from clpt.scene.params import Texture as Texture
 from clpt.scene.values import ImageLike, Matrix4, Textured, TexturedNumber
 
-ATTRIBUTES = ("vertex_", "face_")  # how the names of what meshes have begin
+ATTRIBUTES = ("vertex_", "face_")  # prefixes of the names of attributes
 PATTERNS = ("fbm", "wrinkled", "windy")
 MOST_OCTAVES = 32
 MAPPINGS = ("uv", "planar", "spherical", "cylindrical", "uv1")
@@ -22,7 +22,7 @@ WRAPS = ("repeat", "clamp", "mirror", "zero")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Placed(Texture):
-    """Base of those that lie on uv: a surface's own, or such as a mapping makes of its place."""
+    """Base of the textures over uv: a surface's uv, or uv that a mapping derives from positions."""
 
     to_uv: np.ndarray = host(np.eye(3), "uv transform, (3, 3) float64")
     mapping: str = choice(
@@ -37,7 +37,7 @@ class Placed(Texture):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solid(Texture):
-    """Base of those that fill space."""
+    """Base of the textures that fill space."""
 
     to_texture: Matrix4 = host(np.eye(4), "from the world to the texture's space, (4, 4)")
 
@@ -123,7 +123,7 @@ class MeshAttribute(Texture):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Dots(Placed):
-    """1 within round dots, 0 elsewhere: half of the cells of uv around whole numbers have one."""
+    """1 within round dots, 0 elsewhere: half of the cells of uv around whole numbers have a dot."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -164,7 +164,7 @@ KINDS = (Bitmap, Checkerboard, Product, Mix, MeshAttribute, Dots, Checkers, Nois
 
 
 def _matrix(texture: Texture, name: str, size: int) -> None:
-    """Make a texture's matrix float64. Raises SceneError for one of another form."""
+    """Make a texture's matrix float64. Raises SceneError for another form of matrix."""
     matrix = np.asarray(fields_of(texture)[name], dtype=np.float64)
     if matrix.shape != (size, size) or not np.isfinite(matrix).all():
         raise SceneError(f"must be a finite {size}x{size} matrix", where=f"{texture.kind}.{name}")
@@ -172,7 +172,7 @@ def _matrix(texture: Texture, name: str, size: int) -> None:
 
 
 def _octaves(texture: Noise | Marble) -> None:
-    """Raises SceneError for so many octaves that float32 ends before."""
+    """Raise SceneError for octaves beyond the precision of float32."""
     if not 0 < texture.octaves <= MOST_OCTAVES:
         message = f"must be 1 to {MOST_OCTAVES}, not {texture.octaves}"
         raise SceneError(message, where=f"{texture.kind}.octaves")
@@ -190,13 +190,13 @@ def attributes_in(value: object) -> set[str]:
 
 
 def placed_in(value: object) -> Placed | None:
-    """Return the first texture on a set of uv that a value is made of; None where there is none."""
-    found = (one for one in textures_in(value) if isinstance(one, Placed))
-    return next((one for one in found if one.mapping in ("uv", "uv1")), None)
+    """Return the first texture on a set of uv in a value, None without such a texture."""
+    placed = (texture for texture in textures_in(value) if isinstance(texture, Placed))
+    return next((texture for texture in placed if texture.mapping in ("uv", "uv1")), None)
 
 
 def turned(value: object) -> bool:
-    """Return whether u and v of a value's texture have other directions than the main ones."""
+    """Return whether a texture's u and v have other directions than the surface's u and v."""
     placed = placed_in(value) if isinstance(value, Texture) else None
     if placed is None:
         return False
@@ -206,7 +206,7 @@ def turned(value: object) -> bool:
 
 
 def textures_in(value: object) -> Iterator[Texture]:
-    """Yield the textures that a kind's parameters hold, and those in what these hold, and so on."""
+    """Yield the textures in a kind's parameters, at any depth."""
     if isinstance(value, (list, tuple)):
         for entry in value:
             yield from textures_in(entry)

@@ -9,7 +9,7 @@ import numpy as np
 
 from clpt import device, spectra
 from clpt.render.records import custom_materials
-from clpt.render.records.parameter_words import ORDERS_WORDS
+from clpt.render.records.materials import ORDERS_WORDS
 from clpt.scene import roles
 from clpt.scene.materials import LEAVES, Material
 from clpt.scene.params import Texture, device_params, fields_of

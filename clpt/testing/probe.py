@@ -15,7 +15,7 @@ from clpt.render.materials import rough_coat_table
 from clpt.render.materials.cases import struct_text
 from clpt.render.materials.thin_films import film_colours
 from clpt.render.records import custom_materials
-from clpt.render.records.parameter_words import FILM_COSINES, array_size, lane_type
+from clpt.render.records.materials import FILM_COSINES, array_size, lane_type
 from clpt.render.spectra import measurements
 from clpt.render.spectra.encode import angular_values
 from clpt.scene import roles

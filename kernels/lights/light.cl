@@ -9,7 +9,7 @@
  *   real     <kind>_pdf(<Kind> l, Scene scene, vec3 hemisphere, vec3 d);                  of sample, [1/sr]
  *
  * where `hemisphere` is the unit normal of the hemisphere that the surface scatters into, 0 for the whole sphere. The
- * struct <Kind> is generated from the dataclass (clpt/render/records/light_rows.py, where lights with images have
+ * struct <Kind> is generated from the dataclass (clpt/render/records/lights.py, where lights with images have
  * Records of their own, and LightSample too); its rows lie in `light_params`. `emission_load` reads an emission;
  * `texture_point_nowhere` stands for the point of a light that has no texture. */
 #include "generated/light_sample.cl"

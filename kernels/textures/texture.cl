@@ -11,7 +11,7 @@
  * a random texel, with its weight as its probability, so that the mean is the reflectance (Fajardo et al. 2023,
  * "Stochastic Texture Filtering"). It serves where light is linear in the value.
  *
- * The struct <Kind> is a Record in clpt/render/records/texture_rows.py whose rows lie in `textures`. A texture that
+ * The struct <Kind> is a Record in clpt/render/records/textures.py whose rows lie in `textures`. A texture that
  * combines others is a program, see texture_program. */
 
 /* A colour or spectrum that stands in `textures` in the five words that parameters have. */

@@ -15,7 +15,7 @@ from clpt.render.lights import encode as lights
 from clpt.render.lights import images as image_lights
 from clpt.render.lights.check import check_light
 from clpt.render.lights.images import face_coordinates, face_directions
-from clpt.render.records import light_rows as light_records
+from clpt.render.records import lights as light_records
 from clpt.scene.lights import (
     Area,
     Constant,

@@ -12,14 +12,14 @@ from clpt.render.flow import flags, programs
 from clpt.scene import KINDS
 
 ALTERNATIVES = (  # files, of each row of which a program has one at most
-    ("bvh/*_keyed.cl",),
+    ("bvh/*.cl#keyed",),
     ("transport/mis_ratio.cl#area*",),
     ("materials/bsdf.cl#*mis_pdf",),
     ("media/grid_flight.cl#collision*",),
-    ("bvh/query*.cl",),
-    ("bvh/shapes_*.cl",),
-    ("bvh/mask8*.cl",),
-    ("bvh/wide8_levels.cl", "bvh/wide8_waiting.cl"),
+    ("bvh/query.cl#*",),
+    ("bvh/shapes.cl#*",),
+    ("bvh/mask8.cl*",),
+    ("bvh/wide8_stack.cl*",),
     ("core/spectrum_*.cl",),
     ("core/texels_*.cl",),
     ("film/exposure.cl", "film/splatting.cl"),

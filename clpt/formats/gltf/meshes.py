@@ -1,4 +1,4 @@
-"""Meshes of nodes: morphed, skinned, with materials, once for each node or instance."""
+"""Primitives: their triangles and the attributes of their vertices, as arrays."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import Matrix
+from clpt.arrays import Floats32, Matrix
 from clpt.files import budget
-from clpt.formats.gltf import materials, skins, variants, volume
-from clpt.formats.gltf.accessors import floats
+from clpt.formats.gltf import draco, geometry, materials
+from clpt.formats.gltf.accessors import COMPONENTS, floats, integers, stored
 from clpt.formats.gltf.document import Element
-from clpt.formats.gltf.geometry import Geometry
+from clpt.formats.gltf.geometry import Geometry, target_types, types, warn_of_whole_numbers
 from clpt.formats.gltf.nodes import Graph, compose
-from clpt.formats.gltf.primitives import geometry
 from clpt.formats.meshes.mesh import Arrays, checked
 from clpt.formats.meshes.triangles import TANGENTS
 from clpt.scene.lights import Area
@@ -25,6 +24,85 @@ from clpt.scene.materials import Material, NormalMap
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Group, Instance, Mesh, Shape
 from clpt.scene.textures import SECOND_UV
+
+POINTS, TRIANGLES, STRIP, FAN = 0, 4, 5, 6
+NOT_DRAWN = {0: "points", 1: "lines", 2: "a line loop", 3: "a line strip"}
+
+
+def primitive_geometry(primitive: Element) -> Geometry | None:
+    """Return the triangles of a primitive, or None, and a note, if it has none.
+
+    Raises SceneError where accessors contradict each other or name vertices that are not there.
+    """
+    mode = primitive.integer("mode", TRIANGLES, high=FAN)
+    attributes = primitive.needed("attributes")
+    if mode in NOT_DRAWN:
+        primitive.warn(f"{NOT_DRAWN[mode]} left out: only triangles are rendered")
+        return None
+    if "POSITION" not in attributes:
+        primitive.warn("left out, since it has no positions")
+        return None
+    compressed = primitive.extension(draco.NAME)
+    made = _plain(attributes) if compressed is None else draco.attributes(primitive, compressed)
+    vertices = len(made.attributes["POSITION"])
+    for name, values in made.attributes.items():
+        if len(values) != vertices:
+            message = f"has {len(values)} elements, POSITION has {vertices}"
+            raise attributes.error(message, name)
+    if compressed is None:
+        order = integers(primitive, "indices") if "indices" in primitive else np.arange(vertices)
+        made.faces = triangles(order.astype(np.int64), mode)
+    _check_indices(primitive, made.faces, vertices)
+    made.targets = [_target(target, vertices) for target in primitive.children("targets")]
+    return made
+
+
+def triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
+    """Return the triangles (m, 3) that a list, strip or fan of vertices draws (glTF 3.7.2.1)."""
+    if mode == TRIANGLES:
+        return order[: len(order) // 3 * 3].reshape(-1, 3)
+    count = max(len(order) - 2, 0)
+    i = np.arange(count)
+    if mode == STRIP:
+        odd = i % 2
+        return order[np.stack([i, i + 1 + odd, i + 2 - odd], axis=1)]
+    return order[np.stack([i + 1, i + 2, np.zeros_like(i)], axis=1)]
+
+
+def _plain(attributes: Element) -> Geometry:
+    arrays: dict[str, NDArray[Any]] = {}
+    for name in filter(types, attributes.value):
+        accessor = attributes.entry(name, "accessors")
+        if accessor is None:
+            continue
+        warn_of_whole_numbers(name, accessor)
+        if name.startswith("JOINTS_"):
+            if COMPONENTS.get(accessor.integer("componentType"), np.dtype("f4")).kind != "u":
+                raise accessor.error("joints must be unsigned integers", "componentType")
+            arrays[name] = stored(accessor, types(name))
+        else:
+            arrays[name] = floats(accessor, types(name))
+    return Geometry(np.zeros((0, 3), np.int64), arrays)
+
+
+def _check_indices(primitive: Element, faces: NDArray[np.int64], vertices: int) -> None:
+    if len(faces) and faces.max() >= vertices:
+        bad = int(np.argmax((faces >= vertices).any(axis=1)))
+        message = f"triangle {bad} names a vertex outside of 0 to {vertices - 1}"
+        raise primitive.error(message, "indices")
+
+
+def _target(target: Element, vertices: int) -> dict[str, Floats32]:
+    found = {}
+    for name in filter(types, target.value):
+        accessor = target.entry(name, "accessors")
+        if accessor is None:
+            continue
+        found[name] = floats(accessor, target_types(name))
+        if len(found[name]) != vertices:
+            raise target.error(f"has {len(found[name])} elements, not {vertices}", name)
+    return found
+
 
 PER_PART = 256  # moved vertices that count as a part
 BYTES = 2048  # of a copy in memory, about
@@ -68,7 +146,7 @@ def shapes(graph: Graph, *, instances: bool = True) -> list[Shape]:
         skin = node.entry("skin", "skins")
         key = (mesh.path, weights) if skin is None else index
         if key not in posed:
-            joints = None if skin is None else skins.matrices(skin, graph.to_world)
+            joints = None if skin is None else geometry.joint_matrices(skin, graph.to_world)
             posed[key] = Posed(_parts(mesh, weights, joints))
         own = np.eye(4) if skin is not None else graph.to_world[index]
         copies = _transforms(node, own)
@@ -143,12 +221,12 @@ def _parts(
     """Return a mesh's primitives in the node's space, or in world space where it is skinned."""
     parts = []
     for primitive in mesh.children("primitives"):
-        made = geometry(primitive)
+        made = primitive_geometry(primitive)
         if made is None:
             continue
         _morph(primitive, made, weights)
         if joints is not None:
-            skins.apply(primitive, made, joints)
+            geometry.skinned(primitive, made, joints)
         part = _mesh(mesh, primitive, made)
         parts += [] if part is None else [part]
     return parts
@@ -199,12 +277,12 @@ def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
 def _surface(primitive: Element, colours: bool) -> Surface:
     """Return the primitive's material, made once for all primitives that have it."""
     document = primitive.document
-    element = variants.material(primitive)
+    element = materials.shown_material(primitive)
 
     def make() -> Surface:
         document.uv_sets.clear()
         material, emission = materials.material(element, colours=colours)
-        inside = volume.medium(element) if material.transmits else None
+        inside = materials.medium(element) if material.transmits else None
         return Surface(material, emission, inside, tuple(document.uv_sets))
 
     return document.once(("surface", element.path if element else "", colours), make)

@@ -15,7 +15,7 @@ from clpt.errors import SceneError
 from clpt.files import budget
 from clpt.formats.gltf import accessors
 from clpt.formats.gltf.document import Document, Element
-from clpt.formats.missing import EVEN, GREY, grey_for
+from clpt.formats.reading import EVEN, GREY, grey_for
 from clpt.scene.textures import Bitmap
 
 FORMATS = ("PNG", "JPEG", "WEBP")

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.formats.meshes.obj import Contents
-from clpt.geometry.normals import smooth_normals
-from clpt.geometry.polygons import triangulate
+from clpt.geometry.polygons import smooth_normals, triangulate
 
 DENSE = 8  # numbers between a mesh's first and last vertex, per corner, that a table may have
 

@@ -20,7 +20,7 @@ from clpt.files import budget
 from clpt.formats.meshes import corners, mtl, obj, off, ply, stl
 from clpt.formats.meshes.named_files import find
 from clpt.formats.meshes.triangles import TANGENTS, Triangles, attributes
-from clpt.geometry.normals import smooth_normals
+from clpt.geometry.polygons import smooth_normals
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap, MeshAttribute, Texture, textures_in

@@ -20,7 +20,7 @@ from clpt.choices import Missing
 from clpt.errors import SceneError
 from clpt.files import input_files, text
 from clpt.formats.meshes.named_files import find
-from clpt.formats.missing import EVEN, GREY, grey_for
+from clpt.formats.reading import EVEN, GREY, grey_for
 from clpt.scene.lights import Area
 from clpt.scene.materials import (
     Blend,

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.files import budget, text
-from clpt.formats.gzip_file import read_bytes
 from clpt.formats.meshes.triangles import Triangles, indices, see_through
+from clpt.formats.reading import read_bytes
 from clpt.geometry.polygons import triangulate
 
 HEADER = re.compile(rb"\s*((?:ST)?C?N?4?n?(?:OFF|Off|off))?(\s+BINARY\b)?")

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.files import budget, text
-from clpt.formats.gzip_file import read_bytes
 from clpt.formats.meshes.ply_tables import Columns, Header, read_tables
 from clpt.formats.meshes.triangles import Triangles, indices, see_through
+from clpt.formats.reading import read_bytes
 from clpt.geometry.polygons import triangulate
 
 NORMAL = ("nx", "ny", "nz")

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.files import budget, text
-from clpt.formats.gzip_file import read_bytes
 from clpt.formats.meshes.triangles import Triangles
+from clpt.formats.reading import read_bytes
 from clpt.geometry.polygons import triangulate
 
 HEAD = 84  # bytes of a binary file before its triangles: a comment, and their number

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 from clpt.choices import Missing
-from clpt.formats.blockers import attempt
 from clpt.formats.mitsuba import dicts, old_words, sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter
@@ -25,6 +24,7 @@ from clpt.formats.mitsuba.sensors import sensor
 from clpt.formats.mitsuba.shapes import shapes_of
 from clpt.formats.mitsuba.spectra import texture
 from clpt.formats.mitsuba.xml import Document, Element, parse
+from clpt.formats.reading import attempt
 from clpt.scene import Scene, integrators
 from clpt.scene.framing import framing_camera, world_bounds
 from clpt.scene.integrators import Film, Integrator

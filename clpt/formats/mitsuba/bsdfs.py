@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from clpt import measured, spectra
-from clpt.formats.blockers import attempt
-from clpt.formats.missing import EVEN, GREY
-from clpt.formats.mitsuba.fluorescence import fluorescent
-from clpt.formats.mitsuba.hair import at_yellow, hair
 from clpt.formats.mitsuba.limits import within
-from clpt.formats.mitsuba.principled import principled, principled_thin
+from clpt.formats.mitsuba.principled import (
+    at_yellow,
+    fluorescent,
+    hair,
+    principled,
+    principled_thin,
+)
 from clpt.formats.mitsuba.properties import Context, Properties, numbers, unknown
 from clpt.formats.mitsuba.spectra import (
     coefficient,
@@ -28,8 +30,9 @@ from clpt.formats.mitsuba.spectra import (
     texture,
 )
 from clpt.formats.mitsuba.xml import Element
-from clpt.formats.pbrt import coated_albedo
-from clpt.formats.pbrt.map_values import map_values
+from clpt.formats.pbrt import scattering
+from clpt.formats.pbrt.textures import map_values
+from clpt.formats.reading import EVEN, GREY, attempt
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.params import defaults, fields_of, params
@@ -389,7 +392,7 @@ def _coated(element: Element, context: Context) -> Material:
         context.warn(element, f"a coat over {inner.kind} is left out: it would darken it")
         return inner
     relative = at_yellow(indices["int_ior"]) / at_yellow(indices["ext_ior"])
-    inside = float(coated_albedo.EVEN @ coated_albedo.internal_fresnel(relative))
+    inside = float(scattering.EVEN @ scattering.internal_fresnel(relative))
     base = map_values(parts["reflectance"], lambda r: r / (1.0 + inside * r))
     plastic = {**kept, **indices, "diffuse_reflectance": base, "specular_reflectance": specular}
     if rough:

@@ -9,11 +9,11 @@ import numpy as np
 
 from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba import grids, spectra
-from clpt.formats.mitsuba.fluorescence import dye, fluorescent
 from clpt.formats.mitsuba.limits import within
+from clpt.formats.mitsuba.principled import dye, fluorescent
 from clpt.formats.mitsuba.properties import Context, Properties, numbers, unknown
 from clpt.formats.mitsuba.xml import Element
-from clpt.formats.pbrt.coated_albedo import MEDIA as MEASURED
+from clpt.formats.pbrt.scattering import MEDIA as MEASURED
 from clpt.scene import media, phases
 from clpt.scene.media import Grid, Homogeneous, Medium
 from clpt.scene.phases import Phase

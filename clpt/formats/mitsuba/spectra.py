@@ -14,9 +14,6 @@ import numpy as np
 
 from clpt import images, spectra
 from clpt.errors import UnknownKindError
-from clpt.formats.blockers import attempt
-from clpt.formats.colour import colour
-from clpt.formats.missing import GREY
 from clpt.formats.mitsuba.properties import (
     Context,
     Properties,
@@ -27,6 +24,7 @@ from clpt.formats.mitsuba.properties import (
 )
 from clpt.formats.mitsuba.spectrum_plugins import PLAIN
 from clpt.formats.mitsuba.xml import Element
+from clpt.formats.reading import GREY, attempt, colour
 from clpt.scene.roles import COEFFICIENT, EMISSION, FACTOR, INDEX, REFLECTANCE, Spectral
 from clpt.scene.textures import (
     ATTRIBUTES,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError, nearest
 from clpt.files import budget, input_files
-from clpt.formats.located import Located
+from clpt.formats.reading import Located
 
 MAX_NESTING = 64
 MAX_INCLUDES = 16  # of files inside each other

@@ -17,7 +17,7 @@ from typing import Any
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.files import budget
 from clpt.files import text as text_files
-from clpt.formats.located import Located
+from clpt.formats.reading import Located
 from clpt.scalars import is_number
 
 LARGEST_INTEGER = 2**31 - 1

@@ -14,12 +14,12 @@ import numpy as np
 
 from clpt import spectra
 from clpt.choices import AUTO
-from clpt.formats.native import json_schema, lenses, motion, reradiation, sensors
+from clpt.formats.native import cameras, json_schema, motion
 from clpt.formats.native import spectra as json_spectra
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, TRIPLE, Schema, ref
+from clpt.formats.native.motion import matrix
 from clpt.formats.native.spectra import kind_name
-from clpt.formats.native.transforms import matrix
 from clpt.measured import Measurement, MerlTable
 from clpt.scene import kinds
 from clpt.scene.materials import Layer, Material
@@ -278,8 +278,8 @@ FORMS: dict[str, Form] = {
     "reradiation": Form(
         "[re-radiation](#re-radiation)",
         ref("reradiation"),
-        lambda cursor, _: reradiation.read(cursor),
-        lambda value, _: reradiation.write(value),
+        lambda cursor, _: json_spectra.read_reradiation(cursor),
+        lambda value, _: json_spectra.write_reradiation(value),
     ),
     "orders": _of_cursor(
         "list of numbers", {**NUMBERS, "minItems": 1, "maxItems": 2 * ORDERS + 1}, _numbers
@@ -393,16 +393,16 @@ FORMS: dict[str, Form] = {
         _write_cube_images,
     ),
     "sensor": Form(
-        sensors.WORDS,
-        sensors.SCHEMA,
-        lambda cursor, _: sensors.read(cursor),
-        lambda value, _: sensors.write(value),
+        cameras.SENSOR_WORDS,
+        cameras.SENSOR_SCHEMA,
+        lambda cursor, _: cameras.read_sensor(cursor),
+        lambda value, _: cameras.write_sensor(value),
     ),
     "lens": Form(
-        lenses.WORDS,
-        lenses.SCHEMA,
-        lambda cursor, _: lenses.read(cursor),
-        lambda value, _: lenses.write(value),
+        cameras.LENS_WORDS,
+        cameras.LENS_SCHEMA,
+        lambda cursor, _: cameras.read_lens(cursor),
+        lambda value, _: cameras.write_lens(value),
     ),
     "material": Form(
         "material, or its name",

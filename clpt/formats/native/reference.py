@@ -18,9 +18,8 @@ import numpy as np
 from clpt import spectra
 from clpt.files import output_files
 from clpt.formats.native import forms
-from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.shape_files import FILES
-from clpt.formats.native.spectra import SPECTRA
+from clpt.formats.native.spectra import RERADIATIONS, SPECTRA
 from clpt.scene import KINDS, integrators, materials, shapes, textures
 from clpt.scene.params import Kind, defaults, params
 

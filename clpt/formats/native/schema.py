@@ -24,9 +24,8 @@ from clpt.formats.native.json_schema import (
     ref,
     rows,
 )
-from clpt.formats.native.reradiation import RERADIATIONS
 from clpt.formats.native.shape_files import FILES
-from clpt.formats.native.spectra import SPECTRA
+from clpt.formats.native.spectra import RERADIATIONS, SPECTRA
 from clpt.images.transfer import HEX
 from clpt.scene import KINDS, integrators, materials, roles
 from clpt.scene.params import Kind, defaults, params

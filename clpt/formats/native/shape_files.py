@@ -13,7 +13,7 @@ import numpy as np
 from clpt.choices import Missing
 from clpt.files import budget, numpy_files
 from clpt.formats import luminaires
-from clpt.formats.meshes import mesh, particles, strands
+from clpt.formats.meshes import mesh, spheres_curves
 from clpt.formats.meshes.triangles import TANGENTS
 from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.spectra import find_file
@@ -56,13 +56,13 @@ FILES: dict[type[Kind], ShapeFile] = {
         "name of a text file",
         "lines of x y z radius, blank ones between strands, in place of points and lengths",
         ("points", "lengths"),
-        strands.read,
+        spheres_curves.read_strands,
     ),
     shapes.Spheres: ShapeFile(
         "name of a .npz file",
         "centers, radii and attributes by their names, in place of those",
         ("centers", "radii", "attributes"),
-        particles.read,
+        spheres_curves.read_spheres,
     ),
     shapes.Instance: ShapeFile(
         "name of a .npy file", "matrices (n, 3, 4): an instance for each, before `to_world`"

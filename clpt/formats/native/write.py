@@ -19,7 +19,7 @@ from clpt import images, measured
 from clpt.arrays import on_host
 from clpt.errors import SceneError
 from clpt.files import output_files
-from clpt.formats.meshes import particles, strands
+from clpt.formats.meshes import spheres_curves
 from clpt.formats.meshes.triangles import TANGENT_COLUMNS
 from clpt.formats.native import forms, motion
 from clpt.formats.native.read import VERSION
@@ -260,14 +260,14 @@ class _Writer:
         key = id(curves.points), id(curves.lengths)
         if key not in self.files:
             name = self.file_name(curves.name or "curves", "txt")
-            strands.write(self.path.parent / name, curves.points, curves.lengths)
+            spheres_curves.write_strands(self.path.parent / name, curves.points, curves.lengths)
             self.files[key] = name
         return self.files[key]
 
     def spheres(self, spheres: shapes.Spheres) -> str:
         """Write centres, radii and attributes; return the file's name."""
         name = self.file_name(spheres.name or "spheres", "npz")
-        particles.write(self.path.parent / name, spheres)
+        spheres_curves.write_spheres(self.path.parent / name, spheres)
         self.files[name] = name
         return name
 

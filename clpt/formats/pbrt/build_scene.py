@@ -15,17 +15,16 @@ import numpy as np
 from clpt import transforms
 from clpt.errors import did_you_mean
 from clpt.files import budget
-from clpt.formats.blockers import attempt
 from clpt.formats.pbrt.curves import joined
-from clpt.formats.pbrt.files import Contents
-from clpt.formats.pbrt.layered import body
 from clpt.formats.pbrt.lights import area_light, light
 from clpt.formats.pbrt.materials import material
 from clpt.formats.pbrt.media import medium
 from clpt.formats.pbrt.params import Parameters
+from clpt.formats.pbrt.scattering import body
 from clpt.formats.pbrt.shapes import Geometry, displaced, geometry, with_uvs
-from clpt.formats.pbrt.state import Definition, State
+from clpt.formats.pbrt.state import Contents, Definition, State
 from clpt.formats.pbrt.textures import textured
+from clpt.formats.reading import attempt
 from clpt.scene.lights import Area, Light
 from clpt.scene.materials import Diffuse, Mask, Material, Null, TwoSided
 from clpt.scene.media import Medium

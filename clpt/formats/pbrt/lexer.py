@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError, did_you_mean
 from clpt.files import budget, text
-from clpt.formats.gzip_file import read_bytes
 from clpt.formats.pbrt.params import ALIASES, TYPES, Parameter
+from clpt.formats.reading import read_bytes
 
 WORD = re.compile(rb'(?:[ \t\r\n]+|#[^\n]*)*("[^"\n]*"|[\[\]]|[^ \t\r\n\[\]"#]+)?')
 OLD_TYPES = ("color", "xyz")

@@ -13,15 +13,11 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import UnknownKindError
-from clpt.formats.pbrt.files import Contents
-from clpt.formats.pbrt.hair import hair
-from clpt.formats.pbrt.layered import both, subsurface
-from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.roughness import rough
+from clpt.formats.pbrt.scattering import both, hair, rough, subsurface
 from clpt.formats.pbrt.spectra import named, spectrum
-from clpt.formats.pbrt.state import Definition, State
-from clpt.formats.pbrt.textures import textured
+from clpt.formats.pbrt.state import Contents, Definition, State
+from clpt.formats.pbrt.textures import map_values, textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.roles import INDEX, REAL, REFLECTANCE

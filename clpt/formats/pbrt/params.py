@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.formats.located import Located
+from clpt.formats.reading import Located
 
 SIZES = {  # how many numbers one value of a type has
     "integer": 1, "float": 1, "blackbody": 1, "point2": 2, "vector2": 2, "point3": 3,

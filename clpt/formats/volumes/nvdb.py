@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.files import budget, input_files
-from clpt.formats.volumes import packing, sparse
+from clpt.formats.volumes import sparse
 from clpt.scene.volumes import Volume
 
 SEGMENTS = (b"NanoVDB0", b"NanoVDB2")
@@ -141,7 +141,7 @@ def _unpacked(data: bytes, entry: _Entry) -> bytes:
     else:
         budget.check(2 * entry.size, f"the grid {entry.name!r}")
         zipped = CODECS[entry.codec] == "ZIP"
-        unpack = packing.inflated if zipped else packing.blosc_unpacker()
+        unpack = sparse.inflated if zipped else sparse.blosc_unpacker()
         chunks: list[bytes] = []
         at = entry.begin
         while at < entry.end and len(chunks) < 64:

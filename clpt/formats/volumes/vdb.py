@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.files import budget, input_files
-from clpt.formats.volumes import packing, sparse
+from clpt.formats.volumes import sparse
 from clpt.scene.volumes import Volume
 
 MAGIC = b" BDV\0\0\0\0"
@@ -173,7 +173,7 @@ class _Tree:
     def __init__(self, stream: _Bytes, packed: int, form: str, half: bool):
         self._stream, self._packed, self._form = stream, packed, form
         self._held = np.dtype("<f2" if half else f"<{form}")
-        self._unpack = packing.blosc_unpacker() if packed & BLOSC else packing.inflated
+        self._unpack = sparse.blosc_unpacker() if packed & BLOSC else sparse.inflated
         self.tiles: list[sparse.Tile] = []
         self._active: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []  # boxes of tiles
         origins: list[NDArray[np.int64]] = []

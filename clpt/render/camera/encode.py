@@ -21,7 +21,7 @@ from clpt.lenses.focusing import FocusedLens
 from clpt.lenses.glasses import LINE_D
 from clpt.lenses.pupils import ZONES
 from clpt.lenses.tracing import sag
-from clpt.render.records.camera_rows import GHOST_CELLS, LENS_SURFACE, RECORDS
+from clpt.render.records.camera import GHOST_CELLS, LENS_SURFACE, RECORDS
 from clpt.scene.cameras import Camera, Lens
 from clpt.scene.indices import check_index
 from clpt.scene.integrators import Film

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from clpt.arrays import Image
 from clpt.errors import SceneError
 from clpt.images.spectral_exr import SpectralImage
-from clpt.render.records.layer_names import LayerNames
+from clpt.render.records.film import LayerNames
 from clpt.scene import Film
 
 if TYPE_CHECKING:

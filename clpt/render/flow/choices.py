@@ -205,7 +205,8 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         f.geometry.analytic != ("curves",), "tracing/curve_others.cl"
     ),
     "generated/shape_traversal.cl": lambda f, layout: (
-        (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.geometry.analytic)
+        (f"bvh/shapes.cl#{bvh.shapes_layout(layout).removeprefix('shapes_')}",)
+        * bool(f.geometry.analytic)
     ),
     "generated/hit_space.cl": lambda f, _: either(f.geometry.instances, "shapes/hit_space.cl"),
     "generated/surface_steps.cl": lambda f, _: (
@@ -244,7 +245,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *when(f.motion.vertices or f.motion.spheres, "motion/vertex_keys.cl"),
     ),
     "generated/keyed_layout.cl": lambda f, layout: (
-        (f"bvh/{layout}_keyed.cl",) * (f.motion.vertices and layout != "brute")
+        (f"bvh/{layout}.cl#keyed",) * (f.motion.vertices and layout != "brute")
     ),
     "generated/instance_traversal.cl": lambda f, layout: (
         (

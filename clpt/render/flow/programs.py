@@ -42,7 +42,7 @@ _ALONE: device.Virtual = {
     "core/texels_between.cl": ("core/texels_in_turn.cl",),
     "materials/film_stack.cl#at_once": ("materials/film_stack.cl#in_turn",),
 }
-_FEW: device.Virtual = {"bvh/no_vectorize.cl": ("core/few_registers.cl",)}
+_FEW: device.Virtual = {"bvh/hints.cl": ("bvh/hints.cl#few_registers",)}
 
 
 def sources(

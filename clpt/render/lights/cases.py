@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from clpt.device.source import TWIN
 from clpt.geometry import shape_records
 from clpt.render.records import Features
-from clpt.render.records import light_rows as light_records
+from clpt.render.records import lights as light_records
 from clpt.render.records.dispatch import Case, Function, active, choose, function, masked
-from clpt.render.records.light_rows import (
+from clpt.render.records.lights import (
     BASES,
     BODY,
     BOTH,

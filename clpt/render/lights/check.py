@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import transforms
 from clpt.arrays import fits_single
 from clpt.errors import SceneError
-from clpt.render.records.light_rows import IMAGE_RECORDS, INFINITE, PROJECTED_RECORDS, RECORDS
+from clpt.render.records.lights import IMAGE_RECORDS, INFINITE, PROJECTED_RECORDS, RECORDS
 from clpt.render.textures.check import check_image, check_textures
 from clpt.scene import roles
 from clpt.scene.lights import Light, with_emission

@@ -17,7 +17,7 @@ from clpt.render.lights.cases import (
 )
 from clpt.render.records import Features
 from clpt.render.records.dispatch import Case, Function, choose, function
-from clpt.render.records.light_rows import ALONG, BASES, BOTH, INFINITE, KINDS, PLACED, UNSEEN
+from clpt.render.records.lights import ALONG, BASES, BOTH, INFINITE, KINDS, PLACED, UNSEEN
 
 
 def dispatch_text(features: Features) -> str:

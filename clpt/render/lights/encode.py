@@ -25,7 +25,7 @@ from clpt.render.lights.encode_lamps import blank_row, lower_lamp
 from clpt.render.lights.find import Source, Sources, is_whole
 from clpt.render.lights.power import brightness
 from clpt.render.materials.encoder import Encoder
-from clpt.render.records.light_rows import ALONG, BOTH, FRONT, KINDS, UNSEEN
+from clpt.render.records.lights import ALONG, BOTH, FRONT, KINDS, UNSEEN
 from clpt.render.records.lowering_cache import content
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look

@@ -16,8 +16,8 @@ from clpt.render.lights.find import emissions_of
 from clpt.render.lights.images import lower_image
 from clpt.render.lights.sky import lower_sky
 from clpt.render.materials.encoder import Encoder
-from clpt.render.records import light_rows as light_records
-from clpt.render.records.light_rows import RECORDS
+from clpt.render.records import lights as light_records
+from clpt.render.records.lights import RECORDS
 from clpt.scene import lights, roles
 from clpt.scene.lights import Light
 from clpt.scene.params import fields_of, params

@@ -23,7 +23,7 @@ from clpt.render.lights.bodies import BodyLight, volume_lights
 from clpt.render.lights.bounds import Bounds
 from clpt.render.lights.bricks import BrickLights
 from clpt.render.lights.power import triangle_means
-from clpt.render.records.light_rows import INFINITE
+from clpt.render.records.lights import INFINITE
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
 from clpt.scene import lights

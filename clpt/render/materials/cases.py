@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from clpt.layout import row_words
 from clpt.render.records import Features
 from clpt.render.records.dispatch import Case, choose, function, indented
-from clpt.render.records.parameter_words import (
+from clpt.render.records.materials import (
     NORMAL_MAP_WORDS,
     SPECTRUM_WORDS,
     array_size,

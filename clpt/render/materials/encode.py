@@ -16,7 +16,7 @@ import numpy as np
 from clpt.errors import SceneError
 from clpt.render.materials.encoder import Encoder
 from clpt.render.materials.normal_maps import NormalPerturbation
-from clpt.render.records.parameter_words import MIXTURE, NORMAL_MAP_WORDS
+from clpt.render.records.materials import MIXTURE, NORMAL_MAP_WORDS
 from clpt.render.scene_index import any_of
 from clpt.scene import materials as mt
 from clpt.scene import roles
@@ -200,6 +200,15 @@ def _principled(values: Values) -> tuple[float, float]:
     return _mean(values["roughness"], ROUGHLY) ** 2, _share(straight, (1.0 - metal) * albedo)
 
 
+def _openpbr(values: Values) -> tuple[float, float]:
+    metal, albedo = _mean(values["base_metalness"]), _mean(values["base_color"])
+    straight = metal * albedo + (1.0 - metal) * STRAIGHT
+    rough, coat = _mean(values["specular_roughness"], ROUGHLY), _mean(values["coat_weight"])
+    if coat > metal:
+        rough = min(rough, _mean(values["coat_roughness"], ROUGHLY))
+    return rough**2, _share(straight, (1.0 - metal) * albedo)
+
+
 def _phong(values: Values) -> tuple[float, float]:
     share = _share(_mean(values["specular"]), _mean(values["diffuse"]))
     return float(np.sqrt(2.0 / (4.0 * _mean(values["exponent"], EXPONENT) + 2.0))), share
@@ -215,5 +224,6 @@ _GLOSSY: dict[str, Callable[[Values], tuple[float, float]]] = {
     "rough_plastic": _plastic,
     "principled": _principled,
     "gltf_surface": _principled,
+    "openpbr": _openpbr,
     "phong": _phong,
 }

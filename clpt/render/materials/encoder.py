@@ -11,8 +11,7 @@ import numpy as np
 from clpt.arrays import Words
 from clpt.render.materials import thin_films
 from clpt.render.records.lowering_cache import LoweringCache
-from clpt.render.records.materials import Sources
-from clpt.render.records.parameter_words import LAYERS_WORDS, ORDERS_WORDS, words
+from clpt.render.records.materials import LAYERS_WORDS, ORDERS_WORDS, Sources, words
 from clpt.render.records.tables import TableStore, as_words
 from clpt.render.spectra.encode import SpectraTable
 from clpt.render.spectra.find import Density

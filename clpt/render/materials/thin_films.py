@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from clpt import spectra
 from clpt.arrays import Array
 from clpt.render.materials.cases import load_text, struct_text, value_text
-from clpt.render.records.parameter_words import FILM_COSINES, row_words
+from clpt.render.records.materials import FILM_COSINES, row_words
 from clpt.scene import roles
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, params

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from clpt import spectra
 from clpt.arrays import Floats, Words
 from clpt.measured import Measurement, MerlTable
-from clpt.render.records.parameter_words import (
+from clpt.render.records.materials import (
     MEASUREMENT_WORDS,
     MERL_WORDS,
     RERADIATION_STEP,

@@ -28,7 +28,7 @@ from clpt.files import budget
 from clpt.images import Stored, arrays
 from clpt.render.records.lowering_cache import LoweringCache, version
 from clpt.render.records.tables import TableStore
-from clpt.render.records.texture_rows import KINDS, MIPS
+from clpt.render.records.textures import KINDS, MIPS
 from clpt.render.textures.texels import texels
 from clpt.scene.pixels import channel, spectral_image
 from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role

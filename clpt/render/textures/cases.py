@@ -6,7 +6,7 @@ from typing import Literal
 
 from clpt.render.records import TextureFeatures
 from clpt.render.records.dispatch import Case, Function, active, function, indented
-from clpt.render.records.texture_rows import (
+from clpt.render.records.textures import (
     END,
     IMAGES,
     KINDS,

@@ -13,9 +13,9 @@ import numpy as np
 
 from clpt.errors import SceneError
 from clpt.geometry.triangles import per_face
-from clpt.render.records.parameter_words import SPECTRUM_WORDS
+from clpt.render.records.materials import SPECTRUM_WORDS
 from clpt.render.records.tables import TableStore
-from clpt.render.records.texture_rows import KINDS, PROGRAM, RECORDS
+from clpt.render.records.textures import KINDS, PROGRAM, RECORDS
 from clpt.render.spectra.encode import SpectraTable
 from clpt.render.textures.bitmaps import Images, has_levels, identity
 from clpt.render.textures.programs import folded, is_composite, program, separated

@@ -15,9 +15,9 @@ import numpy as np
 
 from clpt import spectra
 from clpt.arrays import Words
-from clpt.render.records.parameter_words import SPECTRUM_WORDS
+from clpt.render.records.materials import SPECTRUM_WORDS
 from clpt.render.records.tables import TableStore
-from clpt.render.records.texture_rows import END, OPERANDS, OPERATIONS
+from clpt.render.records.textures import END, OPERANDS, OPERATIONS
 from clpt.render.spectra.encode import SpectraTable
 from clpt.scene.roles import EMISSION, FACTOR, INDEX, REAL, REFLECTANCE, Role, Spectral
 from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product, Texture

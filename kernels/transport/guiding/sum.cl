@@ -1,5 +1,5 @@
 /* Turns the histogram of each row to cumulative sums: see transport/guiding/guide.cl. */
-#include "bvh/no_vectorize.cl"
+#include "bvh/hints.cl"
 #include "transport/guiding/guide.cl#bins"
 
 kernel NO_VECTORIZE void guide_sum(global uint *restrict guide)

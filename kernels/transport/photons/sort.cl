@@ -2,7 +2,7 @@
  *
  * numbers: the cell of each photon, PHOTON_NONE for an empty place. cells: a word more than there are cells; afterwards
  * the photons of cell k are order[cells[k]] up to, but without, order[cells[k + 1]], in ascending order. */
-#include "bvh/no_vectorize.cl"
+#include "bvh/hints.cl"
 #include "generated/photon_numbers.cl"
 
 /* Counts the photons of each cell; cells: zeros. */

@@ -9,8 +9,7 @@ from PIL import Image
 import clpt
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.formats.pbrt.map_values import map_values
-from clpt.formats.pbrt.textures import textured
+from clpt.formats.pbrt.textures import map_values, textured
 from clpt.scene.pixels import pixels
 from clpt.scene.roles import REAL, REFLECTANCE
 from clpt.scene.textures import Bitmap, Checkerboard, Checkers, Dots, Mix, Noise, Product

@@ -9,7 +9,7 @@ from clpt.errors import SceneError
 from clpt.render.flow import programs
 from clpt.render.flow.scene_to_tables import lower
 from clpt.render.materials.thin_films import film_colours
-from clpt.render.records.parameter_words import FILM_COSINES
+from clpt.render.records.materials import FILM_COSINES
 from clpt.scene import Film, Scene, cameras, shapes, textures
 from clpt.scene import materials as m
 from clpt.spectra import cie
