@@ -41,6 +41,16 @@ inline LightRay surface_emit(SurfacePoint q, mask along, Spectrum value, vec2 v)
     return r;
 }
 
+/* A ray from a light at a point, without power. */
+inline LightRay light_ray_along(vec3 o, vec3 d)
+{
+    LightRay r = light_ray_nothing();
+    r.o = o;
+    r.d = d;
+    r.n = d;
+    return r;
+}
+
 /* Radius of the disk where light from infinity starts [m]. */
 inline float emission_radius(global const Settings *settings) { return settings->scene_radius * 1.001f; }
 

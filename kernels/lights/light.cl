@@ -17,6 +17,17 @@
 /* Whether only light from a single hemisphere matters. */
 inline mask hemisphere_given(vec3 hemisphere) { return dot3(hemisphere, hemisphere) > 0.5f; }
 
+/* The direction from p to a light at a point, and its distance; *t2: the square of that [m^2]. */
+inline LightSample light_toward(vec3 position, vec3 p, real *t2)
+{
+    vec3 to = sub3(position, p);
+    LightSample s;
+    *t2 = max_r(dot3(to, to), (real)(1e-20f));
+    s.t = sqrt(*t2);
+    s.wi = scale3(to, 1.0f / s.t);
+    return s;
+}
+
 /* Step choice: choice of a row of `lights` by the alias method (Walker 1977). */
 inline LightRow light_at(Scene scene, integer row)
 {

@@ -42,6 +42,22 @@ typedef struct {
     BsdfSample sample;
 } BsdfAnswer;
 
+/* Of two lobes with albedos a and b: the factor 1 / max(1, a + b), per wavelength. */
+inline Spectrum two_lobes_scale(Spectrum a, Spectrum b)
+{
+    Spectrum r;
+#define C(c) r.c = 1.0f / max_r(a.c + b.c, (real)(1.0f));
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+/* The probability of sampling the second of them. */
+inline real two_lobes_probability(Spectrum a, Spectrum b)
+{
+    real first = spectrum_mean(a), second = spectrum_mean(b);
+    return sel(second + first > 0.0f, second / max_r(second + first, (real)(1e-20f)), (real)(0.5f));
+}
+
 inline BsdfSample bsdf_nothing(void)
 {
     BsdfSample s;

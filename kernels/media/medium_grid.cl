@@ -40,25 +40,35 @@ inline natural grid_key(Scene scene, natural pixel_key, integer sample, integer 
 
 #include "generated/grid_numbers.cl"
 
+/* The lattice of a medium, whose words begin at `at`, and the ray from o along d there. */
+inline void grid_enter(Scene scene, integer name, integer at, vec3 o, vec3 d, GridWalk *w)
+{
+    w->first = gather_i(scene.materials, at);
+    w->nx = max_i(gather_i(scene.materials, at + 1), (integer)(1));
+    w->ny = max_i(gather_i(scene.materials, at + 2), (integer)(1));
+    w->nz = gather_i(scene.materials, at + 3);
+    w->packed = grid_packed(name);
+#define AXIS(a, n)                                                            \
+    vec4 row_##a = row4(scene.materials, at + 4 + 4 * n);                     \
+    w->o.a = row_##a.x * o.x + row_##a.y * o.y + row_##a.z * o.z + row_##a.w; \
+    w->d.a = row_##a.x * d.x + row_##a.y * d.y + row_##a.z * d.z;             \
+    w->inverse.a = 1.0f / sel(fabs(w->d.a) > 1e-20f, w->d.a, (real)(1e-20f));
+    AXIS(x, 0)
+    AXIS(y, 1)
+    AXIS(z, 2)
+#undef AXIS
+}
+
 /* Begins a walk where the ray from o along d, t metres long, enters the box; returns the rays that do. */
 inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask active, GridWalk *w)
 {
     integer at = sel_i(active, MEDIUM_ROW(name) + 2 * MEDIUM_SCATTERING, (integer)(0));
-    w->first = gather_i(scene.materials, at);
-    w->nx = gather_i(scene.materials, at + 1);
-    w->ny = gather_i(scene.materials, at + 2);
-    w->nz = gather_i(scene.materials, at + 3);
-    w->packed = grid_packed(name);
+    grid_enter(scene, name, at, o, d, w);
     real lo = 0.0f, hi = t;
-#define AXIS(a, n)                                                            \
-    vec4 row_##a = row4(scene.materials, at + 4 + 4 * n);                     \
-    real top_##a = gather_w(scene.materials, at + 16 + n);                    \
-    w->o.a = row_##a.x * o.x + row_##a.y * o.y + row_##a.z * o.z + row_##a.w; \
-    w->d.a = row_##a.x * d.x + row_##a.y * d.y + row_##a.z * d.z;             \
-    w->inverse.a = 1.0f / sel(fabs(w->d.a) > 1e-20f, w->d.a, (real)(1e-20f)); \
-    real from_##a = (0.5f - w->o.a) * w->inverse.a;                           \
-    real to_##a = (top_##a - w->o.a) * w->inverse.a;                          \
-    lo = max_r(lo, min_r(from_##a, to_##a));                                  \
+#define AXIS(a, n)                                                                              \
+    real from_##a = (0.5f - w->o.a) * w->inverse.a;                                             \
+    real to_##a = (gather_w(scene.materials, at + 16 + n) - w->o.a) * w->inverse.a;             \
+    lo = max_r(lo, min_r(from_##a, to_##a));                                                    \
     hi = min_r(hi, max_r(from_##a, to_##a));
     AXIS(x, 0)
     AXIS(y, 1)

@@ -71,20 +71,7 @@ inline GridWalk grid_point(Scene scene, integer name, integer number, vec3 p, ma
 {
     integer at = sel_i(active, MEDIUM_ROW(name) + 2 * MEDIUM_SCATTERING, (integer)(0));
     GridWalk w;
-    w.first = gather_i(scene.materials, at);
-    w.nx = max_i(gather_i(scene.materials, at + 1), (integer)(1));
-    w.ny = max_i(gather_i(scene.materials, at + 2), (integer)(1));
-    w.nz = gather_i(scene.materials, at + 3);
-    w.packed = grid_packed(name);
-#define AXIS(a, n)                                                            \
-    vec4 row_##a = row4(scene.materials, at + 4 + 4 * n);                     \
-    w.o.a = row_##a.x * p.x + row_##a.y * p.y + row_##a.z * p.z + row_##a.w;  \
-    w.d.a = 0.0f;                                                             \
-    w.inverse.a = 1.0f;
-    AXIS(x, 0)
-    AXIS(y, 1)
-    AXIS(z, 2)
-#undef AXIS
+    grid_enter(scene, name, at, p, v3(0.0f, 0.0f, 0.0f), &w);
     w.x = number % w.nx;
     w.y = (number / w.nx) % w.ny;
     w.z = number / (w.nx * w.ny);

@@ -24,6 +24,18 @@ inline real phase_part(Spectrum s, integer component)
 inline real phase_pdf(Spectrum densities, mask same) { return sel(same, densities.x, spectrum_mean(densities)); }
 #endif
 
+/* A sample of the uniform density over the sphere. */
+inline BsdfSample phase_uniform(vec3 u, Spectrum weight)
+{
+    BsdfSample s = bsdf_nothing();
+    vec2 point = {u.x, u.y};
+    s.wi = uniform_sphere(point);
+    s.weight = weight;
+    s.pdf = 0.25f * INV_PI;
+    s.lobe = LOBE_TRANSMIT;
+    return s;
+}
+
 /* The sample of a scattering angle with this cosine; u: azimuth over 2 pi. */
 inline BsdfSample phase_turned(real cosine, real u)
 {

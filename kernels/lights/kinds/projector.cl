@@ -19,12 +19,9 @@ inline Spectrum projector_irradiance(Projector l, Scene scene, vec2 uv, Waveleng
 
 LightSample projector_sample(Projector l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
 {
-    vec3 to = sub3(l.position, p);
-    real t2 = max_r(dot3(to, to), (real)(1e-20f)), t = sqrt(t2), z;
+    real t2, z;
     vec2 uv;
-    LightSample s;
-    s.wi = scale3(to, 1.0f / t);
-    s.t = t;
+    LightSample s = light_toward(l.position, p, &t2);
     mask shone = projector_uv(l, neg3(s.wi), &z, &uv);
     Spectrum value = projector_irradiance(l, scene, uv, lambdas);
     s.radiance = spectrum_scale(value, 1.0f / (z * z * z * t2)); /* even over a plane across the axis: 1 / cos^3 */
@@ -37,10 +34,7 @@ LightRay projector_emit(Projector l, Scene scene, vec2 u, vec2 v, Wavelengths la
 {
     real x2 = dot3(l.x, l.x), y2 = dot3(l.y, l.y);
     vec3 across = scale3(l.x, (1.0f - 2.0f * v.x) / x2), up = scale3(l.y, (2.0f * v.y - 1.0f) / y2);
-    LightRay r = light_ray_nothing();
-    r.o = l.position;
-    r.d = normalize3(add3(l.z, add3(across, up)));
-    r.n = r.d;
+    LightRay r = light_ray_along(l.position, normalize3(add3(l.z, add3(across, up))));
     real area = 4.0f / sqrt(x2 * y2); /* [m^2] */
     r.power = spectrum_scale(projector_irradiance(l, scene, v, lambdas), area);
     return r;
