@@ -86,8 +86,8 @@ CAMERAS = {
         cameras.Spherical(to_world=look_at([0.25, 0.9, 0.9], [0.0, 0.9, -1.0], UP)),
         size=(264, 132),
     ),
+    "matrix": seen("A cabinet projection, which no other camera has.", cabinet()),
     "rays": seen(
         "A fisheye of 160 degrees, ray by ray: a list makes any camera.", disc(), (180, 180)
     ),
-    "matrix": seen("A cabinet projection, which no other camera has.", cabinet()),
 }

@@ -15,7 +15,7 @@
 #include "generated/lights.cl"
 #include "generated/medium.cl"
 #include "generated/merging.cl"
-#include "transport/path_end.cl"
+#include "transport/path_state.cl#end"
 #include "generated/seen_wavelengths.cl"
 #include "generated/ghosts.cl"
 #include "generated/sky.cl"

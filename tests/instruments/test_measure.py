@@ -196,4 +196,4 @@ def test_pixels_are_entries_again_and_again():
             film=Film(size=(5, 3), mode=mode, filter=Box(radius=0.25), bands=0),
         )
         image = clpt.render(lit, spp=4)[..., 1]
-        np.testing.assert_allclose(image / image[0, 0], np.tile(levels, (3, 1)), rtol=0.04)  # four wavelengths
+        np.testing.assert_allclose(image / image[0, 0], np.tile(levels, (3, 1)), rtol=0.04)
