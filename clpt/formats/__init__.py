@@ -27,6 +27,10 @@ FORMATS = {  # what reads files of a suffix: a module, imported on use, or a par
     ".pbrt.gz": "pbrt",
     ".glb": "gltf",
     ".gltf": "gltf",
+    ".usd": "usd",
+    ".usda": "usd",
+    ".usdc": "usd",
+    ".usdz": "usd",
     ".obj": "mesh",
     ".ply": "mesh",
     ".stl": "mesh",
@@ -35,11 +39,11 @@ FORMATS = {  # what reads files of a suffix: a module, imported on use, or a par
     ".nvdb": "density",
     ".vol": "density",
 }
-WITH_VARIABLES = ("mitsuba", "gltf")
+WITH_VARIABLES = ("mitsuba", "gltf", "usd")
 
 # The scene of a folder: the first of these, else the scene with the folder's name, else the only.
 IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
-SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf")
+SCENES = tuple(suffix for suffix, kind in FORMATS.items() if kind in (*WITH_VARIABLES, "pbrt"))
 MOST_COMPARED, CLOSE = 4096, 0.7  # names of a folder; least similarity of a suggested name
 MOST_NAMED = 8  # scenes of a folder that a message names
 ARGUMENTS = ("kinds", "progress", "missing_textures", "budget")  # of `load`, beside variables
@@ -60,8 +64,8 @@ def load(
     """Read a scene, a bare mesh or a bare density; a folder means the scene in it (see IN_FOLDERS).
 
     `path` is that of the file. A scene.json may name `kinds`, materials that are not clpt's own.
-    `variables` set the `$names` of Mitsuba's XML; of glTF they choose scene, animation and time; of
-    both `camera` is a camera's number or name. `progress` is called with the share that is read,
+    `variables` set the `$names` of Mitsuba's XML; docs/gltf.md and docs/usd.md have theirs; of all
+    three `camera` is a camera's number or name. `progress` is called with the share that is read,
     from 0 to 1, and a text, for files of many shapes. `missing_textures`: "grey" replaces missing
     images, and unknown materials of Mitsuba and PBRT, by grey; it leaves out unknown shapes and
     lights. Each has a warning. `budget`: memory and time that the load may take; a file that asks
@@ -93,12 +97,13 @@ def _load(
         known = " ".join(FORMATS)
         raise SceneError(f"unknown format {path.suffix!r}; known: {known}", file=path)
     if "camera" in variables and kind not in WITH_VARIABLES:
-        message = f"only .xml and glTF have cameras to choose from, no {variables['camera']!r}; "
+        message = "only .xml, glTF and USD have cameras to choose from, no "
+        message += f"{variables['camera']!r}; "
         message += "--camera AZIMUTH,ELEVATION such as 45,20 looks at all of a scene"
         raise SceneError(message, file=path)
     if variables and kind not in WITH_VARIABLES:
         name = min(variables)
-        message = f"only .xml and glTF have variables, so {name!r} means nothing"
+        message = f"only .xml, glTF and USD have variables, so {name!r} means nothing"
         near = difflib.get_close_matches(name, ARGUMENTS)
         raise SceneError(message + (nearest(name, ARGUMENTS) if near else ""), file=path)
     if kinds and kind != "native":

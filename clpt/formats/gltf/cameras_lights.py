@@ -93,11 +93,7 @@ def rigid(element: Element, node: Matrix) -> Matrix:
     """Return a node's transform without its scale: the nearest rotation, and the translation."""
     if transforms.is_singular(node):
         raise element.error("its node's transform flattens space")
-    u, _, v = np.linalg.svd(node[:3, :3])
-    matrix = np.eye(4)
-    matrix[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
-    matrix[:3, 3] = node[:3, 3]
-    return matrix
+    return transforms.rigid(node)
 
 
 def _planes(lens: Element, needed: bool) -> dict[str, Any]:
