@@ -146,8 +146,7 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     sharp = _first_with((shape for shape in index.shapes if not _hides(shape)), is_sharp)
     if sharp is None:
         return without, "nothing is specular"
-    unlit = (shape for shape in index.shapes if shape.emission is None)
-    if _first_with(unlit, _is_diffuse) is None:
+    if _first_with((s for s in index.shapes if s.emission is None), _is_diffuse) is None:
         return without, "there is nothing dull for a caustic to be seen on"
     small = list(_small_lights(lit))
     if not small:
