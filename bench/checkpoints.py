@@ -25,7 +25,7 @@ import clpt
 from bench import machine
 from bench.cluster import processor_time
 from clpt.cli.files.checkpoints import PERIOD, Checkpoints, path_of
-from clpt.cli.opening.factories import DEVICE_SECONDS
+from clpt.cli.opening import DEVICE_SECONDS
 from clpt.cluster import processes
 from clpt.cluster.cluster_renderer import ClusterRenderer
 from clpt.render.film import film_file

@@ -73,7 +73,7 @@ def plot(path: Path) -> None:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    from clpt.cli.plots import pixels as plots
+    from clpt.cli import plots
 
     same = {"SOURCE_DATE_EPOCH": "0"}
     with rc_context({"svg.hashsalt": "same"}), mock.patch.dict(os.environ, same):

@@ -11,7 +11,7 @@ import logging
 import click
 
 from ..errors import nearest
-from .options.verbosity import Handler, verbose_option
+from .options.records import Handler, verbose_option
 from .process import terminal
 
 COMMANDS = {  # with the first words of their help, for which nothing is imported

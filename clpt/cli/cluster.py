@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from .options.verbosity import verbose_option
+from .options.records import verbose_option
 from .process import terminal
 
 

@@ -13,10 +13,9 @@ from clpt.files import output_files
 from ..choices import LAYOUTS, MODES, PICTURE_SCENES
 from ..errors import SceneError
 from ..formats import load, locate
-from .options.loading_options import loading_options
+from .options.loading import loading_options
 from .options.records import with_records
-from .options.scene_path import ScenePath
-from .options.values import Choice
+from .options.values import Choice, ScenePath
 from .process import terminal
 
 if TYPE_CHECKING:

@@ -48,8 +48,8 @@ def merge(
     for film in films:
         locate(film)
     from ..render.film.saved_film import other_devices  # here: help needs no OpenCL
+    from .display import display
     from .files import checkpoints, outputs
-    from .printing.display import display
 
     how = graded.grading
     targets = checked(paths)

@@ -15,7 +15,7 @@ from ..errors import SceneError
 from .options.records import with_records
 from .options.values import Choice
 from .process import terminal
-from .process.extras import extra
+from .process.failures import extra
 
 if TYPE_CHECKING:
     import numpy as np
@@ -95,7 +95,6 @@ def mie(drops: Drops, indices: Indices, output: Path | None, plot: Path | None) 
     """
     from .. import mie as theory  # here: help needs no numpy
     from ..formats.native.write import write_medium
-    from .printing.mie import print_medium
 
     at = _wavelengths(indices.wavelengths)
     medium = theory.droplets(
@@ -113,13 +112,13 @@ def mie(drops: Drops, indices: Indices, output: Path | None, plot: Path | None) 
         terminal.say(str(output))
     if plot is not None:
         with extra("plot", "a plot"):
-            from .plots import mie as mie_plot  # here: matplotlib is an extra, and slow to import
+            from . import plots  # here: matplotlib is an extra, and slow
 
         title = f"{drops.law}, {drops.radius:g} um, {indices.index} in {indices.host}"
-        mie_plot.write(plot, medium, title)
+        plots.plot_phase(plot, medium, title)
         terminal.say(str(plot))
     if output is None and plot is None:
-        print_medium(medium, at)
+        _print_medium(medium, at)
 
 
 def _wavelengths(text: str) -> np.ndarray:
@@ -145,3 +144,22 @@ def _index(text: str, column: Any) -> Any:
 
         return spectra.read_index(Path(text), column)
     return text
+
+
+def _print_medium(medium: Any, at: np.ndarray) -> None:
+    """Print what a medium does at wavelengths [nm]."""
+    import numpy as np
+    from rich.table import Table
+
+    from .console import output_console
+
+    table = Table(box=None, pad_edge=False)
+    for heading in ("nm", "sigma_t [1/m]", "albedo", "mean cosine", "back [1/sr]"):
+        table.add_column(heading, justify="right")
+    phase = medium.phase
+    moment = phase.values * phase.cosines
+    g = np.pi * ((moment[:, 1:] + moment[:, :-1]) @ np.diff(phase.cosines))
+    sigma_t, albedo = (each.sample(at) for each in (medium.sigma_t, medium.albedo))
+    for row in zip(at, sigma_t, albedo, g, phase.values[:, 0], strict=True):
+        table.add_row(*(f"{value:.6g}" for value in row))
+    output_console().print(table)

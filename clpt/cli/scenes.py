@@ -32,7 +32,7 @@ def scenes(as_json: bool, schema: bool) -> None:
         return
     from rich.table import Table
 
-    from .printing.console import output_console, shown
+    from .console import output_console, shown
 
     table = Table("scene", "size", "what it shows")
     for one in found:

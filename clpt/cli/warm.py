@@ -9,11 +9,9 @@ from pathlib import Path
 import click
 
 from ..formats import locate
-from .options.headings import Grouped
-from .options.records import with_records
+from .options.records import Grouped, verbose_option, with_records
 from .options.scene_options import SceneOptions, denoise_option, scene_options
-from .options.scene_path import ScenePath
-from .options.verbosity import verbose_option
+from .options.values import ScenePath
 from .process import terminal
 
 
@@ -32,9 +30,8 @@ def warm(scenes: tuple[Path, ...], options: SceneOptions, verbose: int, quiet: b
     """
     for scene in scenes:
         locate(scene)
-    from .opening.factories import DeviceFactory
-    from .opening.scenes import open_scene
-    from .printing.display import display
+    from .display import display
+    from .opening import DeviceFactory, open_scene
 
     for scene in scenes:
         shown, began = display(quiet, None), time.perf_counter()

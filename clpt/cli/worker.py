@@ -6,9 +6,8 @@ from pathlib import Path
 
 import click
 
-from .options.records import with_records
+from .options.records import verbose_option, with_records
 from .options.scene_options import Machine
-from .options.verbosity import verbose_option
 from .process import terminal
 
 

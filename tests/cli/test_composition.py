@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from clpt import images, transforms
 from clpt.__main__ import run
 from clpt.cli.options.applied import changed, composed
-from clpt.cli.options.changes import SceneChanges
-from clpt.cli.options.composition import CameraType, Composition, CropType, Orbit
+from clpt.cli.options.changes import CameraType, Composition, CropType, Orbit, SceneChanges
 from clpt.errors import SceneError
 from clpt.formats import brought, load
 from clpt.scene import Film, Scene, cameras, framing, lights, shapes

@@ -14,7 +14,7 @@ import pytest
 from clpt import choices
 from clpt.bvh import layouts
 from clpt.cli import COMMANDS, cli
-from clpt.cli.options.headings import HEADINGS, OTHER, Grouped
+from clpt.cli.options.records import HEADINGS, OTHER, Grouped
 from clpt.images.colour import tones
 from clpt.render.film import layer_channels
 from clpt.scene import kinds

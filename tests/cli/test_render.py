@@ -316,7 +316,7 @@ def test_the_renderer_gets_the_tree_that_was_asked_for(given, told, monkeypatch,
     def refuse(*_, tree_quality, layout, **__):
         raise SceneError(f"{tree_quality} {layout}")
 
-    monkeypatch.setattr(sys.modules["clpt.cli.opening.factories"], "Renderer", refuse)
+    monkeypatch.setattr(sys.modules["clpt.cli.opening"], "Renderer", refuse)
     assert run(["render", CORNELL, "--quiet", *given]) == 2
     assert f"clpt: error: {told}" in capsys.readouterr().err
 

@@ -11,8 +11,8 @@ from clpt import images
 from clpt.__main__ import run
 from clpt.cli.files import outputs
 from clpt.cli.options.grading import Grading
-from clpt.cli.render import so_far
-from clpt.cli.render.so_far import PictureSoFar
+from clpt.cli.render import picture
+from clpt.cli.render.picture import PictureSoFar
 from clpt.errors import SceneError
 
 CORNELL = str(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
@@ -23,7 +23,7 @@ COMMON = ["--size", "8x6", "--mode", "rgb"]
 def clock(monkeypatch):
     """A clock that is set by hand."""
     now = [100.0]
-    monkeypatch.setattr(so_far.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(picture.time, "monotonic", lambda: now[0])
     return now
 
 

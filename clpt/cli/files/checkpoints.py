@@ -16,10 +16,9 @@ from ...render.film.saved_film import SavedFilm, differences_text, ranges_text
 from ...render.pictures import DevicePictures
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
-from ..printing.display import clock
+from ..display import clock
 from . import outputs
-from .standard_output import is_standard
-from .targets import CHECKPOINT, FILM, default
+from .targets import CHECKPOINT, FILM, default, is_standard
 
 PERIOD = 300.0  # seconds from one checkpoint to the next
 PATIENCE = 600.0  # seconds of a render after which it has checkpoints unasked

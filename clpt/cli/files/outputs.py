@@ -20,8 +20,7 @@ from ...render.pictures import DevicePictures
 from ...render.resumable import ResumableRenderer
 from ...version import VERSION
 from ..options.grading import Grading
-from .standard_output import is_standard
-from .targets import FILM
+from .targets import FILM, is_standard
 
 Film = ResumableRenderer | SavedFilm  # what can be saved
 Source = Film | DenoisedPicture  # what pictures are taken of

@@ -13,8 +13,7 @@ from ...formats import brought
 from ...scene import Scene, kinds, viewpoint
 from ...scene.integrators import NO_AOV, Auto
 from ...scene.params import Kind, fields_of, params
-from .changes import SceneChanges, Transport
-from .composition import Composition
+from .changes import Composition, SceneChanges, Transport
 
 PARAMETERS = {  # of integrators, and what an integrator without one has not
     "max_depth": "depth",

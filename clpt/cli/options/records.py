@@ -1,13 +1,19 @@
-"""Options of a command as records: each takes the values of the options that its fields name."""
+"""Commands with many options: records of their values, help in groups, the option -v."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
 import inspect
+import logging
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar, cast
+
+import click
+
+from ... import clean_logs
+from ..process import terminal
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 Made = TypeVar("Made")
@@ -74,3 +80,90 @@ def _fields(form: Callable[..., Any]) -> dict[str, Callable[..., Any] | None]:
         found = known.get(parameter.annotation)
         fields[name] = found if dataclasses.is_dataclass(found) else None
     return fields
+
+
+OTHER = "Other options"
+# What stands under each heading, by the names that options have in the program. Options of a
+# command that are in none of them stand under OTHER.
+HEADINGS: dict[str, tuple[str, ...]] = {
+    "Output": (
+        "paths", "folder", "form", "every", "layers", "names", "alpha", "denoise", "tev",
+    ),
+    "Page": ("port", "host", "no_browser", "opened"),
+    "Samples": ("spp", "noise", "limit", "numbers", "sampler", "seed", "period", "resume"),
+    "Camera and picture": ("camera", "size", "crop", "env", "env_rotation"),
+    "Light transport": (
+        "mode", "integrator", "max_depth", "light_paths", "guiding", "radius", "lambda_min",
+        "lambda_max", "bands",
+    ),
+    "Colour": (
+        "exposure", "tone", "view", "display", "look", "ocio", "sensor", "white_balance",
+        "output_space",
+    ),
+    "Animation": ("frames", "fps", "video"),
+    "Device": ("device", "threads", "layout", "tree_quality", "texture_budget"),
+    "Cluster": ("cluster", "keys"),
+    "Scene file": (
+        "variables", "missing_textures", "load_memory", "load_seconds", "load_parts",
+    ),
+}  # fmt: skip
+
+
+class Grouped(click.Command):
+    """A command whose help shows options under HEADINGS.
+
+    `examples` of a heir: command lines, and what each does.
+    """
+
+    examples: Sequence[tuple[str, str]] = ()
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options, heading by heading, then the examples."""
+        left = {
+            param.name: record
+            for param in self.get_params(ctx)
+            if isinstance(param, click.Option)
+            and (record := param.get_help_record(ctx)) is not None
+        }
+        for heading, names in HEADINGS.items():
+            rows = [left.pop(name) for name in names if name in left]
+            if rows:
+                with formatter.section(heading):
+                    formatter.write_dl(rows)
+        with formatter.section(OTHER):
+            formatter.write_dl([*left.values()])
+        if self.examples:
+            with formatter.section("Examples"):
+                for line, meaning in self.examples:
+                    formatter.write(f"{'':{formatter.current_indent}}{line}\n")
+                    formatter.write(f"{'':{formatter.current_indent}}    {meaning}\n")
+
+
+def grouped(examples: Sequence[tuple[str, str]] = ()) -> type[Grouped]:
+    """Return a class of commands whose help ends with examples."""
+    return type("Grouped", (Grouped,), {"examples": examples})
+
+
+LEVELS = (logging.WARNING, logging.INFO, logging.DEBUG)
+_COUNT = "clpt.verbosity"  # in what nested contexts share
+
+
+class Handler(logging.Handler):
+    """Prints messages of clpt's log as the commands print theirs: clpt: warning: ..."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print a message, which has more lines where it tells a traceback."""
+        clean_logs.clean(record)  # another library's too
+        terminal.clear_line()
+        terminal.say_lines(f"clpt: {record.levelname.lower()}: {self.format(record)}", err=True)
+
+
+def verbose_option(text: str) -> Callable[[Command], Command]:
+    """Return the option, with its help; the command gets how often it was given in all."""
+    return click.option("-v", "--verbose", count=True, callback=_add, help=text)
+
+
+def _add(ctx: click.Context, param: click.Parameter, value: int) -> int:
+    count = ctx.meta[_COUNT] = ctx.meta.get(_COUNT, 0) + value
+    logging.getLogger("clpt").setLevel(LEVELS[min(count, len(LEVELS) - 1)])
+    return count

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from ...choices import AUTO, MOST_LIGHT_PATHS, MOST_SAMPLES, OBSERVERS
 from ...errors import nearest
+from ...formats import own_scenes
 
 LARGEST = 65536  # pixels of a side
 MOST_NOISE = 0.5  # that --noise takes: beyond, a few samples of each pixel are enough
@@ -154,3 +158,26 @@ class White(click.ParamType):
             names = {name.lower(): name for name in ("none", *illuminants())}
             return names.get(str(value).lower(), value)
         return numbers[0] if len(numbers) == 1 else tuple(numbers)
+
+
+class ScenePath(click.Path):
+    """The path of a file or a folder, or of one of clpt's own scenes."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Return clpt's own scenes that begin so, with files that are there; else any files."""
+        own = [path for path in own_scenes.paths() if path.startswith(incomplete)]
+        if not incomplete or not own:
+            return super().shell_complete(ctx, param, incomplete)
+        folder, _, name = incomplete.rpartition("/")
+        try:
+            names = sorted(os.listdir(folder or "."))
+        except OSError:
+            names = []
+        here = [f"{folder}/{one}" if folder else one for one in names if one.startswith(name)]
+        files = [path for path in here if path not in own and path != own_scenes.SCENES]
+        return [CompletionItem(path) for path in (*own, *files)]

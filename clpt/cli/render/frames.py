@@ -26,17 +26,15 @@ from ...render.pictures import DevicePictures
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
 from ...version import VERSION
+from ..display import Display, clock
 from ..files import outputs, targets
-from ..opening.devices import choose_devices
-from ..opening.factories import RendererFactory, cluster_factories, device_factories
+from ..opening import RendererFactory, choose_devices, cluster_factories, device_factories
 from ..options.applied import changed
-from ..printing.display import Display, clock
 from ..process.stopping import STATUS, stops
 from . import video
-from .frame_values import expanded, has_number, numbered, varies
 from .passes import End, render_samples
-from .refused import refusals
-from .settings import Job
+from .report import refusals
+from .settings import Job, expanded, has_number, numbered, varies
 
 KEPT = (".exr", ".png")  # formats that keep a frame's fingerprint
 LOOK = 0.1  # seconds between two looks at signals

@@ -12,7 +12,7 @@ from ...choices import MOST_SAMPLES
 from ...render.pictures import DevicePictures
 from ...render.progress import Progress
 from ...render.wavefront.wavefront import Counts
-from ..opening.factories import DEVICE_SECONDS
+from ..opening import DEVICE_SECONDS
 
 GROWTH = 3  # times what has been rendered so far
 

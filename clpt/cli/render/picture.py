@@ -9,24 +9,32 @@ from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...errors import ClusterError
+from ...render.film.layer_channels import channels_of
 from ...render.film.saved_film import SavedFilm
 from ...render.pictures import DevicePictures
 from ...render.progress import Progress
 from ...scene import Scene
+from ..display import Display, device_names
 from ..files import checkpoints, outputs
-from ..opening.factories import DeviceFactory, RendererFactory, cluster_factories, device_factories
-from ..opening.scenes import open_scene, read_scene
-from ..options.grading import for_screens
-from ..printing.display import Display
-from ..printing.names import device_names
+from ..files.outputs import Film
+from ..opening import (
+    DeviceFactory,
+    RendererFactory,
+    cluster_factories,
+    device_factories,
+    open_scene,
+    read_scene,
+)
+from ..options.grading import Grading, for_screens
 from ..process.stopping import STATUS, stops
-from . import brightness, report
+from . import report
 from .passes import End, render_samples
-from .refused import refusals
+from .report import refusals
 from .settings import Job
-from .so_far import PictureSoFar
-from .tev_viewer import showing
 
 
 def render_picture(job: Job, shown: Display, began: float) -> int:
@@ -195,10 +203,10 @@ class _Picture:
         told = [*few, *refusals(self._renderer)]
         if self._has_samples:
             if grading.exposure == "auto" and for_screens(targets):
-                self._shown.note(f"exposure {brightness.exposure_found(self._renderer):+.1f} stops")
-            elif for_screens(targets) and (said := brightness.display_exposure(self._renderer)):
+                self._shown.note(f"exposure {report.exposure_found(self._renderer):+.1f} stops")
+            elif for_screens(targets) and (said := report.display_exposure(self._renderer)):
                 self._shown.note(said)
-            told += brightness.remarks(self._renderer, grading, targets)
+            told += report.remarks(self._renderer, grading, targets)
         for text in told:
             self._shown.note(f"clpt: warning: {text}")
 
@@ -245,3 +253,81 @@ class _Picture:
                     self._shown.note(f"clpt: warning: {error}")
             self._writer.finish(True)
             raise
+
+
+class PictureSoFar:
+    """Writes the picture of a render that goes on, at the ends of its passes.
+
+    A reader sees a whole picture at any time, see clpt.files.output_files. What cannot be written
+    is told once, and tried again; the render goes on.
+
+    period: seconds from one picture to the next, None: never; stats: returns the metadata of the
+    picture so far; note: prints a line.
+    """
+
+    def __init__(
+        self,
+        period: float | None,
+        targets: tuple[Path, ...],
+        source: outputs.Source,
+        stats: Callable[[], dict[str, str | int | float]],
+        grading: Grading,
+        note: Callable[[str], None],
+    ):
+        self._period, self._targets, self._source = period or math.inf, targets, source
+        self._stats, self._grading, self._note = stats, grading, note
+        self._due = time.monotonic() + self._period
+        self._failed: set[Path] = set()
+
+    def after_pass(self) -> None:
+        """Write the picture, if that is due."""
+        if time.monotonic() < self._due:
+            return
+        stats = self._stats()
+        for path in self._targets:
+            self._write(path, stats)
+        self._due = time.monotonic() + self._period  # from its end: a render is not all writing
+
+    def _write(self, path: Path, stats: dict[str, str | int | float]) -> None:
+        try:
+            outputs.write(path, self._source, stats, self._grading)
+        except outputs.FAILURES as error:
+            if path not in self._failed:
+                self._note(f"clpt: warning: {outputs.failure(path, error)}; the render goes on")
+            self._failed.add(path)
+        else:
+            self._failed.discard(path)
+
+
+@contextmanager
+def showing(
+    address: tuple[str, int] | None, name: str, source: Film, note: Callable[[str], None]
+) -> Iterator[Callable[[], None]]:
+    """Yield what sends the picture so far, in a thread; it does nothing without an address.
+
+    A viewer that goes away stops nothing. Raises tev.TevError where none is at first.
+    """
+    if address is None:
+        yield lambda: None
+        return
+    from clpt.images import tev  # here: most renders show nothing
+
+    viewer = tev.Viewer(name, *address, tell=note)
+    try:
+        yield lambda: viewer.show(channels_so_far(source))
+    finally:
+        viewer.close()
+
+
+def channels_so_far(source: Film) -> dict[str, NDArray[np.float32]]:
+    """Return all channels of the picture so far, (h, w) by name: colours, layers, bands."""
+    picture = source.picture()
+    made = {letter: picture[..., i] for i, letter in enumerate("RGBA"[: picture.shape[2]])}
+    made |= channels_of(source.layers())
+    if source.form.adaptive:
+        made["samples.X"] = source.samples_per_pixel()
+    if source.form.bands:
+        spectral = source.spectral_image()
+        for nm, band in zip(spectral.lambdas, np.moveaxis(spectral.values, 2, 0), strict=True):
+            made[f"bands.{nm:g}nm"] = band
+    return made

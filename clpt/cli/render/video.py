@@ -22,7 +22,7 @@ from clpt import images
 from clpt.files import output_files
 
 from ...errors import SceneError
-from ..process.extras import extra
+from ..process.failures import extra
 from ..process.stopping import stops
 
 LOOK = 0.02  # seconds between two looks at ffmpeg

@@ -22,15 +22,14 @@ from ...view.pictures import Display
 from ...view.saving import Folder
 from ...view.session import Session, Source
 from ...view.views import load as load_view
+from ..display import Display as Progress
+from ..display import display
 from ..files import outputs, targets
-from ..opening.scenes import Opened, open_scene
-from ..opening.workers import connected
+from ..opening import Opened, connected, open_scene
 from ..options.grading import Grading
 from ..options.scene_options import SceneOptions
-from ..printing.display import Display as Progress
-from ..printing.display import display
 from ..process import terminal
-from ..process.extras import extra
+from ..process.failures import extra
 from ..process.stopping import STATUS, stops
 from .settings import Settings
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..options.grading import GradingOptions
-from ..options.scene_options import SceneOptions
-from ..options.workers import Workers
+from ..options.scene_options import SceneOptions, Workers
 
 
 @dataclass(frozen=True)

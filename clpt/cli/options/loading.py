@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import click
@@ -12,7 +12,8 @@ import click
 from clpt.files import budget
 
 from .records import Command, with_options
-from .scene_variables import scene_variables
+
+RESERVED = ("kinds", "progress", "missing_textures", "budget")  # parameters of clpt.load
 
 
 class Bytes(click.ParamType):
@@ -39,8 +40,24 @@ def _limit(name: str) -> Callable[[Any, Any, Any], None]:
     return set_limit
 
 
+def _parse(_: click.Context, __: click.Parameter, definitions: Iterable[str]) -> dict[str, Any]:
+    """Return NAME=VALUE options as a dictionary. Raises click.BadParameter."""
+    pairs = [definition.partition("=") for definition in definitions]
+    wrong = next((name for name, equals, _ in pairs if not (name and equals)), None)
+    if wrong is not None:
+        raise click.BadParameter(f"{wrong!r} does not look like NAME=VALUE", param_hint="-D")
+    for name in RESERVED:
+        if any(name == given for given, _, _ in pairs):
+            raise click.BadParameter(f"no variable can be called {name}", param_hint="-D")
+    return {name: value for name, _, value in pairs}
+
+
 _OPTIONS = (
-    scene_variables,
+    click.option(
+        "-D", "variables", multiple=True, metavar="NAME=VALUE", callback=_parse,
+        is_eager=True,  # before --camera, which adds to it
+        help="Set a $name of an .xml; of glTF scene, animation or time. See --frames for {frame}.",
+    ),
     click.option(
         "--load-memory", type=Bytes(), metavar="SIZE", expose_value=False,
         callback=_limit("memory"),

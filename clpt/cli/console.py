@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.text import Text
 
-from ..process.terminal import LONGEST
+from .process.terminal import LONGEST
 
 
 def output_console() -> Console:
