@@ -15,6 +15,7 @@ import numpy as np
 
 import clpt
 from clpt import images, measured, scene
+from clpt.cli.display import Display
 from clpt.cli.files import checkpoints
 from clpt.cli.render import video
 from clpt.files import output_files
@@ -48,9 +49,11 @@ def spectral(path: Path) -> None:
 def checkpoint(path: Path) -> None:
     """Write one as a render does; what it could not do is an error."""
     said: list[str] = []
+    shown = Display()
+    shown.note = said.append
     kept = film((1, 10, 4, 5))
     renderer = SimpleNamespace(_hold=lambda: None, saved_film=lambda held: kept)
-    writer = checkpoints.Checkpoints(renderer, path, 1e9, False, (), said.append)
+    writer = checkpoints.Checkpoints(renderer, path, 1e9, False, (), shown)
     try:
         writer.save(stopped=False)
     finally:

@@ -28,4 +28,5 @@ def convert(source: Path, target: Path, layer: str | None, graded: GradingOption
     locate(source)
     from .files.image_tools import write_converted
 
-    write_converted(source, target, layer, grading, terminal.say)
+    for line in write_converted(source, target, layer, grading):
+        terminal.say(line)

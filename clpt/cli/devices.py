@@ -1,4 +1,4 @@
-"""`clpt devices`: the OpenCL devices, the one that would be used, and why."""
+"""`clpt devices`: the OpenCL devices, and the choice among them."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 @click.option("--json", "json_wanted", is_flag=True, help="Write JSON instead of a table.")
 @verbose_option("Show full names and drivers; log more, twice for everything.")
 def devices(json_wanted: bool, verbose: int) -> None:
-    """List the OpenCL devices, with the one that would be used and why.
+    """List the OpenCL devices, and the choice among them.
 
-    Each is tried with a trivial kernel. Choose another one by --device NAME-OR-INDEX or by the
-    environment variable CLPT_DEVICE; a part of the name is enough.
+    Each is tried with a trivial kernel. Choose another device by --device NAME-OR-INDEX or by
+    the environment variable CLPT_DEVICE; a part of the name is enough.
     """
     from .. import device  # here: help needs no OpenCL
     from ..device import runtimes
@@ -51,7 +51,7 @@ def devices(json_wanted: bool, verbose: int) -> None:
 
 
 def as_json(listed: tuple[DeviceInfo, ...], failures: dict[int, str | None]) -> dict[str, object]:
-    """Return what is known of devices, and which is taken. Raises DeviceError."""
+    """Return the facts of devices, and the chosen device. Raises DeviceError."""
     from ..device.context import selection
 
     choice = selection()
@@ -71,25 +71,24 @@ def table(
 ) -> Table:
     """Return a table of devices, of 80 columns or less where they work.
 
-    taken: the index of the one that would be used; verbose: whether it has their full names and
-    their drivers.
+    taken: the index of the chosen device; verbose: whether to show full names and drivers.
     """
     from rich.table import Table
 
     from .console import shown
     from .display import device_name
 
-    made = Table(box=None, pad_edge=False)
+    rows = Table(box=None, pad_edge=False)
     names = ("platform", "device", "driver") if verbose else ("device",)
     for heading in ("", *names, "kind", "units", "memory", "lanes", "state"):
         right = heading in ("units", "memory", "lanes")
-        made.add_column(heading, justify="right" if right else "left", overflow="fold")
+        rows.add_column(heading, justify="right" if right else "left", overflow="fold")
     for info in listed:
         failure = failures[info.index]
-        own = (info.platform, info.name, info.driver) if verbose else (device_name(info),)
-        made.add_row(
+        labels = (info.platform, info.name, info.driver) if verbose else (device_name(info),)
+        rows.add_row(
             f"{'*' if info.index == taken else ' '} {info.index}",
-            *map(shown, own),
+            *map(shown, labels),
             info.kind.upper() if info.kind != "accelerator" else info.kind,
             str(info.compute_units),
             f"{info.global_mem / 2**30:.1f} GiB",
@@ -97,4 +96,4 @@ def table(
             "works" if failure is None else shown(f"fails: {failure}"),
             style="bold" if info.index == taken else None,
         )
-    return made
+    return rows

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from ..render.progress import Progress
 from .process import terminal
@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
+LoadProgress: TypeAlias = Callable[[float, str], None]  # of `clpt.load`
+
 EVERY = 5.0  # seconds between lines
 PATIENCE = 1.0  # seconds of reading or compiling before a line or a bar tells of it
-WIDE, NARROW, ROOMY = 24, 10, 100  # columns of a bar, and of a terminal for the wide one
+WIDE, NARROW, ROOMY = 24, 10, 100  # columns of a wide bar, of a narrow bar, of a wide terminal
 REFRESH = 0.1  # seconds between changes of the bar
 LONGEST_NAME = 16  # characters of a scene's name beside the bar
 
@@ -36,7 +38,7 @@ def display(quiet: bool, limit: float | None, name: str = "") -> Display:
 
 
 class Programs:
-    """Counts programs that are compiled; changed: called after each change, one at a time."""
+    """Counts programs that are compiled; changed: called under a lock after each change."""
 
     def __init__(self, changed: Callable[[], None] = lambda: None):
         self._begun: set[str] = set()
@@ -74,7 +76,7 @@ class Programs:
 
 
 class Display:
-    """Shows nothing; the base of those that do."""
+    """Shows nothing; the base of displays."""
 
     def __init__(self, limit: float | None = None, name: str = ""):
         self.limit, self.name = limit, terminal.cleaned(name)
@@ -88,16 +90,16 @@ class Display:
 
     @contextmanager
     def compiling(self, text: str) -> Iterator[Programs]:
-        """Yield programs, of which any thread tells what is compiled; show them if it lasts."""
+        """Yield a count of programs, which threads that compile advance; show it if it lasts."""
         yield Programs()
 
     def begin(self, text: str) -> None:
         """Show a text at once, until something else is shown."""
 
     @contextmanager
-    def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:
-        """Yield a function that shows how much of the scene `name` is read."""
-        yield lambda fraction, what: None
+    def loading(self, name: str) -> Iterator[LoadProgress]:
+        """Yield a function that shows the share of the scene `name` that is read."""
+        yield lambda fraction, step: None
 
     @contextmanager
     def rendering(self) -> Iterator[None]:
@@ -158,14 +160,14 @@ class Lines(Display):
             timer.cancel()
 
     @contextmanager
-    def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:
+    def loading(self, name: str) -> Iterator[LoadProgress]:
         last = time.perf_counter()
 
-        def tell(fraction: float, what: str) -> None:
+        def tell(fraction: float, step: str) -> None:
             nonlocal last
             if time.perf_counter() - last >= EVERY:
                 last = time.perf_counter()
-                self.note(f"reading {name}: {what}")
+                self.note(f"reading {name}: {step}")
 
         yield tell
 
@@ -234,7 +236,7 @@ class Bar(Lines):
             yield programs
 
     @contextmanager
-    def loading(self, name: str) -> Iterator[Callable[[float, str], None]]:
+    def loading(self, name: str) -> Iterator[LoadProgress]:
         from rich.progress import BarColumn, TextColumn
         from rich.progress import Progress as RichProgress
 
@@ -246,10 +248,10 @@ class Bar(Lines):
         bar = RichProgress(*columns, console=self.console, transient=True)
         task, began = bar.add_task("", total=1.0, name=terminal.cleaned(name)), time.perf_counter()
 
-        def tell(fraction: float, what: str) -> None:
+        def tell(fraction: float, step: str) -> None:
             if time.perf_counter() - began >= PATIENCE:
                 bar.start()
-                bar.update(task, completed=fraction, description=terminal.cleaned(what))
+                bar.update(task, completed=fraction, description=terminal.cleaned(step))
 
         try:
             yield tell
@@ -290,8 +292,8 @@ def figures(
 ) -> dict[str, str]:
     """Return what is shown, by the names in FIGURES.
 
-    fraction: of the render that is done; since: the seconds and the fraction from which the speed
-    is estimated.
+    fraction: of the render that is done; since: seconds and fraction at the start of the estimate
+    of speed.
     """
     seconds, done = max(progress.seconds, 1e-9), fraction - since[1]
     left = f"{clock((seconds - since[0]) * (1.0 - fraction) / done)} left" if done > 0.0 else ""
@@ -314,9 +316,9 @@ def percent(share: float) -> str:
 
 def clock(seconds: float) -> str:
     """Return a time as m:ss or h:mm:ss."""
-    minutes, rest = divmod(round(seconds), 60)
+    minutes, seconds_left = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+    return f"{hours}:{minutes:02}:{seconds_left:02}" if hours else f"{minutes}:{seconds_left:02}"
 
 
 PLATFORMS = {  # names that people use
@@ -350,5 +352,5 @@ def device_name(info: Named) -> str:
 def device_names(infos: Sequence[Named]) -> str:
     """Return the names of several devices: 4 x NVIDIA H100 where they are alike."""
     names = [device_name(info) for info in infos]
-    found = [(names.count(name), name) for name in dict.fromkeys(names)]
-    return " and ".join(name if count == 1 else f"{count} x {name}" for count, name in found)
+    counted = [(names.count(name), name) for name in dict.fromkeys(names)]
+    return " and ".join(name if count == 1 else f"{count} x {name}" for count, name in counted)

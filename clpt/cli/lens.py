@@ -44,21 +44,21 @@ def lens(
     from .. import lenses  # here: help needs no numpy
     from .console import output_console, shown
 
-    made = lenses.read(lens) if Path(lens).suffix else lenses.library(lens)
+    prescription = lenses.read(lens) if Path(lens).suffix else lenses.library(lens)
     if f_number is not None:
-        made = made.with_stop(lenses.paraxial.stop_radius(made, f_number))
+        prescription = prescription.with_stop(lenses.paraxial.stop_radius(prescription, f_number))
     waves = _numbers(wavelengths, "--wavelengths", 200.0, 2000.0)
     angles = _numbers(fields, "--fields", -89.0, 89.0)
     console = output_console()
-    source = f"; {made.source}" * bool(made.source)
-    console.print(shown(f"{made.name}, {len(made.surfaces)} surfaces{source}"))
-    console.print(_near_axis(made, waves))
-    console.print(_spots(made, waves, angles))
+    source = f"; {prescription.source}" * bool(prescription.source)
+    console.print(shown(f"{prescription.name}, {len(prescription.surfaces)} surfaces{source}"))
+    console.print(_near_axis(prescription, waves))
+    console.print(_spots(prescription, waves, angles))
     if plot is not None:
         with extra("plot", "a plot"):
             from . import plots  # here: matplotlib is an extra, and slow
 
-        plots.plot_lens(plot, made, waves, angles)
+        plots.plot_lens(plot, prescription, waves, angles)
         terminal.say(str(plot))
 
 
@@ -74,7 +74,7 @@ def _numbers(text: str, option: str, low: float, high: float) -> list[float]:
 
 
 def _near_axis(lens: Prescription, waves: Sequence[float]) -> Table:
-    """Return what a lens does near its axis, a row for each wavelength [nm]."""
+    """Return paraxial properties of a lens, a row for each wavelength [nm]."""
     from rich.table import Table
 
     from .. import lenses
@@ -84,11 +84,12 @@ def _near_axis(lens: Prescription, waves: Sequence[float]) -> Table:
     for heading in headings:
         table.add_column(heading, justify="right")
     for wavelength in waves:
-        found = lenses.cardinal(lens, wavelength)
+        points = lenses.cardinal(lens, wavelength)
         table.add_row(
-            f"{wavelength:g}", f"{found.focal_length:.5g}", f"{found.back_focus:.5g}",
-            f"{found.f_number:.4g}", f"{2.0 * found.entrance_radius:.4g} at {found.entrance:.4g}",
-            f"{2.0 * found.exit_radius:.4g} at {found.exit:.4g}",
+            f"{wavelength:g}", f"{points.focal_length:.5g}", f"{points.back_focus:.5g}",
+            f"{points.f_number:.4g}",
+            f"{2.0 * points.entrance_radius:.4g} at {points.entrance:.4g}",
+            f"{2.0 * points.exit_radius:.4g} at {points.exit:.4g}",
         )  # fmt: skip
     return table
 

@@ -25,19 +25,16 @@ DIGITS = 6  # of the table in a file
 
 @dataclass(frozen=True)
 class Drops:
-    """The sizes of drops, see `clpt.mie.sizes`, and their share of the volume; radius [um]."""
+    """Drops: sizes, see `clpt.mie.sizes`, share of the volume, indices; radius [um].
+
+    k: absorption of the drops; host: index of the medium around them; wavelengths: of the table.
+    """
 
     radius: float
     law: str
     spread: float
     share: float
     radii: int
-
-
-@dataclass(frozen=True)
-class Indices:
-    """Indices of drops and of what is around them, absorption of drops, and wavelengths."""
-
     index: str
     k: str
     host: str
@@ -87,8 +84,8 @@ class Indices:
     "--plot", type=click.Path(path_type=Path),
     help="The phase function by angle and wavelength, .png, .svg or .pdf.",
 )  # fmt: skip
-@with_records(drops=Drops, indices=Indices)
-def mie(drops: Drops, indices: Indices, output: Path | None, plot: Path | None) -> None:
+@with_records(drops=Drops)
+def mie(drops: Drops, output: Path | None, plot: Path | None) -> None:
     """Make the medium of spheres of RADIUS micrometres: fog, mist, milk.
 
     It follows from Mie's theory (1908), for each wavelength. Without -o, a table of it is shown.
@@ -96,11 +93,11 @@ def mie(drops: Drops, indices: Indices, output: Path | None, plot: Path | None) 
     from .. import mie as theory  # here: help needs no numpy
     from ..formats.native.write import write_medium
 
-    at = _wavelengths(indices.wavelengths)
+    at = _wavelengths(drops.wavelengths)
     medium = theory.droplets(
         theory.sizes(drops.law, drops.radius * 1e-6, drops.spread, drops.radii), drops.share,
-        index=_index(indices.index, "eta"), k=_index(indices.k, "k"),
-        host=_index(indices.host, "eta"), lambdas=at,
+        index=_index(drops.index, "eta"), k=_index(drops.k, "k"),
+        host=_index(drops.host, "eta"), lambdas=at,
     )  # fmt: skip
     if output is not None:
         if output.suffix.lower() != ".json":
@@ -114,7 +111,7 @@ def mie(drops: Drops, indices: Indices, output: Path | None, plot: Path | None) 
         with extra("plot", "a plot"):
             from . import plots  # here: matplotlib is an extra, and slow
 
-        title = f"{drops.law}, {drops.radius:g} um, {indices.index} in {indices.host}"
+        title = f"{drops.law}, {drops.radius:g} um, {drops.index} in {drops.host}"
         plots.plot_phase(plot, medium, title)
         terminal.say(str(plot))
     if output is None and plot is None:
@@ -147,7 +144,7 @@ def _index(text: str, column: Any) -> Any:
 
 
 def _print_medium(medium: Any, at: np.ndarray) -> None:
-    """Print what a medium does at wavelengths [nm]."""
+    """Print coefficients and phase function of a medium at wavelengths [nm]."""
     import numpy as np
     from rich.table import Table
 

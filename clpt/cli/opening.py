@@ -6,10 +6,9 @@ import math
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,30 +59,14 @@ def ending_at_limit() -> Iterator[None]:
         compile_limits.at_limit = before
 
 
-@dataclass(frozen=True)
-class Opened:
-    """A scene and devices; loading: seconds that its file took."""
+def read_scene(file: Path, options: SceneOptions, shown: Display) -> Scene:
+    """Return the scene of a file, changed by options, and note its warnings.
 
-    scene: Scene
-    devices: list[dev.Device]
-    loading: float
-
-
-def read_scene(
-    file: Path,
-    options: SceneOptions,
-    shown: Display,
-    accept: Callable[[Scene], None] | None = None,
-) -> Scene:
-    """Return the scene of a file, as options change it, and note its warnings.
-
-    accept: called with the scene before it is checked. Raises SceneError, click.BadParameter.
+    Raises SceneError, click.BadParameter.
     """
     with shown.loading(file.name) as tell:
         loaded = options.loading.read(file, tell)
         scene = changed(loaded, options.changes)
-    if accept is not None:
-        accept(scene)
     check(scene)
     for warning in scene.warnings:
         shown.note(f"clpt: warning: {warning}")
@@ -93,35 +76,31 @@ def read_scene(
 
 
 def open_scene(
-    file: Path,
-    options: SceneOptions,
-    shown: Display,
-    resources: ExitStack,
-    accept: Callable[[Scene], None] | None = None,
-) -> Opened:
-    """Return the scene of a file and the devices.
+    file: Path, options: SceneOptions, shown: Display, resources: ExitStack
+) -> tuple[Scene, list[dev.Device], float]:
+    """Return the scene of a file, the devices, and the seconds that the file took.
 
-    resources: get the processes that compile beside this one; accept: see `read_scene`.
+    resources: get the processes that compile for this process.
     """
     began = time.perf_counter()
     alone = ThreadPoolExecutor(max_workers=1)
     with prompt(dev.kill_compilers), reusing(), alone as beside:
         chosen = beside.submit(choose_devices, options.machine)
-        scene = read_scene(file, options, shown, accept)
+        scene = read_scene(file, options, shown)
         loading = time.perf_counter() - began
         devices = chosen.result()
         share_compilers(devices, options.machine.threads, resources)
-    return Opened(scene, devices, loading)
+    return scene, devices, loading
 
 
-MOST_LISTED = 16  # workers that a report has a line for
-OVERLAP = 2  # pictures of a cluster at a time: workers begin the next one while the last one ends
+MOST_LISTED = 16  # workers that have lines in a report
+OVERLAP = 2  # pictures of a cluster at a time: workers begin a picture while another ends
 DEVICE_SECONDS = 3.0  # of a pass: at its end few paths are left; only there is there a checkpoint
-CLUSTER_SECONDS = 30.0  # of a pass with noise, at the end of which workers wait for each other
+CLUSTER_SECONDS = 30.0  # of a pass with noise; at its end workers wait for each other
 
 
 class RendererFactory:
-    """Makes the renderer of one picture after the other.
+    """Makes renderers, picture after picture.
 
     name: for people; frame: the number of the frame that is rendered, infinite without.
     """
@@ -134,31 +113,31 @@ class RendererFactory:
         raise NotImplementedError
 
     def pass_seconds(self, adaptive: bool, *periods: float | None) -> float:
-        """Return how long a pass should take, infinite for a single one.
+        """Return the seconds that a pass should take, infinite for a single pass.
 
         adaptive: whether pixels end by their noise; periods: how often something is written.
         """
         return DEVICE_SECONDS
 
     def look(self, progress: Progress) -> None:
-        """Note what there is to say while a picture is rendered."""
+        """Note events while a picture is rendered."""
 
     def report(self) -> None:
-        """Note what each machine has done."""
+        """Note the work of each machine."""
 
     def stop(self) -> None:
-        """End what would delay the end of the process, after a signal."""
+        """End other processes that would delay the end of this process, after a signal."""
 
 
 class DeviceFactory(RendererFactory):
-    """Makes renderers on devices of this machine; renderer: the last one that was made."""
+    """Makes renderers on devices of this machine; renderer: the last of them."""
 
     renderer: DevicePictures
 
     def __init__(self, devices: list[dev.Device], options: SceneOptions):
         self.devices = devices
         self.name = " and ".join(on.info.label for on in devices)
-        self._made = options.made
+        self._made = options.renderer_options
 
     def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> DevicePictures:
         """Return a new renderer of a scene; note its warnings."""
@@ -181,22 +160,24 @@ class DeviceFactory(RendererFactory):
 class ClusterFactory(RendererFactory):
     """Makes renderers on the workers of a cluster, where lower numbers of pictures come first.
 
-    others: all factories of this cluster, itself among them; made: options of its renderer.
+    others: all factories of this cluster, itself among them; settings: options of its renderer.
     """
 
     watch: Watch
 
     def __init__(
-        self, name: str, client: Client, others: list[ClusterFactory], made: Mapping[str, Any]
+        self, name: str, client: Client, others: list[ClusterFactory], settings: Mapping[str, Any]
     ):
-        self.name, self._client, self._others, self._made = name, client, others, made
+        self.name, self._client, self._others, self._made = name, client, others, settings
         self.renderer: ClusterRenderer | None = None
 
     def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> ClusterRenderer:
         """Return a new renderer of a scene, whose warnings the watch notes."""
         from ..cluster.cluster_renderer import ClusterRenderer
 
-        others = [one.renderer for one in self._others if one.renderer and one is not self]
+        others = [
+            factory.renderer for factory in self._others if factory.renderer and factory is not self
+        ]
         self.renderer = ClusterRenderer(
             scene, self._client, beside=others[0] if others else None, first_sample=first_sample,
             **self._made,
@@ -205,7 +186,7 @@ class ClusterFactory(RendererFactory):
         return self.renderer
 
     def pass_seconds(self, adaptive: bool, *periods: float | None) -> float:
-        """Return how long a pass should take: without adaptive sampling there is one alone."""
+        """Return the seconds of a pass: without adaptive sampling there is a single pass."""
         wanted = [seconds for seconds in periods if seconds]
         return min([CLUSTER_SECONDS, *wanted]) if adaptive else math.inf
 
@@ -214,30 +195,30 @@ class ClusterFactory(RendererFactory):
         self.watch.look()
 
     def report(self) -> None:
-        """Note what each worker has done."""
+        """Note the work of each worker."""
         self.watch.report()
 
     def _priority(self) -> float:
-        """That of this frame's blocks among those of the others: earlier frames come first."""
+        """The priority of blocks of this frame: earlier frames come first."""
         return -self.frame
 
 
-def new_renderer(scene: Scene, devices: list[dev.Device], **made: Any) -> DevicePictures:
-    """Return a renderer on one device, or on several."""
+def new_renderer(scene: Scene, devices: list[dev.Device], **settings: Any) -> DevicePictures:
+    """Return a renderer on a single device, or on several."""
     if len(devices) > 1:
         from ..cluster.multi_renderer import MultiRenderer
 
-        return MultiRenderer(scene, devices, **made)
-    return Renderer(scene, devices[0], **made)
+        return MultiRenderer(scene, devices, **settings)
+    return Renderer(scene, devices[0], **settings)
 
 
 def device_factories(
     devices: list[dev.Device], options: SceneOptions, pictures: int
 ) -> list[DeviceFactory]:
-    """Return a factory for each device, or one of all where there are fewer pictures."""
+    """Return a factory for each device, or a common factory where there are fewer pictures."""
     if pictures < len(devices):
         return [DeviceFactory(devices, options)]
-    return [DeviceFactory([one], options) for one in devices]  # with nothing to add up
+    return [DeviceFactory([device], options) for device in devices]  # with nothing to add up
 
 
 @contextmanager
@@ -247,13 +228,14 @@ def cluster_factories(
     """Yield factories of the workers at an address; pictures: that may be rendered at a time."""
     device = options.machine.device
     several = workers.number is None or dev.names_several(device)
-    made = options.made | {"device": None if several else device}  # one alone makes the pictures
-    made = {name: value for name, value in made.items() if value is not None}
+    # Pictures are made on a single device.
+    settings = options.renderer_options | {"device": None if several else device}
+    settings = {name: value for name, value in settings.items() if value is not None}
     with connected(workers, options.machine, shown) as client:
         factories: list[ClusterFactory] = []
         for _ in range(min(pictures, OVERLAP)):
-            factories.append(ClusterFactory(workers.cluster or "", client, factories, made))
-        watch = Watch(lambda: [one.renderer for one in factories if one.renderer], shown)
+            factories.append(ClusterFactory(workers.cluster or "", client, factories, settings))
+        watch = Watch(factories, shown)
         for factory in factories:
             factory.watch = watch
         yield factories
@@ -261,11 +243,11 @@ def cluster_factories(
 
 @contextmanager
 def connected(workers: Workers, machine: Machine, shown: Display) -> Iterator[Client]:
-    """Yield a client of the scheduler at an address, or of one with workers of our own.
+    """Yield a client of the scheduler at an address, or of a scheduler on this machine.
 
-    machine: what our own workers render with. Raises ClusterError.
+    machine: for workers on this machine. Raises ClusterError.
     """
-    from ..cluster import keys, processes  # here: one device has no use for them
+    from ..cluster import keys, processes  # here: a single device has no use for them
 
     if workers.number is not None:
         device, threads = machine.device, machine.threads
@@ -287,28 +269,34 @@ def connected(workers: Workers, machine: Machine, shown: Display) -> Iterator[Cl
 
 
 class Watch:
-    """Tells of workers that come, go, or are refused; of: returns renderers of one cluster."""
+    """Notes workers that come, go, or are refused; factories: all factories of a cluster."""
 
-    def __init__(self, of: Callable[[], list[ClusterRenderer]], shown: Display):
-        self._of, self._shown = of, shown
+    def __init__(self, factories: list[ClusterFactory], shown: Display):
+        self._factories, self._shown = factories, shown
         self._known: set[str] = set()
         self._refused: set[str] = set()
         self._warned: set[str] = set()
         self._lock = threading.Lock()
 
+    @property
+    def _renderers(self) -> list[ClusterRenderer]:
+        return [factory.renderer for factory in self._factories if factory.renderer]
+
     def look(self) -> None:
-        """Note what has changed since the last look."""
+        """Note changes since the last look."""
         with self._lock:
-            renderers = self._of()
-            refused = {name: why for one in renderers for name, why in one.refused.items()}
-            workers = {name for one in renderers for name in one.workers} - refused.keys()
+            renderers = self._renderers
+            refused = {
+                name: why for renderer in renderers for name, why in renderer.refused.items()
+            }
+            workers = {name for renderer in renderers for name in renderer.workers} - refused.keys()
             for name in sorted(refused.keys() - self._refused):
                 self._shown.note(f"clpt: warning: {name} is refused: {refused[name]}")
             for name in sorted(self._known - workers - refused.keys()):
                 self._shown.note(f"clpt: warning: {name} is gone; others render its samples")
             for name in sorted(workers - self._known):
                 self._shown.note(f"{name} renders")
-            for warning in (text for one in renderers for text in one.warnings):
+            for warning in (text for renderer in renderers for text in renderer.warnings):
                 if warning not in self._warned:
                     self._shown.note(f"clpt: warning: {warning}")
                 self._warned.add(warning)
@@ -316,9 +304,9 @@ class Watch:
 
     def report(self) -> None:
         """Note what each worker has done."""
-        renderers = self._of()
+        renderers = self._renderers
         records: dict[str, list[WorkerRecord]] = {}
-        for name, record in (pair for one in renderers for pair in one.workers.items()):
+        for name, record in (pair for renderer in renderers for pair in renderer.workers.items()):
             records.setdefault(name, []).append(record)
         for name, of_worker in sorted(records.items())[:MOST_LISTED]:
             samples = sum(record.samples for record in of_worker)
@@ -328,5 +316,5 @@ class Watch:
                 f"{name}  {samples:.5g} spp in {blocks} blocks, {of_worker[-1].rate:.3g} spp/s, "
                 f"{failures} failures"
             )
-        lost = max((one.lost for one in renderers), default=0)
+        lost = max((renderer.lost for renderer in renderers), default=0)
         self._shown.note(f"{len(records)} workers, {lost} lost")

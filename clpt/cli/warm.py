@@ -36,15 +36,15 @@ def warm(scenes: tuple[Path, ...], options: SceneOptions, verbose: int, quiet: b
     for scene in scenes:
         shown, began = display(quiet, None), time.perf_counter()
         with ExitStack() as resources:
-            opened = open_scene(scene, options, shown, resources)
-            renderer = DeviceFactory(opened.devices, options).make(opened.scene, shown)
+            plan, opened, loading = open_scene(scene, options, shown, resources)
+            renderer = DeviceFactory(opened, options).make(plan, shown)
             with shown.phase("compiling for the first samples"):
                 renderer.prepare()
         builds, seconds = [on.builds for on in renderer.devices], time.perf_counter() - began
-        programs, found = sum(b.programs for b in builds), sum(b.cached for b in builds)
+        programs, cached = sum(b.programs for b in builds), sum(b.cached for b in builds)
         terminal.say(
-            f"{scene}: {programs} programs, {found} of them found, in {seconds:.1f}"
-            f" s; the scene took {opened.loading:.1f} s of it",
+            f"{scene}: {programs} programs, {cached} of them found, in {seconds:.1f}"
+            f" s; the scene took {loading:.1f} s of it",
             err=False,
         )
         renderer.close()

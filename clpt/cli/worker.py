@@ -38,8 +38,8 @@ def worker(
 ) -> int:
     """Render for the scheduler at ADDRESS, such as tls://192.168.1.5:8786, until it ends.
 
-    It renders with one device, or with several: --device all, gpu, or 0,2. Who has the keys of the
-    cluster can run any program here, as you can.
+    It renders with a single device, or with several: --device all, gpu, or 0,2. Who has the keys of
+    the cluster can run any program here, as you can.
     """
     from ..cluster import processes, tasks
 

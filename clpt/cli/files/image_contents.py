@@ -37,7 +37,7 @@ class ImageContents:
 
     values: (h, w, n); labels: a wavelength or a channel's name per value; lambdas: (n,) [nm], None
     where the image is not spectral; colours: (h, w, 3) linear Rec. 709, None where it has none;
-    quantity: what the values are, with their unit; facts: what else the file says; stops: by which
+    quantity: of the values, with its unit; facts: further entries of the file; stops: by so many
     screens show the colours brighter.
     """
 
@@ -120,13 +120,13 @@ def _provenance(attributes: Mapping[str, Any]) -> dict[str, str]:
 
 def _mattes(attributes: Mapping[str, Any]) -> dict[str, str]:
     """The mattes of Cryptomatte that a file has, and how many names each knows."""
-    found = {}
+    mattes = {}
     for key, manifest in attributes.items():
         if key.startswith(MATTES) and key.endswith("/manifest"):
             name = str(attributes.get(key.replace("/manifest", "/name"), key))
             with contextlib.suppress(ValueError):
-                found[name] = f"Cryptomatte, {len(json.loads(manifest))} names"
-    return found
+                mattes[name] = f"Cryptomatte, {len(json.loads(manifest))} names"
+    return mattes
 
 
 def _read(path: Path) -> ImageContents:
@@ -160,7 +160,7 @@ def _read(path: Path) -> ImageContents:
 
 
 def _stops(attributes: Mapping[str, Any]) -> float:
-    """The stops by which screens show a picture brighter, 0 for what is no such number."""
+    """The stops that brighten a picture on screens, 0 where the file has no usable number."""
     stated = attributes.get(images.STOPS, 0.0)
     usable = isinstance(stated, (int, float)) and abs(stated) <= MOST_STOPS
     return float(stated) if usable else 0.0
@@ -203,8 +203,8 @@ def _layers(channels: dict[str, np.ndarray]) -> Iterator[str]:
         spread = f", {finite.min():.4g} to {finite.max():.4g}" if finite.size else ""
         lost = values.size - finite.size
         bad = f", {lost:,} not finite" if lost else ""
-        own = "" if [layer] == letters else f" {' '.join(letters)}"
-        yield f"{layer}{own}: {stored}{spread}{bad}"
+        letters_shown = "" if [layer] == letters else f" {' '.join(letters)}"
+        yield f"{layer}{letters_shown}: {stored}{spread}{bad}"
 
 
 def in_order(letter: str) -> tuple[int, str]:
@@ -237,9 +237,10 @@ def film_summary(path: Path) -> dict[str, Any]:
         "sampler": origin["sampler.type"],
         "seed": origin["seed"],
         "noise": "noise" in header["adaptive"],
-        "seconds": round(sum(one["seconds"] for one in sessions), 3),
+        "seconds": round(sum(session["seconds"] for session in sessions), 3),
         "sessions": [
-            f"{one['began']}  {one['seconds']:.1f} s  {one['device']['device']}" for one in sessions
+            f"{session['began']}  {session['seconds']:.1f} s  {session['device']['device']}"
+            for session in sessions
         ],
     }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -26,12 +26,12 @@ MOST = 0.99  # of the pixels differ by less than the brightest of the false colo
 
 
 def write_converted(
-    source: Path, target: Path, layer: str | None, grading: Grading, tell: Callable[[str], None]
-) -> None:
-    """Write an image in the format of the target. Raises SceneError."""
+    source: Path, target: Path, layer: str | None, grading: Grading
+) -> Iterator[str]:
+    """Write an image in the format of the target; yield lines about it. Raises SceneError."""
     (target,) = checked((target,))
     if text := grading.unused((target,)):
-        tell(f"clpt: warning: {text}")
+        yield f"clpt: warning: {text}"
     image = contents(source)
     pixels = _picture(image) if layer is None else _layer(image, layer)
     if source.suffix.lower() in images.STRAIGHT:
@@ -47,8 +47,8 @@ def write_converted(
         tone=grading.tone, view=grading.view,
     )  # fmt: skip
     if grading.exposure == "auto" and for_screens((target,)):
-        tell(f"exposure {images.auto_exposure(images.straight(pixels)) - stops:+.1f} stops")
-    tell(str(target))
+        yield f"exposure {images.auto_exposure(images.straight(pixels)) - stops:+.1f} stops"
+    yield str(target)
 
 
 def _picture(image: ImageContents) -> np.ndarray:
@@ -67,8 +67,10 @@ def _layer(image: ImageContents, name: str) -> np.ndarray:
     known = _layers(image)
     if name not in known:
         raise SceneError(f"has no layer {name!r}{nearest(name, known)}", file=image.path)
-    found = sorted(known[name], key=lambda place: in_order(image.labels[place].rpartition(".")[2]))
-    return np.asarray(image.values[..., found[: 3 if len(found) >= 3 else 1]])
+    channels = sorted(
+        known[name], key=lambda place: in_order(image.labels[place].rpartition(".")[2])
+    )
+    return np.asarray(image.values[..., channels[: 3 if len(channels) >= 3 else 1]])
 
 
 def _layers(image: ImageContents) -> dict[str, list[int]]:
@@ -81,13 +83,13 @@ def _layers(image: ImageContents) -> dict[str, list[int]]:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two images (h, w, n) of one shape with the same channels, and how they differ."""
+    """Two images (h, w, n) of equal shape and channels, and how they differ."""
 
     paths: tuple[Path, Path]
     a: np.ndarray
     b: np.ndarray
     labels: tuple[str, ...]
-    found: Differences
+    figures: Differences
 
     @classmethod
     def read(cls, a: Path, b: Path) -> Pair:
@@ -111,7 +113,7 @@ class Pair:
     @property
     def place(self) -> str:
         """Where the largest difference is."""
-        x, y, channel = self.found.where
+        x, y, channel = self.figures.where
         return one_line(f"{x},{y} {self.labels[channel]}")
 
 
@@ -122,29 +124,29 @@ def _same_wavelengths(a: np.ndarray | None, b: np.ndarray | None) -> bool:
 
 def as_json(pair: Pair) -> str:
     """Return the figures as JSON."""
-    figures = asdict(pair.found) | {"root_mean_square": pair.found.root_mean_square}
-    x, y, channel = pair.found.where
+    figures = asdict(pair.figures) | {"root_mean_square": pair.figures.root_mean_square}
+    x, y, channel = pair.figures.where
     figures["where"] = {"at": [x, y], "channel": pair.labels[channel]}
     return json.dumps({"files": [str(path) for path in pair.paths], **figures}, indent=2)
 
 
 def as_text(pair: Pair) -> str:
     """Return the figures as lines."""
-    found = pair.found
-    share = f" ({found.bias / found.means[1]:+.3%} of B)" if found.means[1] else ""
+    figures = pair.figures
+    share = f" ({figures.bias / figures.means[1]:+.3%} of B)" if figures.means[1] else ""
     rows = {
-        "mean of A": f"{found.means[0]:.6g}",
-        "mean of B": f"{found.means[1]:.6g}",
-        "mean difference": f"{found.bias:+.4g}{share}",
-        "mean absolute error": f"{found.absolute:.4g}",
-        "root mean square error": f"{found.root_mean_square:.4g}",
-        "relative square error": f"{found.relative_square:.4g}",
-        "largest difference": f"{found.largest:.4g} at {pair.place}",
+        "mean of A": f"{figures.means[0]:.6g}",
+        "mean of B": f"{figures.means[1]:.6g}",
+        "mean difference": f"{figures.bias:+.4g}{share}",
+        "mean absolute error": f"{figures.absolute:.4g}",
+        "root mean square error": f"{figures.root_mean_square:.4g}",
+        "relative square error": f"{figures.relative_square:.4g}",
+        "largest difference": f"{figures.largest:.4g} at {pair.place}",
     }
-    if not found.largest and not found.lost:
+    if not figures.largest and not figures.lost:
         rows = {"mean of both": rows["mean of A"], "difference": "none: all values are the same"}
-    if found.lost:
-        rows["not finite, left out"] = f"{found.lost:,} values"
+    if figures.lost:
+        rows["not finite, left out"] = f"{figures.lost:,} values"
     return "\n".join(f"{name:<24} {value}" for name, value in rows.items())
 
 

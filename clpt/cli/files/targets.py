@@ -44,7 +44,7 @@ def checked(paths: tuple[Path, ...]) -> tuple[Path, ...]:
 
 
 def name_of(scene: Path) -> str:
-    """Return the name by which a scene's files are called."""
+    """Return the name of a scene's files, without a suffix."""
     return default(scene)[0].stem
 
 
@@ -79,12 +79,12 @@ def standard_output(paths: tuple[Path, ...], form: str | None) -> Iterator[tuple
     if sys.stdout.isatty():
         raise click.UsageError("a terminal shows no picture: send it on, as by -o - > picture.png")
     with tempfile.TemporaryDirectory(prefix=FOLDER) as folder:
-        made = Path(folder) / f"{STANDARD}.{form or 'png'}"
+        file = Path(folder) / f"{STANDARD}.{form or 'png'}"
         try:
-            yield tuple(made if path == STANDARD else path for path in paths)
+            yield tuple(file if path == STANDARD else path for path in paths)
         finally:
-            if made.exists():
-                _print(made)
+            if file.exists():
+                _print(file)
 
 
 def _print(path: Path) -> None:

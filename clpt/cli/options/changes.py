@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import click
 
@@ -14,23 +14,14 @@ from .records import Command, record_of, with_options
 
 NEAREST, FARTHEST = 1e-3, 1e6  # of an orbit, in distances that frame the scene
 
-
-@dataclass(frozen=True)
-class Orbit:
-    """Where a camera stands that looks at the middle of a scene.
-
-    azimuth [degrees]: 0 is in front, 90 on the right; elevation [degrees]: 90 is above; distance:
-    in those that frame the whole scene.
-    """
-
-    azimuth: float
-    elevation: float
-    distance: float = 1.0
+# A camera that looks at the middle of a scene. Azimuth [degrees]: 0 is in front, 90 on the right;
+# elevation [degrees]: 90 is above; distance: 1 frames the whole scene.
+Orbit: TypeAlias = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Span:
-    """Columns or rows of a picture: the first one and the end.
+    """Columns or rows of a picture, from `first` to `end`, which is excluded.
 
     Each is a number of pixels and False, or a share of the picture [percent] and True.
     """
@@ -51,28 +42,6 @@ class Span:
 
 
 @dataclass(frozen=True)
-class Composition:
-    """From where a scene is seen, which part of the picture, and the image that surrounds it.
-
-    env_rotation: of the image about the vertical [degrees].
-    """
-
-    camera: Orbit | None = None
-    crop: tuple[Span, Span] | None = None
-    env: Path | None = None
-    env_rotation: float | None = None
-
-
-@dataclass(frozen=True)
-class Sampling:
-    """Samples of a pixel, the noise at which one ends (0: never), and the seed."""
-
-    spp: int | None = None
-    noise: float | None = None
-    seed: int | None = None
-
-
-@dataclass(frozen=True)
 class FilmChanges:
     """Parameters of a film, by their names there; size: width and height in pixels."""
 
@@ -88,17 +57,17 @@ class FilmChanges:
     alpha: bool | None = None
 
     def values(self) -> dict[str, Any]:
-        """Return what is given, by the names of the film."""
-        given = {name: value for name, value in vars(self).items() if value is not None}
-        width_height = given.pop("size", None)
+        """Return the parameters that options set, by their names in the film."""
+        values = {name: value for name, value in vars(self).items() if value is not None}
+        width_height = values.pop("size", None)
         if width_height is not None:
-            given["width"], given["height"] = width_height
-        return given
+            values["width"], values["height"] = width_height
+        return values
 
 
 @dataclass(frozen=True)
 class Transport:
-    """A kind of integrator, one of sampler, and parameters of the integrator."""
+    """Kinds of integrator and sampler, and parameters of the integrator."""
 
     integrator: str | None = None
     sampler: str | None = None
@@ -116,13 +85,22 @@ class Transport:
 
 @dataclass(frozen=True)
 class SceneChanges:
-    """Values that take the place of a scene's own, where they are not None."""
+    """Values that replace parameters of a scene, where they are not None.
 
-    sampling: Sampling = Sampling()
+    noise: that ends the sampling of a pixel, 0: none does; env: an image around the scene;
+    env_rotation: of the image about the vertical [degrees].
+    """
+
     film: FilmChanges = FilmChanges()
     transport: Transport = Transport()
-    composition: Composition = Composition()
+    spp: int | None = None
+    noise: float | None = None
+    seed: int | None = None
     denoise: str | None = None
+    camera: Orbit | None = None
+    crop: tuple[Span, Span] | None = None
+    env: Path | None = None
+    env_rotation: float | None = None
 
     @classmethod
     def of(cls, **options: Any) -> SceneChanges:
@@ -138,7 +116,7 @@ class CameraType(click.ParamType):
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> Orbit | str:
-        if isinstance(value, Orbit):
+        if isinstance(value, tuple):
             return value
         text = str(value).strip()
         try:
@@ -151,13 +129,13 @@ class CameraType(click.ParamType):
             return text
         if len(numbers) > 3 or not all(map(math.isfinite, numbers)):
             self.fail(f"{text!r} does not look like 45,20 or 45,20,1.5", param, ctx)
-        orbit = Orbit(*numbers)
-        if abs(orbit.elevation) > 90.0:
-            self.fail(f"the elevation is -90 to 90 degrees, not {orbit.elevation:g}", param, ctx)
-        if not NEAREST <= orbit.distance <= FARTHEST:
+        azimuth, elevation, distance = (*numbers, 1.0)[:3]
+        if abs(elevation) > 90.0:
+            self.fail(f"the elevation is -90 to 90 degrees, not {elevation:g}", param, ctx)
+        if not NEAREST <= distance <= FARTHEST:
             limits = f"{NEAREST:g} to {FARTHEST:g}"
-            self.fail(f"the distance is {limits}, not {orbit.distance:g}; 1 frames all", param, ctx)
-        return orbit
+            self.fail(f"the distance is {limits}, not {distance:g}; 1 frames all", param, ctx)
+        return azimuth, elevation, distance
 
 
 class CropType(click.ParamType):
@@ -171,14 +149,14 @@ class CropType(click.ParamType):
         if isinstance(value, tuple):
             return value
         number = r"(?:(\d{1,9}(?:\.\d{1,9})?)(%?))?"
-        found = re.fullmatch(rf"{number}:{number},{number}:{number}", str(value).replace(" ", ""))
-        if not found:
+        match = re.fullmatch(rf"{number}:{number},{number}:{number}", str(value).replace(" ", ""))
+        if not match:
             message = f"{value!r} does not look like 100:200,50:150 or 25%:75%,0%:50%"
             self.fail(message, param, ctx)
         ends = [
             (float(text or default), bool(share) or not text)
             for text, share, default in zip(
-                found.groups()[::2], found.groups()[1::2], ("0", "100") * 2, strict=True
+                match.groups()[::2], match.groups()[1::2], ("0", "100") * 2, strict=True
             )
         ]
         if any(not share and number != int(number) for number, share in ends):
@@ -222,5 +200,5 @@ _OPTIONS = (
 
 
 def composition_options(command: Command) -> Command:
-    """Give a command the options of which `Composition` is the record."""
+    """Give a command options of the camera, the crop and the surroundings."""
     return with_options(command, _OPTIONS)

@@ -33,12 +33,12 @@ class Grading:
 
     def unused(self, targets: tuple[Path, ...]) -> str | None:
         """Return a sentence on options that concern none of the files, None without such."""
-        given = {
+        used = {
             "--exposure": self.exposure != 0.0,
             "--tone": self.tone != "none",
             "--view": self.view is not None,
         }
-        names = [name for name, was in given.items() if was]
+        names = [name for name, was in used.items() if was]
         if not names or for_screens(targets):
             return None
         suffixes = " ".join(FOR_SCREENS)
@@ -106,5 +106,5 @@ names_option = click.option(
 
 
 def grading_options(command: Command) -> Command:
-    """Give a command the options of which `GradingOptions` is the record."""
+    """Give a command the options of the record `GradingOptions`."""
     return with_options(command, _OPTIONS)

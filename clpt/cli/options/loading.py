@@ -1,4 +1,4 @@
-"""The options of the commands that load a scene: its variables, and what the load may take."""
+"""Options of commands that load a scene: its variables, and limits of the load."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Bytes(click.ParamType):
 
 
 def _limit(name: str) -> Callable[[Any, Any, Any], None]:
-    """Return what makes the value of an option a limit of all loads of the command."""
+    """Return the callback of an option that limits all loads of the command."""
 
     def set_limit(_: click.Context, __: click.Parameter, value: Any) -> None:
         budget.set_usual(dataclasses.replace(budget.usual, **{name: value}))
@@ -47,7 +47,7 @@ def _parse(_: click.Context, __: click.Parameter, definitions: Iterable[str]) ->
     if wrong is not None:
         raise click.BadParameter(f"{wrong!r} does not look like NAME=VALUE", param_hint="-D")
     for name in RESERVED:
-        if any(name == given for given, _, _ in pairs):
+        if any(name == known for known, _, _ in pairs):
             raise click.BadParameter(f"no variable can be called {name}", param_hint="-D")
     return {name: value for name, _, value in pairs}
 
@@ -78,5 +78,5 @@ _OPTIONS = (
 
 
 def loading_options(command: Command) -> Command:
-    """Give a command the parameter `variables`, and options that set what loads may take."""
+    """Give a command the parameter `variables`, and options that limit loads."""
     return with_options(command, _OPTIONS)

@@ -8,7 +8,7 @@ import inspect
 import logging
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, TypeVar, cast
+from typing import Any, Protocol, TypeVar, cast
 
 import click
 
@@ -16,51 +16,58 @@ from ... import clean_logs
 from ..process import terminal
 
 Command = TypeVar("Command", bound=Callable[..., Any])
-Made = TypeVar("Made")
 
 
-def with_options(command: Command, options: Sequence[Callable[[Any], Any]]) -> Command:
+class Decorator(Protocol):
+    """Gives a command options, or records in their place."""
+
+    def __call__(self, command: Command, /) -> Command: ...
+
+
+RecordType = TypeVar("RecordType")
+
+
+def with_options(command: Command, options: Sequence[Decorator]) -> Command:
     """Give a command options, which its help shows in this order."""
     for option in reversed(options):
         command = option(command)
     return command
 
 
-def with_records(**forms: Callable[..., Any]) -> Callable[[Command], Command]:
+def with_records(**forms: type[Any]) -> Decorator:
     """Let a command take records by these names in the place of the options that they name.
 
-    forms: frozen dataclasses, or functions that make them, see `record_of`. Two records may take
-    the same option.
+    forms: frozen dataclasses, see `record_of`. Two records may take the same option.
     """
     taken = {name for form in forms.values() for name in _names(form)}
 
     def decorate(command: Command) -> Command:
         @functools.wraps(command)
-        def with_them(**given: Any) -> Any:
-            made = {name: record_of(form, given) for name, form in forms.items()}
-            rest = {name: value for name, value in given.items() if name not in taken}
-            return command(**made, **rest)
+        def with_them(**values: Any) -> Any:
+            records = {name: record_of(form, values) for name, form in forms.items()}
+            others = {name: value for name, value in values.items() if name not in taken}
+            return command(**records, **others)
 
         return cast(Command, with_them)
 
     return decorate
 
 
-def record_of(form: Callable[..., Made], given: Mapping[str, Any]) -> Made:
+def record_of(form: type[RecordType], values: Mapping[str, Any]) -> RecordType:
     """Return a record of the options that its fields name; a field may be a record of others.
 
     An option that the command does not have leaves the field's default.
     """
-    made: dict[str, Any] = {}
+    members: dict[str, Any] = {}
     for name, inner in _fields(form).items():
         if inner is not None:
-            made[name] = record_of(inner, given)
-        elif name in given:
-            made[name] = given[name]
-    return form(**made)
+            members[name] = record_of(inner, values)
+        elif name in values:
+            members[name] = values[name]
+    return form(**members)
 
 
-def _names(form: Callable[..., Any]) -> Iterator[str]:
+def _names(form: type[Any]) -> Iterator[str]:
     """Yield the names of the options that a record takes."""
     for name, inner in _fields(form).items():
         if inner is not None:
@@ -69,7 +76,7 @@ def _names(form: Callable[..., Any]) -> Iterator[str]:
             yield name
 
 
-def _fields(form: Callable[..., Any]) -> dict[str, Callable[..., Any] | None]:
+def _fields(form: type[Any]) -> dict[str, type[Any] | None]:
     """Return the fields of a record by their names, with the record that is the type of each.
 
     A record is looked up in the form's module; other types may not be imported yet.
@@ -77,14 +84,13 @@ def _fields(form: Callable[..., Any]) -> dict[str, Callable[..., Any] | None]:
     known = vars(sys.modules[form.__module__])
     fields: dict[str, Any] = {}
     for name, parameter in inspect.signature(form).parameters.items():
-        found = known.get(parameter.annotation)
-        fields[name] = found if dataclasses.is_dataclass(found) else None
+        record = known.get(parameter.annotation)
+        fields[name] = record if dataclasses.is_dataclass(record) else None
     return fields
 
 
 OTHER = "Other options"
-# What stands under each heading, by the names that options have in the program. Options of a
-# command that are in none of them stand under OTHER.
+# Options under each heading, by their names in the program; further options stand under OTHER.
 HEADINGS: dict[str, tuple[str, ...]] = {
     "Output": (
         "paths", "folder", "form", "every", "layers", "names", "alpha", "denoise", "tev",
@@ -145,7 +151,7 @@ def grouped(examples: Sequence[tuple[str, str]] = ()) -> type[Grouped]:
 
 
 LEVELS = (logging.WARNING, logging.INFO, logging.DEBUG)
-_COUNT = "clpt.verbosity"  # in what nested contexts share
+_COUNT = "clpt.verbosity"  # in the dictionary that nested contexts share
 
 
 class Handler(logging.Handler):
@@ -158,7 +164,7 @@ class Handler(logging.Handler):
         terminal.say_lines(f"clpt: {record.levelname.lower()}: {self.format(record)}", err=True)
 
 
-def verbose_option(text: str) -> Callable[[Command], Command]:
+def verbose_option(text: str) -> Decorator:
     """Return the option, with its help; the command gets how often it was given in all."""
     return click.option("-v", "--verbose", count=True, callback=_add, help=text)
 

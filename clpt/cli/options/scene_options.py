@@ -1,4 +1,4 @@
-"""Options of scenes and of what renders them, with records of their values."""
+"""Options of scenes, devices and workers, with records of their values."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 
 import click
 
@@ -24,11 +24,13 @@ from ...choices import (
 from ...formats import load
 from .changes import SceneChanges, composition_options
 from .loading import Bytes, loading_options
-from .records import Command, with_options
+from .records import Command, Decorator, with_options
 from .values import Choice, LightPaths, Names, SensorName, Size, White
 
 if TYPE_CHECKING:
     from ...scene import Scene
+
+Progress: TypeAlias = Callable[[float, str], None]  # of `clpt.load`
 
 
 LOCAL = "local:"
@@ -50,7 +52,7 @@ class Where(click.ParamType):
 
 @dataclass(frozen=True)
 class Workers:
-    """Where workers are, None for none, and the folder of their cluster's keys."""
+    """The address of a cluster, None for none, and the folder of its keys."""
 
     cluster: str | None = None
     keys: Path | None = None
@@ -62,8 +64,8 @@ class Workers:
         return int(where.removeprefix(LOCAL)) if where.startswith(LOCAL) else None
 
 
-def worker_options(text: str) -> Callable[[Command], Command]:
-    """Return what gives a command the options of which `Workers` is the record.
+def worker_options(text: str) -> Decorator:
+    """Return a decorator that gives a command the options of the record `Workers`.
 
     text: the help of --cluster.
     """
@@ -85,7 +87,7 @@ class Loading:
     variables: dict[str, Any]
     missing_textures: Missing = "error"
 
-    def read(self, file: Path, progress: Callable[[float, str], None] | None = None) -> Scene:
+    def read(self, file: Path, progress: Progress | None = None) -> Scene:
         """Return the scene of a file. Raises SceneError."""
         return load(
             file, progress=progress, missing_textures=self.missing_textures, **self.variables
@@ -94,7 +96,7 @@ class Loading:
 
 @dataclass(frozen=True)
 class Machine:
-    """Devices of this machine, by what --device says, and the cores that one may use.
+    """The value of --device, and the most cores of a CPU.
 
     profiling: whether stages are timed.
     """
@@ -105,29 +107,25 @@ class Machine:
 
 
 @dataclass(frozen=True)
-class Build:
-    """Options of renderers that are built: see `RenderOptions`."""
-
-    layout: str | None = None
-    tree_quality: Quality = "high"
-    texture_budget: int | None = None
-
-
-@dataclass(frozen=True)
 class SceneOptions:
     """The options of `scene_options`: a scene, changes of it, and who renders it."""
 
     loading: Loading
     changes: SceneChanges
     machine: Machine
-    build: Build
+    layout: str | None = None
+    tree_quality: Quality = "high"
+    texture_budget: int | None = None
 
     @property
-    def made(self) -> dict[str, Any]:
-        """The options of renderers, by their names there."""
-        return {**vars(self.build), "denoise": self.changes.denoise}
+    def renderer_options(self) -> dict[str, Any]:
+        """The options of renderers, see `RenderOptions`."""
+        return {
+            "layout": self.layout, "tree_quality": self.tree_quality,
+            "texture_budget": self.texture_budget, "denoise": self.changes.denoise,
+        }  # fmt: skip
 
-    def scene(self, file: Path, progress: Callable[[float, str], None] | None = None) -> Scene:
+    def scene(self, file: Path, progress: Progress | None = None) -> Scene:
         """Return the scene of a file, changed. Raises SceneError, click.BadParameter."""
         from .applied import changed
 
@@ -217,5 +215,5 @@ _OPTIONS = (
 
 
 def scene_options(command: Command) -> Command:
-    """Give a command the options of which `SceneOptions` is the record."""
+    """Give a command the options of the record `SceneOptions`."""
     return with_options(composition_options(command), _OPTIONS)

@@ -1,4 +1,4 @@
-"""Failures as the user reads them: one line, and an exit status."""
+"""Failures as the user reads them: a single line, and an exit status."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BAD_INPUT, BUG = 2, 1
 
 
 def message_of(error: Exception) -> tuple[str, int]:
-    """Return what to say of an error, and the exit status: of bad input, or of a fault of clpt.
+    """Return the message of an error, and the exit status: of bad input, or of a fault of clpt.
 
     A fault keeps its traceback in a file.
     """
@@ -30,13 +30,13 @@ def message_of(error: Exception) -> tuple[str, int]:
 
 
 def complain(message: str) -> None:
-    """Print an error as one line."""
+    """Print an error as a single line."""
     terminal.clear_line()
     terminal.say(f"clpt: error: {message}")
 
 
 def _keep_traceback(error: Exception) -> str:
-    """Write the traceback of an error to clpt's log folder; a phrase that tells where."""
+    """Write the traceback of an error to clpt's log folder; return a phrase with its path."""
     import platformdirs
 
     from ...device import disk_cache  # here: most commands end without a fault, some without OpenCL
@@ -56,7 +56,7 @@ def _keep_traceback(error: Exception) -> str:
 
 @contextmanager
 def extra(name: str, purpose: str) -> Iterator[None]:
-    """Guard an import of packages of one of clpt's extras.
+    """Guard an import of packages that an extra of clpt installs.
 
     Raises ClptError, which names the extra, where a package is not installed.
     """

@@ -1,4 +1,4 @@
-"""Text to people on the standard streams: on one line, cut, without what controls a terminal."""
+"""Text to people on the standard streams: a single line, cut, that controls no terminal."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import click
 from ...errors import LONGEST_WARNING, lines, one_line
 
 LONGEST = LONGEST_WARNING  # characters of a line
-CLEARED, CURSOR = "\r\x1b[2K", "\x1b[?25h"  # what clpt itself tells a terminal
+CLEARED, CURSOR = "\r\x1b[2K", "\x1b[?25h"  # control sequences of clpt itself
 
 
 def cleaned(text: object) -> str:
-    """Return a text on one line, cut, without control characters."""
+    """Return a text as a single line, cut, without control characters."""
     return one_line(str(text), LONGEST)
 
 
 def say(text: object, *, err: bool = True, nl: bool = True) -> None:
-    """Print a text on one line. nl: whether the line ends."""
+    """Print a text as a single line. nl: whether the line ends."""
     click.echo(cleaned(text), err=err, nl=nl)
 
 
@@ -36,7 +36,7 @@ def write(text: str) -> None:
 
 
 def clear_line() -> None:
-    """Remove what a display has left in the line of the cursor, on a terminal."""
+    """Clear the line of the cursor, on a terminal."""
     if sys.stderr.isatty():
         click.echo(CLEARED, err=True, nl=False)
 
@@ -48,7 +48,7 @@ def show_cursor() -> None:
 
 
 def make_safe() -> None:
-    """Open what is closed, print what an encoding lacks as an escape, let stderr fail silently."""
+    """Open closed streams, escape characters that an encoding lacks, let stderr fail silently."""
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:  # closed: no other file may get the stream's number
             nothing = os.open(os.devnull, os.O_RDWR)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -60,13 +59,13 @@ def render(scenes: tuple[Path, ...], form: str | None, settings: Settings) -> in
     With --frames every frame gets files of its own: name.0001.exr, or what #### or %04d in -o says.
     -D values may have {frame}, {time} in seconds, and arithmetic of them such as {360*frame/240};
     SCENE may be scene.####.json. Frames that are complete, and of the same scene and options, are
-    not rendered again. Each device renders whole frames, with --cluster all workers render one
-    together; --time is per frame.
+    not rendered again. Each device renders whole frames, with --cluster all workers render a
+    frame together; --time is per frame.
 
-    If one scene of several fails, the others are still rendered; the exit status shows it.
+    If a scene of several fails, the others are still rendered; the exit status shows it.
     """
     settings.check()
-    return one_by_one(_rendered, scenes, settings, form)
+    return one_by_one(scenes, settings, form)
 
 
 def _rendered(job: Job) -> int:
@@ -88,27 +87,25 @@ def _rendered(job: Job) -> int:
     return render_picture(job, shown, began)
 
 
-def one_by_one(
-    run: Callable[[Job], int], scenes: tuple[Path, ...], settings: Settings, form: str | None
-) -> int:
+def one_by_one(scenes: tuple[Path, ...], settings: Settings, form: str | None) -> int:
     """Render scenes, of the camera `all` each; form: of the picture of -o -.
 
-    Returns what `run` does for one scene; for several 0, or the largest status, and at a signal its
-    status at once.
+    Returns the exit status of a single scene; of several 0, or the largest status, and at a signal
+    its status at once.
     """
-    paths = settings.output.paths
+    paths = settings.paths
     with standard_output(paths, form) as named:
         of_cameras = settings.options.loading.variables.get("camera") == ALL
         several = len(scenes) > 1 or of_cameras or settings.animation.frames is not None
         if STANDARD in paths and several:
             raise click.UsageError("-o - is for one picture")
-        if set(paths) == {STANDARD} and settings.output.every is not None:
+        if set(paths) == {STANDARD} and settings.every is not None:
             raise click.UsageError("--every writes a file again and again; -o - is none")
-        settings = replace(settings, output=replace(settings.output, paths=named))
+        settings = replace(settings, paths=named)
         jobs = [settings.of(scene).named(NAME, targets.name_of(scene)) for scene in scenes]
         if of_cameras:
-            jobs = [one for job in jobs for one in _of_cameras(job)]
-        return _all(run, jobs) if len(jobs) > 1 else run(jobs[0])
+            jobs = [job_of_camera for job in jobs for job_of_camera in _of_cameras(job)]
+        return _all(jobs) if len(jobs) > 1 else _rendered(jobs[0])
 
 
 def _of_cameras(job: Job) -> list[Job]:
@@ -119,26 +116,26 @@ def _of_cameras(job: Job) -> list[Job]:
         scene = replace(loading, variables=variables).read(job.scene)
     except SceneError:
         return [job]  # it fails by itself, and says why
-    names = [one.partition(" ")[2] for one in scene.extra.get("cameras", ())]
+    names = [entry.partition(" ")[2] for entry in scene.extra.get("cameras", ())]
     if ALL in names:
         return [job]
     if not names:
         return [job.with_variables(variables)]
     if len({*names}) < len(names) or not all(names):
         names = [str(number) for number in range(len(names))]
-    if not job.output.paths:
+    if not job.paths:
         usual = tuple(path.with_stem(f"{path.stem}.{CAMERA}") for path in job.targets)
-        job = replace(job, output=replace(job.output, paths=usual))
-    made = []
+        job = replace(job, paths=usual)
+    jobs = []
     for number, name in enumerate(names):
-        one = job.named(CAMERA, re.sub(r"[^\w.-]", "_", name))
-        one = one.with_variables(variables | {"camera": str(number)})
-        made.append(replace(one, camera=str(number)))
-    return made
+        job_of_camera = job.named(CAMERA, re.sub(r"[^\w.-]", "_", name))
+        job_of_camera = job_of_camera.with_variables(variables | {"camera": str(number)})
+        jobs.append(replace(job_of_camera, camera=str(number)))
+    return jobs
 
 
 def _check_distinct(jobs: list[Job]) -> None:
-    """Raise SceneError where two scenes or cameras would be written to one file."""
+    """Raise SceneError where two scenes or cameras would be written to the same file."""
     owners: dict[Path, Job] = {}
     for job in jobs:
         for path in job.files:
@@ -151,7 +148,7 @@ def _check_distinct(jobs: list[Job]) -> None:
                 raise SceneError(f"{message}; -o '{CAMERA}.exr' names them", file=path)
 
 
-def _all(run: Callable[[Job], int], jobs: list[Job]) -> int:
+def _all(jobs: list[Job]) -> int:
     """Render each scene; return the status of all."""
     _check_distinct(jobs)
     for job in jobs:
@@ -161,7 +158,7 @@ def _all(run: Callable[[Job], int], jobs: list[Job]) -> int:
         if not job.quiet:
             which = "" if job.camera is None else f", camera {job.camera}"
             terminal.say(f"{job.scene}{which} ({number} of {len(jobs)})")
-        status = _one(run, job)
+        status = _rendered_of_several(job)
         if status > failures.BAD_INPUT:
             return status  # a signal
         statuses.append(status)
@@ -171,10 +168,10 @@ def _all(run: Callable[[Job], int], jobs: list[Job]) -> int:
     return max(statuses)
 
 
-def _one(run: Callable[[Job], int], job: Job) -> int:
+def _rendered_of_several(job: Job) -> int:
     """Render a scene of several; return the status."""
     try:
-        return run(job)
+        return _rendered(job)
     except Exception as error:
         message, status = failures.message_of(error)
         failures.complain(message if str(job.scene) in message else f"{job.scene}: {message}")

@@ -1,4 +1,4 @@
-"""Lines that `clpt render` prints: figures, and remarks on a picture in which little is seen."""
+"""Lines that `clpt render` prints: figures, and remarks on a picture that shows little."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ TIMES = {  # of RenderStats.seconds
 }
 MOSTLY_WHITE = 0.5  # of the lit pixels
 NEARLY_BLACK = 0.98  # of all pixels
-DARK = 2.0  # stops by which a picture that is nearly black would have to be brightened
+DARK = 2.0  # stops: a picture that is nearly black would have to be brightened by more
 OUTSHINING = 1000.0  # times as strong as any other lamp
 WHITE = watts(RGBIlluminant(1.0, 1.0, 1.0))  # of an emission of 1 [nm]
 ADVICE = "docs/lighting.md has a list: Why is it black?"
 
 
 def header(name: str, renderer: DevicePictures, where: str) -> str:
-    """Return the line that says what is rendered, how and where."""
+    """Return the line with the scene, its size, mode, integrator and device."""
     film, asked, chosen = renderer.scene.film, renderer.scene.integrator.kind, renderer.stats
     how = asked if asked == chosen.integrator else f"{asked} -> {chosen.integrator}"
     size = f"{film.size[0]}x{film.size[1]}"
@@ -56,7 +56,7 @@ def ending(renderer: DevicePictures, end: End, seconds: float) -> str:
 
 
 def before(renderer: DevicePictures, loading: float) -> None:
-    """Print what was made of the scene, and the time; loading: seconds for its file."""
+    """Print sizes of the encoded scene, and times; loading: seconds for its file."""
     first, stats = renderer._wavefront, renderer.stats
     for on in renderer.devices:
         _line("device", on.info.label)
@@ -89,18 +89,21 @@ def before(renderer: DevicePictures, loading: float) -> None:
     kept = f"{stats.programs_cached} from clpt's cache, {others} by the driver or from its cache"
     _line("programs", f"{stats.programs} in {stats.seconds['programs']:.2f} s: {kept}")
     _line("time to read the file", f"{loading:.2f} s")
-    for name, what in TIMES.items():
-        _line(what, f"{stats.seconds[name]:.2f} s")
+    for name, label in TIMES.items():
+        _line(label, f"{stats.seconds[name]:.2f} s")
 
 
 def after(renderer: DevicePictures) -> None:
-    """Print the time of the first sample, what each device did, and each stage of the first."""
-    from ...cluster.multi_renderer import MultiRenderer  # here: one device has no use for it
+    """Print the time of the first sample, shares of devices, and stages of the first device."""
+    from ...cluster.multi_renderer import MultiRenderer  # here: a single device has no use for it
 
     if isinstance(renderer, MultiRenderer):
-        for one in renderer.shares:
-            lost = f", failed: {one.failure}" if one.failure else ""
-            _line(f"share {one.share:.1%}", f"{one.rate * 1e-6:.3g} Mpaths/s, {one.name}{lost}")
+        for part in renderer.shares:
+            lost = f", failed: {part.failure}" if part.failure else ""
+            _line(
+                f"share {part.share:.1%}",
+                f"{part.rate * 1e-6:.3g} Mpaths/s, {part.name}{lost}",
+            )
     _line("time to the first sample", f"{renderer.stats.seconds.get('first_sample', 0.0):.2f} s")
     if renderer.scene.noise is not None:
         samples = renderer.film.get()[..., 3]
@@ -117,8 +120,8 @@ def after(renderer: DevicePictures) -> None:
         _line(f"stage {name}", f"{timing.seconds:.3f} s, {share:.0%}, {timing.calls:,} calls")
 
 
-def _line(what: str, text: str) -> None:
-    terminal.say(f"{what:<24} {text}")
+def _line(label: str, text: str) -> None:
+    terminal.say(f"{label:<24} {text}")
 
 
 def _bytes(n: int) -> str:
@@ -131,27 +134,27 @@ def exposure_found(renderer: DevicePictures) -> float:
 
 
 def display_exposure(renderer: DevicePictures) -> str:
-    """Return what to say of the exposure that the scene's film has for screens, "" for none."""
+    """Return a sentence on the exposure that the scene's film has for screens, "" for none."""
     stops = renderer.scene.film.display_exposure
     return f"exposure {stops:+.1f} stops, of the scene: film.display_exposure" if stops else ""
 
 
 def remarks(renderer: DevicePictures, grading: Grading, targets: tuple[Path, ...]) -> Iterator[str]:
-    """Yield sentences of a picture in which little is seen, with what mends it."""
+    """Yield sentences on a picture that shows little, with a remedy."""
     scene, pixels = renderer.scene, _pixels(renderer)
     display = scene.film.display_exposure
     exposure = images.stops(images.raised(grading.exposure, display), pixels)
-    found = images.levels(pixels, exposure, grading.tone, grading.view)
+    seen = images.levels(pixels, exposure, grading.tone, grading.view)
     mended = images.auto_exposure(pixels)
     advice = f"--exposure auto, {mended - display:+.1f} stops, shows it"
-    if not found.lit:
+    if not seen.lit:
         yield f"the picture is black: no path has found a light; {ADVICE}"
         return
     if grading.exposure != "auto" and for_screens(targets):
-        if found.white > MOSTLY_WHITE:
-            yield f"{found.white:.0%} of what is lit is white: {advice}"
-        elif found.black > NEARLY_BLACK and mended > exposure + DARK:
-            yield f"{found.black:.0%} of the picture is black: {advice}"
+        if seen.white > MOSTLY_WHITE:
+            yield f"{seen.white:.0%} of what is lit is white: {advice}"
+        elif seen.black > NEARLY_BLACK and mended > exposure + DARK:
+            yield f"{seen.black:.0%} of the picture is black: {advice}"
     yield from _outshone(scene)
 
 
@@ -162,7 +165,7 @@ def _pixels(renderer: DevicePictures) -> Floats32:
 
 
 def _outshone(scene: Scene) -> Iterator[str]:
-    """Yield a sentence where one lamp with a place sends out far more watts than any other lamp."""
+    """Yield a sentence where a lamp with a place sends out far more watts than any other lamp."""
     lit, look = plainly_lit(scene), Look.of(scene.film)
     powers = [
         (light_power.power(lamp, _watts(lamp, look), 1.0, look), f"lights[{i}] ({lamp.kind})")
@@ -198,13 +201,13 @@ def _shape_watts(shape: Shape, look: Look) -> float:
 
 
 def refusals(renderer: DevicePictures) -> list[str]:
-    """Return a sentence for each way in which samples of a render, or pixels, are wrong."""
-    told = []
+    """Return a sentence for each fault of samples or pixels of a render."""
+    sentences = []
     if rejected := renderer.counts.rejected:
-        told.append(
+        sentences.append(
             f"{rejected} samples were not finite, too bright, or in a medium that is far too dense "
             "beside empty cells, and count as black"
         )
     if renderer.counts.full:
-        told.append("pixels are too bright for the film: lower film.exposure")
-    return told
+        sentences.append("pixels are too bright for the film: lower film.exposure")
+    return sentences
