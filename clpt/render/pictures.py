@@ -11,7 +11,7 @@ from pyopencl.array import Array
 
 from clpt import device as dev
 from clpt import images
-from clpt.images.colour.view import View
+from clpt.images.colour import View
 from clpt.render.film.resolve import Resolve, Screen
 from clpt.render.makers.locking import synchronized
 from clpt.render.resumable import ResumableRenderer
@@ -57,7 +57,7 @@ class DevicePictures(ResumableRenderer):
         into: the caller's Array or Buffer, or 2D Image of 8-bit or float RGBA, as OpenGL shares
         them; None makes an Array. dtype: uint8 (the default, the bytes of a .png) or float32.
         exposure [stops] over the film's `display_exposure`; tone: none, reinhard, aces, agx or
-        neutral, see clpt.images.colour.tones; srgb: whether the sRGB transfer is applied, by
+        neutral, see clpt.images.colour; srgb: whether the sRGB transfer is applied, by
         default to uint8 only; colours become Rec. 709. view: of OpenColorIO, in the place of tone
         and
         transfer: a table of it, right to 1/512 for 98 of 100 colours. flip: the first row is the

@@ -30,7 +30,7 @@ from clpt.cli.render.passes import render_samples
 from clpt.errors import DeviceError, SceneError
 from clpt.formats import load
 from clpt.images import exr_files, spectral_exr
-from clpt.images.colour.view import View
+from clpt.images.colour import View
 from clpt.render.film import film_file
 from clpt.render.renderer import Renderer
 from clpt.spectra import read_sensor

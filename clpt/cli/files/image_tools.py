@@ -11,12 +11,12 @@ import numpy as np
 
 from clpt import images
 from clpt.files import output_files
-from clpt.images.colour.false_colours import false_colours
+from clpt.images.colour import false_colours
 
 from ...choices import FOR_SCREENS
 from ...errors import SceneError, nearest, one_line
 from ...images import screen_files
-from ...images.differences import Differences, differences, size_of
+from ...images.measures import Differences, differences, size_of
 from ...version import VERSION
 from ..options.grading import Grading, for_screens
 from .image_contents import ImageContents, contents, in_order, size_text

@@ -14,14 +14,14 @@ from .records import Command, with_options
 from .values import Choice, Stops
 
 if TYPE_CHECKING:
-    from clpt.images.colour.view import View
+    from clpt.images.colour import View
 
 
 @dataclass(frozen=True)
 class Grading:
     """The form of pictures in files.
 
-    exposure [stops], or "auto"; tone: a curve of clpt.images.colour.tones; view: of OpenColorIO,
+    exposure [stops], or "auto"; tone: a curve of clpt.images.colour; view: of OpenColorIO,
     instead;
     names: of channels of an .exr, a set of clpt.choices.CHANNEL_NAMES.
     """
@@ -73,7 +73,7 @@ class GradingOptions:
             return Grading(self.exposure, self.tone or "none", names=self.names)
         if self.tone is not None:
             raise click.UsageError("a view has its own tone curve; leave out --tone")
-        from clpt.images.colour.view import View  # here: help needs no numpy
+        from clpt.images.colour import View  # here: help needs no numpy
 
         seen = View(self.view, display=self.display, look=self.look, config=self.ocio)
         return Grading(self.exposure, view=seen, names=self.names)

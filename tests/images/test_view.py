@@ -8,8 +8,8 @@ from clpt import device, images
 from clpt.choices import OCIO_CONFIG
 from clpt.device import DeviceArray
 from clpt.errors import DeviceError, SceneError, UnknownKindError
-from clpt.images.colour import view as views
-from clpt.images.colour.view import View
+from clpt.images import colour as views
+from clpt.images.colour import View
 from clpt.render.film.resolve import Resolve, Screen
 
 ocio = pytest.importorskip("PyOpenColorIO", reason="OpenColorIO is not installed")

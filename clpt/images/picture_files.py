@@ -1,8 +1,9 @@
-"""Pictures into files, by their suffix; each says what its numbers mean, or has one meaning."""
+"""Files of pictures by their suffix: the way in and the way out."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,16 +12,72 @@ from numpy.typing import ArrayLike, NDArray
 from clpt.arrays import Floats32
 from clpt.choices import FOR_SCREENS, WRITABLE, Exposure
 from clpt.errors import SceneError
-from clpt.files import output_files
-from clpt.images import exr, hdr, npy, pfm, screen_files
-from clpt.images.arrays import from_array
-from clpt.images.brightness import stops
-from clpt.images.colour.view import View
-from clpt.images.png_files import Metadata, png
+from clpt.files import budget, output_files
+from clpt.images import exr, float_files, hdr, pillow, screen_files
+from clpt.images.checks import check_there, reading
+from clpt.images.colour import View
+from clpt.images.measures import stops
+from clpt.images.screen_files import Metadata, png
+from clpt.images.stored import Stored, from_array
 from clpt.images.transfer import multiplied, straight, to_codes, to_rec709
 from clpt.spectra.spaces import chromaticities
 
+log = logging.getLogger("clpt.images")
+READERS: dict[str, Callable[[Path], Stored]] = {
+    ".exr": exr.read,
+    ".hdr": hdr.read,
+    ".pic": hdr.read,
+    ".pfm": float_files.read_pfm,
+    ".npy": float_files.read_npy,
+    **dict.fromkeys(pillow.SUFFIXES, pillow.read),
+}
+STRAIGHT = pillow.SUFFIXES  # of files whose colours are not multiplied by alpha
 WITH_ALPHA = (".png", ".webp")  # of FOR_SCREENS
+
+
+def read(path: str | Path, *, linear: bool = True) -> Floats32:
+    """Return an image file as (h, w, c) float32, row 0 at the top; c is 1, 3 or 4.
+
+    Other counts are possible for EXR files without colours, and .npy.
+
+    path: of the file. linear: colours, as linear Rec. 709. False: data, such as roughness or
+    normals: the numbers as they are stored, those of 8 and 16 bits in [0, 1]. Alpha is never
+    decoded; colours of .exr are multiplied by it, those of other files are not, and they stay so.
+    What the file says and is left out is a warning in the log. docs/images.md has the table.
+
+    Raises SceneError if there is no such file, its suffix is unknown, it is not an image, or too
+    large.
+    """
+    image = read_stored(path)
+    log_notes(path, image, raw=not linear)
+    return image.decoded(linear)
+
+
+def log_notes(path: str | Path, image: Stored, *, raw: bool) -> None:
+    """Warn in the log of what an image's file says that is left out."""
+    for note in image.notes_of(raw):
+        log.warning("%s: %s", path, note)
+
+
+def read_stored(path: str | Path) -> Stored:
+    """Return an image file as it is stored; whoever asks tells its notes. Raises as `read`."""
+    path = check_input(path)
+    with reading(path):
+        image = READERS[path.suffix.lower()](path)
+    if image.values.size == 0:
+        raise SceneError("the image has no pixels", file=path)
+    budget.take_image(image.values.nbytes, "its pixels", path)
+    return image
+
+
+def check_input(path: str | Path) -> Path:
+    """Return the path, if `read` knows its suffix and there is such a file. Else SceneError."""
+    path = Path(path)
+    if path.suffix.lower() not in READERS:
+        message = f"unknown image suffix {path.suffix!r}; known: {', '.join(READERS)}"
+        raise SceneError(message, file=path)
+    check_there(path)
+    return path
 
 
 def write(
@@ -51,7 +108,7 @@ def write(
     space: of the colours, see clpt.spectra.spaces; an .exr states it by its chromaticities, an .hdr
     by its primaries. Files for screens are converted to sRGB and a .pfm to Rec. 709, white to
     white, which is what they mean; an .npy is not converted.
-    tone: of files for screens, see clpt.images.colour.tones; view: of them, a `clpt.View` of
+    tone: of files for screens, see clpt.images.colour; view: of them, a `clpt.View` of
     OpenColorIO, in the place of tone and sRGB transfer.
 
     Raises SceneError if the suffix, the space or the tone is unknown, the shape does not fit or the
@@ -70,9 +127,9 @@ def write(
         elif suffix == ".hdr":
             hdr.write(path, pixels, space)
         elif suffix == ".pfm":
-            pfm.write(path, to_rec709(pixels, space))
+            float_files.write_pfm(path, to_rec709(pixels, space))
         else:
-            npy.write(path, pixels)
+            float_files.write_npy(path, pixels)
     except SceneError:
         raise
     except (OSError, RuntimeError, ValueError) as error:

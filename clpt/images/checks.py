@@ -1,4 +1,4 @@
-"""Failures of libraries that read pictures, raised as errors of clpt."""
+"""Checks of image files before and during reading: existence, size, faults of libraries."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 
 from clpt.errors import SceneError
 from clpt.files import input_files
+
+PIXELS = 1 << 29  # of one image
 
 
 def check_there(path: Path) -> None:
@@ -35,3 +37,10 @@ def reading(path: Path) -> Iterator[None]:
     except Exception as error:  # the libraries raise their own, from struct.error to RuntimeError
         message = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise SceneError(f"not a readable image: {message}", file=path) from error
+
+
+def check_size(file: Path | None, width: int, height: int) -> None:
+    """Raise SceneError for an image of more pixels than are read."""
+    if width * height > PIXELS:
+        message = f"has {width}x{height} pixels, more than the {PIXELS} that are read"
+        raise SceneError(message, file=file)
