@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from clpt.render.flow.check import check
 
 from .. import device as dev
-from ..device import compile_limits, share_compilers
+from ..device import compilers, share_compilers
 from ..errors import ClusterError
 from ..render.pictures import DevicePictures
 from ..render.progress import Progress
@@ -52,11 +52,11 @@ def ending_at_limit() -> Iterator[None]:
         failures.complain(said)
         os._exit(failures.BAD_INPUT)
 
-    before, compile_limits.at_limit = compile_limits.at_limit, end
+    before, compilers.at_limit = compilers.at_limit, end
     try:
         yield
     finally:
-        compile_limits.at_limit = before
+        compilers.at_limit = before
 
 
 def read_scene(file: Path, options: SceneOptions, shown: Display) -> Scene:
