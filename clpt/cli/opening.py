@@ -247,7 +247,7 @@ def connected(workers: Workers, machine: Machine, shown: Display) -> Iterator[Cl
 
     machine: for workers on this machine. Raises ClusterError.
     """
-    from ..cluster import keys, processes  # here: a single device has no use for them
+    from ..cluster import processes  # here: a single device has no use for them
 
     if workers.number is not None:
         device, threads = machine.device, machine.threads
@@ -257,7 +257,7 @@ def connected(workers: Workers, machine: Machine, shown: Display) -> Iterator[Cl
     processes.configure()
     from distributed import Client
 
-    security = keys.security(workers.keys)
+    security = processes.security(workers.keys)
     with shown.phase(f"connecting to {workers.cluster}"):
         try:
             client = Client(workers.cluster, security=security, timeout=10)
