@@ -22,7 +22,7 @@ from clpt.files import output_files
 from clpt.formats.meshes import particles, strands
 from clpt.formats.native import motion
 from clpt.images import spectral_exr
-from clpt.measured import tensor_file
+from clpt.measured import measurement
 from clpt.render.film import film_file
 from clpt.scene.motion import Deformation
 from tests.render.film.test_film_file import made as film
@@ -116,7 +116,10 @@ WRITERS: dict[str, tuple[str, Writer]] = {
         ),
     ),
     "merl": ("a.binary", merl),
-    "tensors": ("a.bsdf", lambda path: tensor_file.write(path, {"points": POINTS, "n": NOISE})),
+    "tensors": (
+        "a.bsdf",
+        lambda path: measurement.write_tensors(path, {"points": POINTS, "n": NOISE}),
+    ),
     "plot png": ("a.png", plot),
     "plot svg": ("a.svg", plot),
     "plot pdf": ("a.pdf", plot),

@@ -98,14 +98,14 @@ def _spots(lens: Prescription, waves: Sequence[float], angles: Sequence[float]) 
     """Return the spots of points at angles [degrees], a row for each and a wavelength [nm]."""
     from rich.table import Table
 
-    from ..lenses import spots
+    from ..lenses import tracing
 
     table = Table(box=None, pad_edge=False)
     for heading in ("degrees", "nm", "spot [um]", "light through"):
         table.add_column(heading, justify="right")
     for angle in angles:
         for wavelength in waves:
-            spot = spots.spot(lens, angle, wavelength)
+            spot = tracing.spot(lens, angle, wavelength)
             size = f"{spot.radius * 1e3:.4g}" if len(spot.points) else "-"
             table.add_row(f"{angle:g}", f"{wavelength:g}", size, f"{spot.through:.3f}")
     return table

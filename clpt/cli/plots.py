@@ -17,7 +17,7 @@ from clpt.files import output_files
 
 from ..errors import SceneError
 from ..images import to_srgb8
-from ..lenses import Prescription, cardinal, spots
+from ..lenses import Prescription, cardinal, tracing
 from ..lenses.glasses import AIR, LINE_D
 from ..lenses.tracing import Rays, intersect, refract, sag
 from ..spectra import cie_xyz, xyz_to_rgb
@@ -251,7 +251,7 @@ def _rays(lens: Prescription, angle: float, front: float, film: float) -> list[n
 def _spot(axes: Axes, lens: Prescription, angle: float, waves: list[float]) -> None:
     middle, reach = None, 1.0
     for wavelength in waves:
-        points = spots.spot(lens, angle, wavelength).points * 1e3
+        points = tracing.spot(lens, angle, wavelength).points * 1e3
         if not len(points):
             continue
         if middle is None:

@@ -1,4 +1,4 @@
-"""Arrays on a device that numpy and other array libraries can read."""
+"""Arrays on a device that numpy and other array libraries can read, also by DLPack capsules."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from . import forking
 from .runtimes import refused, wait
 
 _changing = forking.renewed(threading.Lock())  # held while a list of events changes
+# Structures and codes of dlpack.h 0.8. For OpenCL the data pointer is the cl_mem handle.
 CPU, OPENCL = 1, 4  # DLDeviceType
 _NAME = b"dltensor"  # until a consumer renames it
 _CODES = {"i": 0, "u": 1, "f": 2}  # DLDataTypeCode

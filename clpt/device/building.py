@@ -355,7 +355,13 @@ def first_built(
 
 @functools.cache
 def declarations() -> str:
-    """Return the declarations without comments, followed by #undef of their macros."""
+    """Return declarations of OpenCL's built-in functions, followed by #undef of their macros.
+
+    PoCL puts clang's header before each text: 18,000 lines, which take longer than most of clpt's
+    programs. With its guard macro defined the header is empty, and these declarations
+    (`kernels/core/builtins.cl`) precede the text. A text that calls other functions, such as a
+    user's, fails to build, and is built again with the header.
+    """
     text = (kernels_folder() / "core" / "builtins.cl").read_text(encoding="utf-8")
     text = re.sub(r"/\*.*?\*/|\\\n\s*|\n(?=\n)", "", text, flags=re.DOTALL)
     macros = dict.fromkeys(re.findall(r"^#define (\w+)", text, re.MULTILINE))

@@ -23,7 +23,7 @@ from clpt.device import (
     runtimes,
     speed_trial,
 )
-from clpt.files import host_memory
+from clpt.files import budget
 
 from ..errors import DeviceError
 from ..scalars import is_whole
@@ -122,7 +122,7 @@ class DeviceInfo:
     def free_memory(self) -> int:
         """Return an estimate of the device's free memory [bytes]; OpenCL has no query for it."""
         if self.is_cpu:
-            return min(self.global_mem, host_memory.available() or self.global_mem)
+            return min(self.global_mem, budget.free_memory() or self.global_mem)
         if "cl_amd_device_attribute_query" in self.cl_device.extensions:
             try:
                 kib = self.cl_device.get_info(cl.device_info.GLOBAL_FREE_MEMORY_AMD)

@@ -27,7 +27,7 @@ from pathlib import Path
 import pyopencl as cl
 
 from clpt.device import disk_cache
-from clpt.files import output_files, ownership
+from clpt.files import output_files
 
 from ..errors import DeviceError, MemoryBudgetError
 
@@ -186,7 +186,7 @@ def _created(folder: Path) -> Path:
 def _is_safe(path: str) -> bool:
     """Return whether other users cannot write to a folder in the user's home."""
     try:
-        return ownership.fault(Path(path).expanduser()) is None
+        return output_files.ownership_fault(Path(path).expanduser()) is None
     except (OSError, RuntimeError):  # RuntimeError: a user without a home
         return False
 

@@ -40,7 +40,11 @@ def reading(path: Path) -> Iterator[None]:
 
 
 def check_size(file: Path | None, width: int, height: int) -> None:
-    """Raise SceneError for an image of more pixels than are read."""
+    """Raise SceneError for an image of more than PIXELS pixels.
+
+    A file of a few kilobytes can announce gigabytes of pixels, so its header is checked before
+    memory is taken. Readers ask `clpt.files.budget` for the memory itself.
+    """
     if width * height > PIXELS:
         message = f"has {width}x{height} pixels, more than the {PIXELS} that are read"
         raise SceneError(message, file=file)

@@ -1,4 +1,8 @@
-"""Colours of screens: tone curves, false colours of figures, views of OpenColorIO."""
+"""Colours of screens: tone curves, false colours of figures, views of OpenColorIO.
+
+A tone curve takes linear Rec. 709 of any brightness to linear values of a screen, where white is 1.
+The device has the same curves, in kernels/film/tone.cl, in the order of their names in TONES.
+"""
 
 from __future__ import annotations
 
@@ -148,6 +152,9 @@ class View:
     name: of the view; display, look: by default the config's first display and no look; config: a
     file, or a name such as ocio://default, or "$OCIO" for what the environment names. By default
     each is the config's own default.
+
+    OpenColorIO (`pip install 'clpt[colour]'`) makes the pictures of files. A device gets a table of
+    its result, see `table`.
 
     Raises SceneError where OpenColorIO is not installed or refuses the config, UnknownKindError for
     names that the config does not have.

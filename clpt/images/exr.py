@@ -33,9 +33,9 @@ HALF_MIN = 2.0**-14  # from which on it has 11 bits
 class Choice:
     """The channels of a picture.
 
-    part: which they are of; names: in the order of the image. form: "rgb", "xyz", "grey", "chroma"
-    (luminance and chroma) or "numbers"; all but the last may have alpha. note: what is to be told
-    of the choice.
+    part: index of their part; names: in the order of the image; form: "rgb", "xyz", "grey",
+    "chroma" (luminance and chroma) or "numbers"; all but the last may have alpha; note: a warning
+    about the choice.
     """
 
     part: int
@@ -45,7 +45,18 @@ class Choice:
 
 
 def choose(parts: Sequence[Sequence[str]]) -> Choice:
-    """Choose among the names of the channels of each part."""
+    """Return the channels of the picture, by the names of the channels of each part.
+
+    A name is a layer, a dot and a letter; the letters of a picture are R, G, B and A, or Y, RY, BY
+    and A ("Technical Introduction to OpenEXR", Channel Names), here in small letters too. The rule:
+
+    1. of each part in turn, channels without a layer; X, Y and Z too, which are XYZ;
+    2. else of each part in turn, channels of a layer: of a layer whose last word is in FAVOURED,
+       else of the first layer;
+    3. else, of the first part: its only channel; X, Y and Z of a layer; else all, as numbers.
+
+    Deep parts have no names here, and are passed over.
+    """
     layers = [_layers(names) for names in parts]
     for number, found in enumerate(layers):
         if made := _picture(number, found.get("", {}), whole=True):

@@ -1,4 +1,9 @@
-"""Pictures as plain numbers: portable float maps (.pfm), and NumPy's arrays (.npy)."""
+"""Pictures as plain numbers: portable float maps (.pfm), and NumPy's arrays (.npy).
+
+A portable float map is a text header, then floats, rows from the bottom (Debevec's description).
+The scale's sign says the order of bytes, its absolute value is a factor. "PF4", of four channels,
+is an extension of ImageMagick and others.
+"""
 
 from __future__ import annotations
 

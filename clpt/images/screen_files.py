@@ -36,7 +36,11 @@ class Profile:
 
 
 def profile(file: BinaryIO) -> Profile:
-    """Read the colours that the chunks before the pixels describe; Pillow reads iCCP."""
+    """Read the colours that the chunks before the pixels describe; Pillow reads iCCP.
+
+    The PNG Specification (third edition), sections 4.3 and 11.3.2: of cICP, iCCP, sRGB, and gAMA
+    with cHRM the first counts. Without any of them the colours are sRGB.
+    """
     chunks = dict(_chunks(file))
     if b"cICP" in chunks and chunks[b"cICP"] != SRGB_CICP:
         return Profile(notes=("its cICP chunk is left out: its colours are taken as sRGB",))
