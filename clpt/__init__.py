@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     )
     from clpt.files.budget import Budget
     from clpt.formats import load, load_dict, save
-    from clpt.formats.mitsuba.transform4f import ScalarTransform4f
+    from clpt.formats.mitsuba.dicts import ScalarTransform4f
     from clpt.images import read as read_image
     from clpt.images import write as write_image
     from clpt.images.colour import View
@@ -67,7 +67,7 @@ _HOMES = {  # the module of each name, and what it is called there
     "UnusedParameterError": ("errors", "UnusedParameterError"),
     "load": ("formats", "load"),
     "load_dict": ("formats", "load_dict"),
-    "ScalarTransform4f": ("formats.mitsuba.transform4f", "ScalarTransform4f"),
+    "ScalarTransform4f": ("formats.mitsuba.dicts", "ScalarTransform4f"),
     "save": ("formats", "save"),
     "read_image": ("images", "read"),
     "write_image": ("images", "write"),
@@ -121,10 +121,10 @@ class _Front(ModuleType):
 
 def _give_widgets() -> None:
     """Let renderers have widgets: they know nothing of who shows their pictures."""
-    from clpt.render.pictures import DevicePictures
+    from clpt.render.resumable import ResumableRenderer
     from clpt.view.notebook import widget
 
-    DevicePictures._make_widget = widget
+    ResumableRenderer._make_widget = widget
 
 
 def _give_pictures() -> None:

@@ -368,7 +368,7 @@ LIMITS = (  # on the page, and where the code has them
     ("| 16 |", "clpt.formats.mitsuba.xml", "MAX_INCLUDES", 16),
     ("1000 parts", "clpt.scene.params", "MOST_PARTS", 1000),
     ("64 deep", "clpt.scene.params", "MOST_NESTED", 64),
-    ("| 32 |", "clpt.formats.pbrt.files", "DEEPEST", 32),
+    ("| 32 |", "clpt.formats.pbrt.state", "DEEPEST", 32),
     ("65,536 values along an axis", "clpt.formats.volumes.sparse", "MOST_AXIS", 65536),
     ("10 levels", "clpt.formats.pbrt.shapes", "DEEPEST", 10),
 )

@@ -13,7 +13,7 @@ from clpt.device import kernels_folder
 from clpt.layout import SLAB_BLOCK, TYPES, Constants, Record, bits
 from clpt.records import CONSTANTS, LIGHT, PATH, SETTINGS, SHAPE, SLABS
 from clpt.render.flow.signatures import scene_text
-from clpt.render.records import camera_rows as camera_records
+from clpt.render.records import camera as camera_records
 
 UNIFORM = [SETTINGS, *camera_records.RECORDS.values()]
 

@@ -19,7 +19,7 @@ from clpt.cli.display import Display
 from clpt.cli.files import checkpoints
 from clpt.cli.render import video
 from clpt.files import output_files
-from clpt.formats.meshes import particles, strands
+from clpt.formats.meshes import spheres_curves
 from clpt.formats.native import motion
 from clpt.images import spectral_exr
 from clpt.measured import measurement
@@ -107,8 +107,8 @@ WRITERS: dict[str, tuple[str, Writer]] = {
     "checkpoint": ("a.resume.exr", checkpoint),
     "text": ("a.cl", lambda path: output_files.write_text(path, "kernel\n" * 500)),
     "scene": ("scene.json", saved_scene),
-    "strands": ("a.txt", lambda path: strands.write(path, POINTS, np.array([4, 4]))),
-    "particles": ("a.npz", lambda path: particles.write(path, SPHERES)),
+    "strands": ("a.txt", lambda path: spheres_curves.write_strands(path, POINTS, np.array([4, 4]))),
+    "particles": ("a.npz", lambda path: spheres_curves.write_spheres(path, SPHERES)),
     "deformation": (
         "a.npz",
         lambda path: motion.write_deformation(

@@ -202,7 +202,7 @@ def _compact_nodes(
     common |= {"nodes": built.nodes, "items": built.items, "leaves": leaves}
     common |= {"costs": chosen.costs, "roots": chosen.roots, "firsts": chosen.firsts}
     for begin, count in reversed(figures.steps):
-        building.run_each("bvh/compact_pack.cl", "compact_nodes", count, begin=begin, **common)
+        building.run_each("bvh/collapse.cl#compact", "compact_nodes", count, begin=begin, **common)
     bounds = building.allocate(32 * figures.nodes)
     part = Part(built.count, built.reach(building), figures.steps, bounds=bounds)
     return nodes, part, figures.stats
@@ -247,8 +247,8 @@ BOX_LAYOUTS: dict[str, Callable[[Building, int, cl.Buffer], Packed]] = {
 
 # Kernel files that replace others on devices without vectors.
 ALONE: dict[str, tuple[str, ...]] = {
-    "bvh/mask8.cl": ("bvh/mask8_bits.cl",),
-    "bvh/wide8_waiting.cl": ("bvh/wide8_levels.cl",),
+    "bvh/mask8.cl": ("bvh/mask8.cl#bits",),
+    "bvh/wide8_stack.cl": ("bvh/wide8_stack.cl#levels",),
 }
 
 TREES = tuple(name for name in LAYOUTS if name in BOX_LAYOUTS)  # all but brute force
@@ -264,7 +264,7 @@ def traversal_text(layout: str, all_hits: bool = False) -> str:
 
     all_hits: the traversal that finds all triangles that a ray meets instead, LAYOUT(all_hits).
     """
-    file = f"bvh/{layout}{'_all_hits' * all_hits}.cl"
+    file = f"bvh/{layout}.cl{'#all_hits' * all_hits}"
     return f'#include "{file}"\n#define LAYOUT(verb) {layout}_##verb\n'
 
 

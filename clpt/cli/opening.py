@@ -17,9 +17,9 @@ from clpt.render.flow.check import check
 from .. import device as dev
 from ..device import compilers, share_compilers
 from ..errors import ClusterError
-from ..render.pictures import DevicePictures
 from ..render.progress import Progress
 from ..render.renderer import Renderer
+from ..render.resumable import ResumableRenderer
 from ..scene import Scene
 from .display import Display, device_names
 from .options.applied import changed
@@ -108,7 +108,7 @@ class RendererFactory:
     name = ""
     frame = math.inf
 
-    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> DevicePictures:
+    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> ResumableRenderer:
         """Return a new renderer of a scene, which takes samples from this number on."""
         raise NotImplementedError
 
@@ -132,14 +132,14 @@ class RendererFactory:
 class DeviceFactory(RendererFactory):
     """Makes renderers on devices of this machine; renderer: the last of them."""
 
-    renderer: DevicePictures
+    renderer: ResumableRenderer
 
     def __init__(self, devices: list[dev.Device], options: SceneOptions):
         self.devices = devices
         self.name = " and ".join(on.info.label for on in devices)
         self._made = options.renderer_options
 
-    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> DevicePictures:
+    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> ResumableRenderer:
         """Return a new renderer of a scene; note its warnings."""
         text = f"compiling for {device_names([on.info for on in self.devices])}"
         compiling = shown.compiling(text)
@@ -203,7 +203,7 @@ class ClusterFactory(RendererFactory):
         return -self.frame
 
 
-def new_renderer(scene: Scene, devices: list[dev.Device], **settings: Any) -> DevicePictures:
+def new_renderer(scene: Scene, devices: list[dev.Device], **settings: Any) -> ResumableRenderer:
     """Return a renderer on a single device, or on several."""
     if len(devices) > 1:
         from ..cluster.multi_renderer import MultiRenderer

@@ -339,9 +339,8 @@ def _panel(
     axes.set_ylim(len(rows) - 0.4, -0.6)
     scene = rows[0][1].scene if len({figure.scene for _, figure in rows}) == 1 else ""
     axes.set_title(f"{part}{' of ' if scene else ''}{scene}", loc="left", size=10, color=INK)
-    first = rows[0][1]
-    direction = ", less is better" if first.less_is_better else ""
-    axes.set_xlabel(f"{first.unit}{direction}", color=INK, size=9)
+    direction = ", less is better" if rows[0][1].less_is_better else ""
+    axes.set_xlabel(f"{rows[0][1].unit}{direction}", color=INK, size=9)
     axes.grid(axis="x", color=FAINT, linewidth=0.8)
     axes.set_axisbelow(True)
     axes.tick_params(colors=INK, labelsize=8, length=0, which="both")

@@ -18,18 +18,20 @@ from clpt.cluster.farm import Farm, Film
 from clpt.cluster.host_maker import HostMaker
 from clpt.denoise import needs
 from clpt.errors import SceneError
+from clpt.render.edit.plan import Plan
 from clpt.render.film.state import FilmState, Ranges
+from clpt.render.makers import planning
 from clpt.render.makers.contents import Contents
-from clpt.render.makers.device_film import Apply, Changes, DeviceFilm, open_device
+from clpt.render.makers.device_film import DeviceFilm, open_device
 from clpt.render.makers.maker import Call, Held, Settle
+from clpt.render.makers.planning import Changes
 from clpt.render.options import check_options, check_scene
-from clpt.render.pictures import DevicePictures
+from clpt.render.resumable import ResumableRenderer
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.tracer import Selection
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Plain
-from clpt.scene.integrators import Integrator
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -218,23 +220,27 @@ class ClusterMaker(HostMaker):
     def empty(self, *, seed: int | None = None, recover: bool = False) -> None:
         """Empty the film; workers open the scene with another seed at the next call."""
         if seed is not None:
-            self._take_scene(replace(self.scene, seed=seed))
+            self.take_scene(replace(self.scene, seed=seed))
         self._sum = self._whole = FilmSum()
 
-    def update(self, changes: Changes, events: dev.Events, apply: Apply) -> None:
-        """Render another scene from now on; workers open it at the next call.
+    def plan(self, changes: Changes, events: dev.Events = None) -> Plan | None:
+        """Return the plan of another scene, which workers open at the next call.
 
-        Records of workers stay. Raises SceneError for a scene that cannot be written, for custom
-        materials, and for changes of a part of the scene.
+        Records of workers stay; for another integrator there is no plan, as workers agree on one.
+        Raises SceneError for changes of a part of the scene. The plan raises SceneError for a scene
+        that cannot be written, and for custom materials.
         """
+        if changes.integrator is not None:
+            return None
         if changes.by_key:
             raise SceneError("give the whole scene", where=min(changes.by_key))
         scene = changes.scene or self.scene
         if changes.camera is not None:
             scene = replace(scene, camera=changes.camera)
-        apply(lambda: self._take_scene(scene), refusals=(Exception,))
+        return ClusterPlan(self, scene)
 
-    def _take_scene(self, scene: Scene) -> None:
+    def take_scene(self, scene: Scene) -> None:
+        """Replace the scene; a film of another form on this machine is closed."""
         former = self._folder
         self._pack(scene)
         former.cleanup()
@@ -242,15 +248,14 @@ class ClusterMaker(HostMaker):
             return
         self._shown = None
         try:
-            self._home.update(Changes(scene=self.scene), [], lambda write, **_: write())
+            plan = planning.plan(self._home, Changes(scene=self.scene), [])
+            if plan is not None:
+                plan.write()
         except SceneError:  # a film of another form
             self._home.close()
             self._home = None
         else:
             self._home.empty()
-
-    def follow(self, way: Integrator, apply: Apply) -> None:
-        """Do nothing: workers agree on an integrator."""
 
     def close(self) -> None:
         """Free this machine's resources; workers keep the scene until another needs room."""
@@ -259,7 +264,23 @@ class ClusterMaker(HostMaker):
             self._home.close()
 
 
-class ClusterRenderer(DevicePictures):
+@dataclass(frozen=True, eq=False)
+class ClusterPlan(Plan):
+    """Another scene for the workers of a cluster."""
+
+    maker: ClusterMaker
+    scene: Scene
+    refusals = (Exception,)
+
+    @property
+    def repeatable(self) -> bool:
+        return False
+
+    def write(self) -> None:
+        self.maker.take_scene(self.scene)
+
+
+class ClusterRenderer(ResumableRenderer):
     """Renders a scene on the workers of a cluster, with the methods of `Renderer`.
 
     client: a Dask client of any cluster whose workers have clpt installed. mixed: whether workers

@@ -14,18 +14,20 @@ from clpt.cluster.crew import Crew
 from clpt.cluster.device_worker import DeviceWorker, Once, device_names, results_where_possible
 from clpt.cluster.host_maker import HostMaker
 from clpt.errors import DeviceError, SceneError
+from clpt.render.edit.plan import Plan
 from clpt.render.film.state import FilmState, Ranges
+from clpt.render.makers import planning
 from clpt.render.makers.contents import Contents
-from clpt.render.makers.device_film import Apply, Changes, DeviceFilm, texture_budget_of
+from clpt.render.makers.device_film import DeviceFilm, texture_budget_of
 from clpt.render.makers.maker import Call, Held, Settle
+from clpt.render.makers.planning import Changes
 from clpt.render.options import RenderOptions, check_options, check_scene
-from clpt.render.pictures import DevicePictures
+from clpt.render.resumable import ResumableRenderer
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.tracer import Selection
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Plain
-from clpt.scene.integrators import Integrator
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -228,19 +230,20 @@ class DevicesMaker(HostMaker):
         crew.use_all_pixels()
         crew.count_from(Counts())
 
-    def update(self, changes: Changes, events: dev.Events, apply: Apply) -> None:
-        """Render another scene from now on, which is lowered once for all devices."""
-        share = Once()
-        self._write(lambda film: film.update(changes, events, _written, share), apply)
+    def plan(self, changes: Changes, events: dev.Events = None) -> Plan:
+        """Return the plan of a changed scene, which is lowered once for all devices."""
+        return DevicesPlan(self, changes, events)
 
-    def follow(self, way: Integrator, apply: Apply) -> None:
-        """Change to the integrator of a film that is continued."""
+    def write(self, changes: Changes, events: dev.Events) -> None:
+        """Change the scene on all devices at once."""
         share = Once()
-        self._write(lambda film: film.follow(way, _written, share), apply)
 
-    def _write(self, action: Callable[[DeviceFilm], None], apply: Apply) -> None:
-        """Change the scene on every device at once."""
-        apply(lambda: self._on_each(action), refusals=(Exception,))
+        def write(film: DeviceFilm) -> None:
+            plan = planning.plan(film, changes, events, share)
+            if plan is not None:
+                plan.write()
+
+        self._on_each(write)
 
     def close(self) -> None:
         """Free the memory of all devices."""
@@ -270,9 +273,21 @@ class DevicesMaker(HostMaker):
                 self.crew.drop(worker, result)
 
 
-def _written(write: Callable[[], None], *, again: bool = False) -> None:
-    """Write a device's changes at once: `_write` guards the change of all devices."""
-    write()
+@dataclass(frozen=True, eq=False)
+class DevicesPlan(Plan):
+    """Changes of the scene on several devices, each of which plans and writes them."""
+
+    maker: DevicesMaker
+    changes: Changes
+    events: dev.Events
+    refusals = (Exception,)
+
+    @property
+    def repeatable(self) -> bool:
+        return False
+
+    def write(self) -> None:
+        self.maker.write(self.changes, self.events)
 
 
 @dataclass(frozen=True)
@@ -289,7 +304,7 @@ class DeviceShare:
     failure: str | None
 
 
-class MultiRenderer(DevicePictures):
+class MultiRenderer(ResumableRenderer):
     """Renders a scene on several devices; its picture so far is available between runs.
 
     devices: "all", "gpu", or names or indexes as `clpt.device.choose_all` takes them, and

@@ -11,6 +11,7 @@ import functools
 import hashlib
 import logging
 import os
+import re
 import stat
 import sys
 import tempfile
@@ -265,7 +266,7 @@ def _warn(text: str) -> None:
 def keep_failed(source: Source) -> str | None:
     """Write the text of a program that failed to build; return its path, None on failure."""
     digest = hashlib.sha256(source.text.encode()).hexdigest()[:12]
-    stem = source.name.replace("/", "_").removesuffix(".cl")
+    stem = re.sub(r"\W", "_", source.name.removesuffix(".cl"))
     path = folder() / "failed" / f"{stem}-{digest}.cl"
     try:
         _keep(path, source.text.encode())

@@ -15,9 +15,12 @@ from .conditions import OPENING, Macros, Row, rows_of, taken
 from .definitions import Paragraph, macro, named, paragraphs, whole, with_gaps
 
 _GENERATED = "generated/"  # prefix of files generated for a scene
-TWIN = "#none"  # suffix of the half of a file with the step that does nothing
-_HEAD = re.compile(r"/\*.*?\*/", re.DOTALL)
-_STEP, _TWIN = "\n/* Step. */", "\n/* Twin, "  # the starts of both halves
+TWIN = "#none"  # suffix of the section of a file with the step that does nothing
+_SHARED = "#"  # suffix of the section that all steps of a file share
+_MARK = re.compile(  # at a section's start
+    r"^/\* (?:(?P<twin>Twin, .*?\*/)|Step(?:(?P<unnamed>\. \*/)| (?P<step>\w+):))",
+    re.MULTILINE | re.DOTALL,
+)
 _QUOTED = re.compile(r'"([^"]+)"$')
 _LINE = re.compile(r'\s*#\s*line (\d+)(?: "([^"]+)")?')
 _PRIVATE = re.compile(  # at a line's start: a constant, or a function with an argument
@@ -146,26 +149,26 @@ def _text(folder: Path, name: str) -> str:
     return (folder / inside).read_text(encoding="utf-8")
 
 
-def _half(folder: Path, name: str) -> Part:
-    """Return a file up to its twin or, for a name with TWIN, without its step. Raises OSError.
+@cache
+def sections(folder: Path, file: str) -> dict[str, Part]:
+    """Return the sections of a file by the ends of their names. Raises OSError without the file.
 
-    The text above the step belongs to both halves. Blank rows replace the other half and, of a
-    twin, the comments at the heads of the file and of the half.
+    "#": the text above the first step, which all steps share; "#name": a named step; "": the step
+    without a name, or all of a file without steps; each plus TWIN: the step's twin.
     """
-    file = name.removesuffix(TWIN)
-    text, _, twin = _text(folder, file).partition(_TWIN)
-    if file == name:
-        return Part(text.replace(_STEP, "\n"), f"kernels/{file}")
-    if not twin:
-        raise FileNotFoundError(name)
-    shared = text.partition(_STEP)[0] if _STEP in text else ""
-    head = _HEAD.match(shared)
-    described = head[0] if head else ""
-    about, _, functions = twin.partition("*/")
-    left_out = (text[len(shared) :], about)
-    blank = "\n" * sum(part.count("\n") for part in (_TWIN, *left_out))
-    above = "\n" * described.count("\n") + shared[len(described) :]
-    return Part(f"{above}{blank}{functions}", f"kernels/{file}")
+    text = _text(folder, file)
+    marks = [*_MARK.finditer(text)]
+    found: dict[str, Part] = {}
+    end, start = _SHARED if marks and not marks[0]["twin"] else "", 0
+    for mark in [*marks, None]:
+        stop = mark.start() if mark else len(text)
+        line = 1 + text.count("\n", 0, start)
+        found[end] = Part(text[start:stop], f"kernels/{file}", line)
+        if mark:
+            step = f"#{mark['step']}" if mark["step"] else ""
+            end = end + TWIN if mark["twin"] else step
+            start = mark.start() if step else mark.end()
+    return found
 
 
 class _BadRow(Exception):
@@ -223,11 +226,12 @@ class _File:
     """A file in the text: its label in errors, and its head comment.
 
     generated: whether it is no file on disk, so that its lines count as in the text; lines: their
-    number so far.
+    number so far; described: whether the text gets its head comment, which a twin does without.
     """
 
     label: str
     generated: bool
+    described: bool = True
     header: tuple[Row, ...] = ()
     lines: int = 0
 
@@ -244,20 +248,25 @@ class _Assembly:
 
     def add(self, name: str, includer: str | None, line: int) -> None:
         """Append the file `name` with its includes inserted."""
-        part = self._read(name, includer, line)
-        self.names.add(name)
+        generated = name.startswith(_GENERATED)
+        for part in self._read(name, includer, line):
+            is_pasted = part is self.virtual.get(name) and "##" in part.text
+            file = _File(part.file, generated, described=not name.endswith(TWIN))
+            self._append(part, file, self.library or is_pasted)
+
+    def _append(self, part: Part, file: _File, keeps_all: bool) -> None:
+        """Append a part of a file with its includes inserted.
+
+        keeps_all: whether unused definitions stay.
+        """
         try:
             pieces = _pieces(part.text, part.line)
         except _BadRow as error:
             self._fail(part.file, error.line, str(error))
-        is_pasted = isinstance(self.virtual.get(name), Part) and "##" in part.text
-        keeps_all = self.library or is_pasted
-        generated = name.startswith(_GENERATED)
-        file = _File(part.file, generated)
         for number, piece in enumerate(pieces):
             kept = taken(piece.rows, self.macros)
-            if number == 0 and kept and kept[0].is_comment and not (keeps_all or generated):
-                file.header, kept = kept[:1], kept[1:]
+            if number == 0 and kept and kept[0].is_comment and not (keeps_all or file.generated):
+                file.header, kept = kept[: file.described], kept[1:]
             self.pieces.append((file, whole(kept) if keeps_all else paragraphs(kept)))
             include = piece.include and _QUOTED.match(piece.include.argument)
             if piece.include and include and include[1] not in self.names:
@@ -275,24 +284,34 @@ class _Assembly:
         root = self.pieces[0][0]
         if any(kept for file, parts in left if file is root for kept, _ in parts):
             text.add(root, root.header)
+            text.begun.add(root)
         for file, parts in left:
             for kept, apart in parts:
-                if kept and file.header and file.label not in text.files:
+                if kept and file.header and file not in text.begun:
                     text.begin(file, kept[0])
                 text.add(file, kept, apart)
         names = tuple(label.removeprefix("kernels/") for label in text.files)
         return Source(self.root, "\n".join([*text.rows, ""]), names)
 
-    def _read(self, name: str, includer: str | None, line: int) -> Part:
-        if name in self.virtual:
-            content = self.virtual[name]
-            if isinstance(content, tuple):
-                content = "".join(f'#include "{file}"\n' for file in content)
-            return content if isinstance(content, Part) else Part(content, name)
+    def _read(self, name: str, includer: str | None, line: int) -> list[Part]:
+        """Return the parts of a file, the part that its steps share first, unless it was read."""
+        self.names.add(name)
+        content = self.virtual.get(name)
+        if isinstance(content, tuple):
+            content = "".join(f'#include "{file}"\n' for file in content)
+        if content is not None:
+            return [content if isinstance(content, Part) else Part(content, name)]
+        file, mark, step = name.partition("#")
+        shared = file + _SHARED
         try:
-            return _half(self.folder, name)
+            parts = sections(self.folder, file)
         except OSError:
+            parts = {}
+        if mark + step not in parts and (mark or _SHARED not in parts):
             self._fail(includer, line, f"no file {name!r} in {self.folder} and no generated one")
+        ends = [mark + step] if shared in self.names else [_SHARED, mark + step]
+        self.names.add(shared)
+        return [parts[end] for end in ends if end in parts]
 
     def _fail(self, file: str | None, line: int, message: str) -> NoReturn:
         raise KernelBuildError(self.root, file, line or None, f"error: {message}", None)
@@ -304,6 +323,7 @@ class _Text:
     def __init__(self, rows: list[str]):
         self.rows = rows
         self.files: dict[str, None] = {}
+        self.begun: set[_File] = set()  # files whose head comments are written
         self._label, self._line = "", 0  # of the next row, by a compiler's count
 
     def begin(self, file: _File, first: Row) -> None:
@@ -313,8 +333,9 @@ class _Text:
         """
         header = "\n".join([row.text for row in file.header])
         lines = sum(row.lines for row in file.header)
-        apart = first.is_comment and first.number > lines + 1
+        apart = first.is_comment and first.number > file.header[0].number + lines
         self.files.setdefault(file.label)
+        self.begun.add(file)
         self.rows += [f'#line {first.number - lines - apart} "{file.label}"', header]
         self.rows += [""] * apart
         self._label, self._line = file.label, first.number

@@ -1,4 +1,11 @@
-"""Readers of lens files by suffix, and the library of lenses that ships with clpt."""
+"""Readers of lens files by suffix, and the library of lenses that ships with clpt.
+
+Optical Bench: `[lens data]` has a row for each surface: its number, radius (`AS` the stop, `FS` a
+field stop, `Infinity` a plane), thickness or a name, index, diameter, Abbe number, glass.
+`[aspherical data]` has number, radius, conic constant and factors of r^4, r^6, ... `[variable
+distances]` has a value for each state of a zoom or focus; the first is read. `[coating]`, an
+extension of clpt: a surface's number and pairs of index and thickness [nm], from the front on.
+"""
 
 from __future__ import annotations
 
@@ -79,12 +86,6 @@ def assembled(rows: list[Row], file: Path, name: str = "", source: str = "") -> 
 
 def _optical_bench(text: str, file: Path) -> Prescription:
     """Read text of Optical Bench (photonstophotos.net): tables, fields separated by tabs.
-
-    `[lens data]` has a row for each surface: its number, radius (`AS` the stop, `FS` a field stop,
-    `Infinity` a plane), thickness or a name, index, diameter, Abbe number, glass. `[aspherical
-    data]` has number, radius, conic constant and factors of r^4, r^6, ... `[variable distances]`
-    has a value for each state of a zoom or focus; the first is read. `[coating]`, an extension of
-    clpt: a surface's number and pairs of index and thickness [nm], from the front on.
 
     Raises SceneError with the line.
     """

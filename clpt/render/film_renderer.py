@@ -19,6 +19,7 @@ from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.denoise import needs
 from clpt.errors import LONGEST_WARNING, ClptError, DeviceError, SceneError, one_line
 from clpt.images.colour import View
+from clpt.render.edit.plan import Plan
 from clpt.render.edit.scene_edit import MaterialKey, ShapeKey
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
@@ -29,10 +30,9 @@ from clpt.render.film.saved_film import (
     other_devices,
 )
 from clpt.render.film.state import join_ranges
-from clpt.render.makers.contents import Change, Contents, FilmOwner
-from clpt.render.makers.device_film import Changes
-from clpt.render.makers.locking import Stop, healing, synchronized
+from clpt.render.makers.contents import Change, Contents, FilmOwner, Stop, healing, synchronized
 from clpt.render.makers.maker import Call, Discarded, Maker, Settle
+from clpt.render.makers.planning import Changes
 from clpt.render.options import check_changes, check_scene
 from clpt.render.progress import Progress
 from clpt.render.stats import RenderStats, collect
@@ -374,29 +374,20 @@ class FilmRenderer(FilmOwner, Pictures):
         events = list(wait_for or ())
         changes = Changes(camera, materials, transforms, vertices, scene, motion)
         self._maker.after(events)
-        self._maker.update(changes, events, self._apply)
+        self._write(self._maker.plan(changes, events), "update")
         return self._maker.last
 
-    def _apply(
-        self,
-        write: Callable[[], None],
-        *,
-        what: str = "update",
-        again: bool = False,
-        refusals: tuple[type[BaseException], ...] = (),
-    ) -> None:
-        """Change the scene, and begin at the first sample.
-
-        write: writes the change; what: that is, for people; again: whether it may be called once
-        more after an error; refusals: errors of it that leave all as it was.
-        """
+    def _write(self, plan: Plan | None, name: str) -> None:
+        """Change the scene, and begin at the first sample; name: of the change, for people."""
+        if plan is None:
+            return
 
         def put(_: BaseException | None = None) -> Contents:
-            write()
+            plan.write()
             return self._emptied()
 
-        change = self._change(what, put if again else None, heals=False)
-        with change, change.beginning_unless(*refusals):
+        change = self._change(name, put if plan.repeatable else None, heals=False)
+        with change, change.beginning_unless(*plan.refusals):
             self._contents = put()
 
     # ---- the film and its pictures

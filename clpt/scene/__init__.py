@@ -67,15 +67,15 @@ def __dir__() -> list[str]:
 
 
 def _show_own(module: ModuleType) -> None:
-    """Let TAB after a module's name show what it defines, not what it imports."""
+    """Let TAB after a module's name show its definitions without its imports."""
     defined = (type, FunctionType)
-    own = [
+    names = [
         name
         for name, value in vars(module).items()
         if not name.startswith("_")
         and (name.isupper() or (isinstance(value, defined) and value.__module__ == module.__name__))
     ]
-    vars(module)["__dir__"] = lambda: own
+    vars(module)["__dir__"] = lambda: names
 
 
 for _module in (cameras, integrators, lights, materials, media, phases, shapes, textures):
@@ -91,15 +91,15 @@ def kinds(category: str) -> dict[str, type[Kind]]:
 class Scene:
     """A whole scene.
 
-    camera: from which it is seen. shapes, lights: what there is; lights that are surfaces are a
-    shape's `emission`. integrator: how light is followed; sampler: where its random numbers come
-    from; film: size, mode, filter and colours of the picture. spp: samples of a pixel, for
-    `clpt.render`; noise: below which it gets no more, None for all, see
+    camera: the view. shapes, lights: the content; a light on a surface is its shape's `emission`.
+    integrator: the algorithm that follows light; sampler: the source of its random numbers; film:
+    size, mode, filter and colours of the picture. spp: samples of a pixel, for `clpt.render`;
+    noise: pixels below this relative noise get no more samples, None for no such limit, see
     clpt.render.wavefront.adaptive; seed: of the random numbers. name: for messages and files.
-    warnings: what a loader had to pass over; extra: what else it found, for people;
-    account: of what loading it has taken, from which making it ready draws too.
+    warnings: features of a file that its loader ignored; extra: further content of the file, for
+    people; account: the memory and time that loading took; lowering draws from it too.
 
-    Raises SceneError for `spp` that is no whole number above zero, and `noise` likewise.
+    Raises SceneError unless `spp` is a whole number above 0 and `noise` a number above 0 or None.
     """
 
     camera: cameras.Camera
@@ -116,17 +116,17 @@ class Scene:
     extra: dict[str, Any] = field(default_factory=dict)
     account: Account | None = field(default=None, repr=False, compare=False)
 
-    # Makes the picture that a notebook shows: given by clpt/__init__, as scenes know no renderer.
+    # Renders the picture for a notebook; clpt/__init__ sets it, since scenes import no renderer.
     _picture: ClassVar[Callable[[Scene], bytes] | None] = None
 
     def _repr_png_(self) -> bytes | None:
-        """Return a small picture of the scene as PNG, which a notebook shows of it."""
+        """Return a small picture of the scene as PNG, for notebooks."""
         return None if Scene._picture is None else Scene._picture(self)
 
     @classmethod
     def studio(
         cls,
-        things: object,
+        subject: object,
         *,
         camera: cameras.Camera | None = None,
         lights: Sequence[Light] = (),
@@ -135,29 +135,29 @@ class Scene:
     ) -> Scene:
         """Return a scene of shapes in a photographer's studio, as `clpt render mesh.ply` makes it.
 
-        things: a shape, a `trimesh.Trimesh`, or a list of them. camera: by default one that frames
-        them all, from the front and above. lights: by default a warm key light and a cool fill,
-        over a ground that curves up to a backdrop. up: "y", or "z" as in CAD; the front is +z, or
-        -y then. name: of the scene.
+        subject: a shape, a `trimesh.Trimesh`, or a list of them. camera: by default it looks from
+        the front and above, and frames the whole subject. lights: by default a warm key light and
+        a cool fill, over a ground that curves up to a backdrop. up: "y", with +z as the front; or
+        "z" as in CAD, with -y as the front. name: of the scene.
 
         Raises SceneError for shapes too large to be framed.
         """
-        listed = [things] if trimeshes.is_mesh(things) else _listed(things, "shapes")
+        listed = [subject] if trimeshes.is_mesh(subject) else _listed(subject, "shapes")
         shown: list[Shape] = []
-        for i, thing in enumerate(listed):
-            if trimeshes.is_mesh(thing):
-                thing = shapes.Mesh.from_trimesh(thing)
-            _check_kind(thing, Shape, f"shapes[{i}]")
-            shown.append(thing)
-        made = studio.parts(shown, camera=camera, own_lights=lights, up=up)
-        return cls(**made, name=name)
+        for i, part in enumerate(listed):
+            if trimeshes.is_mesh(part):
+                part = shapes.Mesh.from_trimesh(part)
+            _check_kind(part, Shape, f"shapes[{i}]")
+            shown.append(part)
+        parts = studio.parts(shown, camera=camera, own_lights=lights, up=up)
+        return cls(**parts, name=name)
 
     @classmethod
     def from_trimesh(cls, scene: Any, *, up: Up = "y", name: str = "") -> Scene:
         """Return a `trimesh.Scene` in the studio: its meshes where they are, with their materials.
 
-        It is seen by its own camera if it has been given one. up, name: see `studio`. What is no
-        mesh, such as a path, is left out, with a warning.
+        Its camera takes the place of the studio's, if it has a camera. up, name: see `studio`.
+        Geometry other than meshes, such as a path, is left out with a warning.
 
         Raises SceneError for an object that is not a scene of trimesh.
         """
@@ -179,9 +179,9 @@ class Scene:
         camera = None
         if scene.has_camera:
             camera = trimeshes.camera_of(scene.camera, scene.camera_transform)
-        made = cls.studio(placed, camera=camera, up=up, name=name)
-        made.warnings = list(dict.fromkeys(left_out))
-        return made
+        built = cls.studio(placed, camera=camera, up=up, name=name)
+        built.warnings = list(dict.fromkeys(left_out))
+        return built
 
     def parameters(self) -> dict[str, Any]:
         """Return all parameters by their paths, as "ball.material.reflectance", in their order.
@@ -199,12 +199,12 @@ class Scene:
         return paths.get(self, path)
 
     def changed(self, values: Mapping[str, Any]) -> Scene:
-        """Return a scene with other values, by their paths; this one stays as it is.
+        """Return a copy of the scene with other values, by their paths.
 
-        `renderer.update(scene=scene.changed({"ball.material.reflectance": 0.2}))` renders it. What
-        several shapes share, such as a material, changes at all of them.
+        `renderer.update(scene=scene.changed({"ball.material.reflectance": 0.2}))` renders it. An
+        object that several shapes share, such as a material, changes at all of them.
 
-        Raises SceneError for a path that leads to nothing, and a value that makes no sense there.
+        Raises SceneError for a path that leads to nothing, and a value that its parameter refuses.
         """
         scene = self
         for path, value in values.items():
@@ -222,12 +222,12 @@ class Scene:
 
 
 def checked_seed(seed: object) -> int:
-    """Return a seed. Raises SceneError for no whole number of 32 bits: kernels know no others."""
+    """Return a seed. Raises SceneError unless it is a whole number of 32 bits, as in kernels."""
     return scalars.whole(seed, 0, MOST_SEED, where="seed")
 
 
 def check_parts(scene: Scene) -> None:
-    """Raise SceneError for a part of a scene that is of another category."""
+    """Raise SceneError for a part of a scene of the wrong category."""
     _check_kind(scene.camera, cameras.Camera, "camera")
     _check_kind(scene.integrator, integrators.Integrator, "integrator")
     _check_kind(scene.sampler, integrators.Sampler, "sampler")
@@ -236,31 +236,31 @@ def check_parts(scene: Scene) -> None:
         ("shapes", scene.shapes, Shape),
         ("lights", scene.lights, Light),
     )
-    for name, things, base in held:
-        for i, thing in enumerate(things):
-            if not isinstance(thing, base):  # there may be a million
-                _check_kind(thing, base, f"{name}[{i}]")
+    for name, members, base in held:
+        for i, member in enumerate(members):
+            if not isinstance(member, base):  # there may be a million
+                _check_kind(member, base, f"{name}[{i}]")
 
 
-def _listed(held: object, name: str) -> list[Any]:
-    """Return a list as it is, one thing or other items in a new one. Raises SceneError."""
-    if isinstance(held, (list, Kind)):
-        return held if isinstance(held, list) else [held]
+def _listed(value: object, name: str) -> list[Any]:
+    """Return a list unchanged, a kind or another iterable as a list. Raises SceneError."""
+    if isinstance(value, (list, Kind)):
+        return value if isinstance(value, list) else [value]
     try:
-        return list(held)  # type: ignore[call-overload]
+        return list(value)  # type: ignore[call-overload]
     except TypeError:
-        raise SceneError(f"must be a list of {name}, not {held!r}", where=name) from None
+        raise SceneError(f"must be a list of {name}, not {value!r}", where=name) from None
 
 
 def _check_kind(value: object, base: type[Kind], where: str) -> None:
-    """Raise SceneError for a value that is of no kind of a category."""
+    """Raise SceneError for a value that is no kind of a category."""
     if not isinstance(value, base):
         message = f"must be of a kind of {base.__name__.lower()}, not {value!r}"
         raise SceneError(message, where=where)
 
 
 def checked_noise(noise: object) -> float:
-    """Return a limit of noise. Raises SceneError for what is none."""
+    """Return a limit of noise. Raises SceneError unless it is a finite number above 0."""
     if not scalars.is_number(noise) or not 0.0 < noise < math.inf:
         message = f"must be a number above zero, such as 0.02, not {noise!r}"
         raise SceneError(message, where="noise")

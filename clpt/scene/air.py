@@ -35,15 +35,15 @@ def clear_air(
     """Return the air over a flat ground: a `Mixture` of air, haze and ozone, each by its height.
 
     width: of the box along x and z, about the origin [m]; height: of the air above the ground,
-    which is y = 0 [m]; altitude: of the ground above the sea [m]; layers: between whose ends
-    density is linear; all else: as of `clpt.scene.lights.Sky`. Of what there is none is left out:
-    without haze and ozone it is a `Grid`. It still needs a shape around it, a cube of `null` to be
-    inside of.
+    which is y = 0 [m]; altitude: of the ground above the sea [m]; layers: their number; the density
+    is linear within a layer; the other arguments are parameters of `clpt.scene.lights.Sky`. An
+    absent constituent has no part in the mixture: without haze and ozone the result is a `Grid`.
+    The caller puts it into a shape, such as a cube of `null`.
 
-    What is in the air: `clpt.spectra.air`. The earth is flat: right for the sun at some 10 degrees
-    and above.
+    `clpt.spectra.air` has the constituents of air. The earth is flat: this holds while the sun is
+    10 degrees or more above the horizon.
 
-    Raises SceneError for a size that is not above 0, and for what no `Sky` may be.
+    Raises SceneError for a size that is not above 0, and for a value that `Sky` refuses.
     """
     content = Atmosphere(aerosol, exponent, aerosol_albedo, asymmetry, ozone)
     _check({"width": width, "height": height, "layers": layers}, content)
@@ -72,7 +72,7 @@ def clear_air(
 
 
 def _check(sizes: Mapping[str, float], content: Atmosphere) -> None:
-    """Raise SceneError for sizes that are not above 0, and for what no `Sky` may be."""
+    """Raise SceneError for sizes that are not above 0, and for values that `Sky` refuses."""
     for name, value in sizes.items():
         if not value > 0:
             raise SceneError(f"must be above 0, not {value!r}", where=f"clear_air.{name}")

@@ -24,7 +24,7 @@ from clpt.scene.values import IndexLike, Matrix4, Vector3
 from clpt.spectra import Constant, Spectrum
 
 MOST_BLADES = 24
-DESIGN_WAVELENGTH = 587.56  # [nm], the helium line d, at which a lens's focal length is given
+DESIGN_WAVELENGTH = 587.56  # [nm], the helium line d, of a lens's focal length
 
 
 def _looking(
@@ -51,7 +51,7 @@ LOOK_AT = Shorthand(
 
 @dataclass(frozen=True)
 class View:
-    """The view from one point.
+    """The view from a point.
 
     origin: the point (3,) [m]; axis: from it to the film's middle (3,), unit length; width: of the
     film at a distance of 1 m [m]; angle: between the axis and the film's corners [rad].
@@ -67,7 +67,7 @@ class View:
 class Camera(Kind):
     """Base of all cameras.
 
-    A kind whose record holds `to_world` and `extent` sees from the one point of that matrix.
+    A kind whose record holds `to_world` and `extent` sees from the origin of that matrix.
     """
 
     connects: ClassVar[bool] = False  # whether light paths can be joined to the camera
@@ -103,11 +103,11 @@ class Camera(Kind):
 
     @property
     def traced_lens(self) -> Lens | None:
-        """The lens whose surfaces its rays pass one by one; None if it has a formula instead."""
+        """The lens whose surfaces each ray passes in turn; None for a camera with a formula."""
         return None
 
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
-        """Return the members of its record in `clpt.render.records.camera_rows` by name.
+        """Return the members of its record in `clpt.render.records.camera` by name.
 
         A traced lens has only those that need no table. width, height: of the film [pixels].
         Raises SceneError for planes, a matrix, a glass or a lens that cannot be used.
@@ -123,15 +123,15 @@ class Camera(Kind):
         return members
 
     def view_point(self, width: int, height: int) -> NDArray[np.float64]:
-        """Return the point (3,) [m] from which it sees, before `motion`.
+        """Return the centre of projection (3,) [m], before `motion`.
 
-        A camera without such a point returns the middle of its film, a lens its front. width,
-        height: of the film [pixels].
+        A camera without a centre of projection returns the middle of its film, a lens its front.
+        width, height: of the film [pixels].
         """
         return np.asarray(self.checked_members(width, height)["to_world"], np.float64)[:3, 3]
 
     def view_of(self, width: int, height: int) -> View | None:
-        """Return its view in the middle of the shutter; None if it does not see from one point.
+        """Return its view in the middle of the shutter; None without a centre of projection.
 
         width, height: of the film [pixels].
         """
@@ -152,7 +152,7 @@ class Camera(Kind):
         return 1.0
 
     def pixel_camera(self, width: int, height: int, x: int, y: int) -> Camera | None:
-        """Return a camera whose film of one pixel is the pixel (x, y) of a film; None if none is.
+        """Return a camera whose film is the single pixel (x, y) of a film; None if it has none.
 
         width, height: of the film [pixels].
         """
@@ -307,7 +307,7 @@ class ThinLens(Perspective):
 class Lens(Camera):
     """A lens traced surface by surface, with a film behind it; its origin is the film's middle.
 
-    The whole lens moves to focus. Where its glasses disperse, each path has one wavelength.
+    The whole lens moves to focus. Where its glasses disperse, each path has a single wavelength.
     """
 
     lens: Prescription | str = host("double_gauss", "its surfaces", form="lens")
@@ -434,8 +434,8 @@ class Spherical(Camera):
     """All directions: the film is a map in latitude and longitude, +y up, +z in its middle.
 
     The middle of row i of h rows lies at pi (i + 1/2) / h from +y. Rows of an `envmap` lie at
-    pi i / (h - 1), from pole to pole: a film of few rows that becomes one is stretched by half a
-    row at the poles, by 3 % of the height with 16 rows and nothing to see with 1024.
+    pi i / (h - 1), from pole to pole: the film, shown as an `envmap`, is stretched by half a row at
+    the poles: 3 % of the height with 16 rows, invisible with 1024.
     """
 
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:

@@ -27,10 +27,10 @@ from clpt.scene.shapes import Group, Shape
 Plain: TypeAlias = bool | int | float | str | None
 Values: TypeAlias = dict[str, Plain]
 
-DIGEST = "sha256:"  # begins a value that stands for many
-SHORT = 4  # numbers of a list up to which it is shown
-MOST_LISTED = 64  # members of a list up to which each is shown in full
-MOST_DIGESTS = 4096  # up to which each has a digest; more have one together
+DIGEST = "sha256:"  # prefix of the digest of several values
+SHORT = 4  # longest list of numbers that is shown
+MOST_LISTED = 64  # longest list whose members are shown in full
+MOST_DIGESTS = 4096  # longest list with a digest for each member; a longer list has a single digest
 WITHOUT_SAMPLES = (
     "spp",
     "noise",
@@ -38,41 +38,41 @@ WITHOUT_SAMPLES = (
     "warnings",
     "extra",
     "account",
-)  # of a scene: they change no sample
-ARRAYS: dict[str, DTypeLike] = {  # how the lowering reads what a host parameter holds, by its form
+)  # fields of a scene that change no sample
+ARRAYS: dict[str, DTypeLike] = {  # how lowering reads a host parameter, by its form
     "rows2": np.float32, "rows3": np.float32, "rows4": np.float32, "normals": np.float32,
     "attributes": np.float32, "grid": np.float32, "triangles": np.uint32, "lengths": np.int64,
 }  # fmt: skip
-NAMELESS = (bool, int, float, type(None), np.ndarray, np.generic)  # hold no name of a file
+NAMELESS = (bool, int, float, type(None), np.ndarray, np.generic)  # types without names of files
 FILES = ("image", "cube_images")  # forms of host parameters that may name files
-PIECE = 1 << 20  # bytes of a file that are read at once
+PIECE = 1 << 20  # bytes of a read
 
 
 @dataclass(frozen=True)
 class Fingerprint:
     """The values that decide a scene's samples, by flat names such as "camera.fov".
 
-    Arrays, files and long lists stand as the SHA-256 of their content.
+    An array, a file or a long list has the SHA-256 of its content as its value.
     """
 
     values: Mapping[str, Plain]
 
     @cached_property
     def digest(self) -> str:
-        """The SHA-256 of all of it, in hexadecimal."""
+        """The SHA-256 of all values, in hexadecimal."""
         return _digest(self.values)
 
     def differences(self, other: Fingerprint) -> list[str]:
-        """Return what differs in another one, such as "camera.fov: 40.0 -> 45.0"."""
-        found: dict[str, tuple[Plain, Plain]] = {}
+        """Return the differences of another fingerprint, such as "camera.fov: 40.0 -> 45.0"."""
+        differing: dict[str, tuple[Plain, Plain]] = {}
         for name in dict.fromkeys((*self.values, *other.values)):
-            own, given = self.values.get(name, ABSENT), other.values.get(name, ABSENT)
-            if type(own) is not type(given) or own != given:
-                found[name] = own, given
+            before, after = self.values.get(name, ABSENT), other.values.get(name, ABSENT)
+            if type(before) is not type(after) or before != after:
+                differing[name] = before, after
         return [
             f"{name}: {_change(*values)}"
-            for name, values in found.items()
-            if not any(_tells(found, owner, ABSENT in values) for owner in _owners(name))
+            for name, values in differing.items()
+            if not any(_explained_by(differing, p, ABSENT in values) for p in _parents(name))
         ]
 
 
@@ -82,11 +82,11 @@ ABSENT = DIGEST + "absent"
 def fingerprint(scene: Scene, files: Mapping[str, str] | None = None) -> Fingerprint:
     """Return the fingerprint of a scene.
 
-    It leaves out what changes no sample: how many there are, the limit of noise, names. Images are
-    read as bytes; arrays on a device are copied to the host. files: what stands for files that were
-    read before, by path, see `file_digest`; they may have changed since.
+    Fields that change no sample are left out: the number of samples, the limit of noise, names.
+    Images are read as bytes; arrays on a device are copied to the host. files: digests of files
+    that were read before, by path, see `file_digest`; the files may have changed since.
 
-    Raises SceneError for what cannot be read, with its name.
+    Raises SceneError, with the name of a part, if the part cannot be read.
     """
     walk = _Walk(files or {})
     values: Values = {}
@@ -97,108 +97,108 @@ def fingerprint(scene: Scene, files: Mapping[str, str] | None = None) -> Fingerp
 
 
 class _Walk:
-    """One walk through a scene; what several shapes share is read once."""
+    """A walk through a scene, which reads shared objects once."""
 
     def __init__(self, files: Mapping[str, str]) -> None:
         self._files = files
         self._known: dict[tuple[int, str], Values] = {}
         self._alive: list[Any] = []  # so that no id is used again
 
-    def values(self, thing: object, where: str, form: str = "") -> Values:
-        """Return what a thing consists of, by names below its own; "" is the thing itself.
+    def values(self, part: object, where: str, form: str = "") -> Values:
+        """Return the plain values of a part, by paths relative to it; "" is the part itself.
 
-        where: its name, for errors; form: of the parameter that holds it, see HostForm.
+        where: its path, for errors; form: of the parameter that holds it, see HostForm.
         """
-        if thing is None or isinstance(thing, (bool, int, float, np.generic)):
-            return {"": _plain(thing)}
-        if isinstance(thing, (str, os.PathLike)):
-            return {"": self._file(os.fspath(thing), where) if form in FILES else os.fspath(thing)}
-        key = id(thing), form
+        if part is None or isinstance(part, (bool, int, float, np.generic)):
+            return {"": _plain(part)}
+        if isinstance(part, (str, os.PathLike)):
+            return {"": self._file(os.fspath(part), where) if form in FILES else os.fspath(part)}
+        key = id(part), form
         if key not in self._known:
-            self._alive.append(thing)
-            self._known[key] = self._inner(thing, where, form)
+            self._alive.append(part)
+            self._known[key] = self._inner(part, where, form)
         return self._known[key]
 
-    def _inner(self, thing: object, where: str, form: str) -> Values:
-        if isinstance(thing, Group):  # many instances may share many shapes
-            return {"": _digest(self._fields(thing, where))}
-        if dataclasses.is_dataclass(thing):
-            return self._fields(thing, where)
-        if isinstance(thing, Mapping):
-            return self._members(sorted(thing.items()), where, form)
-        if isinstance(thing, np.ndarray):
-            return {"": _array(thing, form)}
-        if hasattr(thing, "context"):  # PyOpenCL's arrays, and its buffers, which have no type
-            if not hasattr(thing, "get"):
+    def _inner(self, part: object, where: str, form: str) -> Values:
+        if isinstance(part, Group):  # many instances may share many shapes
+            return {"": _digest(self._fields(part, where))}
+        if dataclasses.is_dataclass(part):
+            return self._fields(part, where)
+        if isinstance(part, Mapping):
+            return self._members(sorted(part.items()), where, form)
+        if isinstance(part, np.ndarray):
+            return {"": _array(part, form)}
+        if hasattr(part, "context"):  # arrays and buffers of PyOpenCL; buffers have no dtype
+            if not hasattr(part, "get"):
                 raise SceneError(
                     "is a buffer on a device; an Array of PyOpenCL is read", where=where
                 )
-            read = on_host(thing) if on_device(thing) else thing.get()
+            read = on_host(part) if on_device(part) else part.get()
             return {"": _array(np.asarray(read), form)}
-        if isinstance(thing, Sequence):
-            numbers = _numbers(thing)
+        if isinstance(part, Sequence):
+            numbers = _numbers(part)
             if numbers is not None:
                 return {"": _array(numbers, form)}
-            return self._list(thing, where, form)
-        raise SceneError(f"cannot be compared: a {type(thing).__name__}", where=where)
+            return self._list(part, where, form)
+        raise SceneError(f"cannot be compared: a {type(part).__name__}", where=where)
 
     def _file(self, path: str, where: str) -> str:
         return self._files.get(path) or file_digest(Path(path), where)
 
-    def _fields(self, thing: Any, where: str) -> Values:
-        """The parameters of a kind, or the fields of another dataclass."""
-        cls: Any = type(thing)
-        found: Values = {".type": thing.kind if isinstance(thing, Kind) else cls.__name__}
-        given = fields_of(thing)
+    def _fields(self, part: Any, where: str) -> Values:
+        """Return the parameters of a kind, or the fields of another dataclass."""
+        cls: Any = type(part)
+        values: Values = {".type": part.kind if isinstance(part, Kind) else cls.__name__}
+        fields = fields_of(part)
         for name, form in _plan(cls):
-            inner = self.values(given[name], f"{where}.{name}", form)
+            inner = self.values(fields[name], f"{where}.{name}", form)
             for below, value in inner.items():
-                found[f".{name}{below}"] = value
-        return found
+                values[f".{name}{below}"] = value
+        return values
 
     def _members(self, pairs: list[tuple[str, Any]], where: str, form: str) -> Values:
-        found: Values = {}
+        values: Values = {}
         for name, value in pairs:
-            found |= _under(f"[{name}]", self.values(value, f"{where}[{name}]", form))
-        return found or {"": None}
+            values |= _under(f"[{name}]", self.values(value, f"{where}[{name}]", form))
+        return values or {"": None}
 
-    def _list(self, things: Sequence[Any], where: str, form: str) -> Values:
-        """The members of a list: in full, or as digests where there are many."""
-        members = [self.values(one, f"{where}[{i}]", form) for i, one in enumerate(things)]
-        found: Values = {".count": len(members)}
+    def _list(self, listed: Sequence[Any], where: str, form: str) -> Values:
+        """Return the members of a list, in full or as digests; see MOST_LISTED and MOST_DIGESTS."""
+        members = [self.values(member, f"{where}[{i}]", form) for i, member in enumerate(listed)]
+        values: Values = {".count": len(members)}
         if len(members) > MOST_DIGESTS:
-            return {**found, "": _digest([_digest(one) for one in members])}
-        for i, one in enumerate(members):
-            shown: Values = one if len(members) <= MOST_LISTED else {"": _digest(one)}
-            found |= _under(f"[{i}]", shown)
-        return found
+            return {**values, "": _digest([_digest(member) for member in members])}
+        for i, member in enumerate(members):
+            shown: Values = member if len(members) <= MOST_LISTED else {"": _digest(member)}
+            values |= _under(f"[{i}]", shown)
+        return values
 
 
 def named_files(whole: object) -> set[str]:
-    """Return the paths of the files that the images of a scene, or of a part, are read from."""
-    found: set[str] = set()
+    """Return the paths of the image files of a scene, or of a part of it."""
+    paths: set[str] = set()
     seen: dict[int, object] = {}
     waiting: list[tuple[Any, str]] = [(whole, "")]
     while waiting:
-        thing, form = waiting.pop()
-        if isinstance(thing, NAMELESS) or id(thing) in seen:
+        part, form = waiting.pop()
+        if isinstance(part, NAMELESS) or id(part) in seen:
             continue
-        seen[id(thing)] = thing
-        if form in FILES and isinstance(thing, (str, os.PathLike)):
-            found.add(os.fspath(thing))
-        elif hasattr(thing, "__dataclass_fields__"):
-            held = fields_of(thing)
-            waiting += [(held[name], one) for name, one in _plan(thing.__class__)]
-        elif isinstance(thing, dict):
-            waiting += [(one, form) for one in thing.values()]
-        elif isinstance(thing, (list, tuple)) and form not in ARRAYS:
-            waiting += [(one, form) for one in thing]
-    return found
+        seen[id(part)] = part
+        if form in FILES and isinstance(part, (str, os.PathLike)):
+            paths.add(os.fspath(part))
+        elif hasattr(part, "__dataclass_fields__"):
+            fields = fields_of(part)
+            waiting += [(fields[name], form) for name, form in _plan(part.__class__)]
+        elif isinstance(part, dict):
+            waiting += [(value, form) for value in part.values()]
+        elif isinstance(part, (list, tuple)) and form not in ARRAYS:
+            waiting += [(value, form) for value in part]
+    return paths
 
 
 @cache
 def _plan(cls: Any) -> list[tuple[str, str]]:
-    """The fields of a class that count, with the forms of its host parameters."""
+    """Return the fields of a class that decide samples, each with its form as a host parameter."""
     declared, named = params(cls), issubclass(cls, (Shape, Material, Group))
     names = [part.name for part in dataclasses.fields(cls) if not (named and part.name == "name")]
     return [(name, declared[name].role.name if name in declared else "") for name in names]
@@ -208,17 +208,17 @@ def _under(name: str, values: Values) -> Values:
     return {name + below: value for below, value in values.items()}
 
 
-def _owners(name: str) -> Iterator[str]:
-    """Yield what a name stands in, as far as it is not that which tells its own type or count."""
-    whole = name.removesuffix(".type").removesuffix(".count")
-    for i, letter in enumerate(name):
+def _parents(path: str) -> Iterator[str]:
+    """Yield the enclosing paths: `shapes[3].fov` gives `shapes` and `shapes[3]`."""
+    whole = path.removesuffix(".type").removesuffix(".count")
+    for i, letter in enumerate(path):
         if letter in ".[" and i < len(whole):
-            yield name[:i]
+            yield path[:i]
 
 
-def _tells(found: Mapping[str, Any], owner: str, absent: bool) -> bool:
-    """Whether another type, or another count of members, tells why what stands in it differs."""
-    return f"{owner}.type" in found or (absent and f"{owner}.count" in found)
+def _explained_by(differing: Mapping[str, Any], parent: str, missing: bool) -> bool:
+    """Return whether the parent's type or length already differs."""
+    return f"{parent}.type" in differing or (missing and f"{parent}.count" in differing)
 
 
 def _plain(value: Any) -> Plain:
@@ -228,21 +228,21 @@ def _plain(value: Any) -> Plain:
     return value
 
 
-def _numbers(things: Sequence[Any]) -> NDArray[Any] | None:
-    """A list, perhaps of lists, as an array if it holds numbers only; None: it does not."""
-    if not things or not all(isinstance(t, (int, float, np.generic, Sequence)) for t in things):
+def _numbers(values: Sequence[Any]) -> NDArray[Any] | None:
+    """Return a list of numbers, or of such lists, as an array; None for another list."""
+    if not values or not all(isinstance(t, (int, float, np.generic, Sequence)) for t in values):
         return None
     try:
-        array = np.asarray(things)
+        array = np.asarray(values)
     except ValueError:  # of rows that differ in length
         return None
     return array if array.dtype.kind in "biuf" else None
 
 
 def _array(array: NDArray[Any], form: str) -> str:
-    """Numbers as a text: those of a few, else the digest of their type, shape and bytes."""
+    """Return a few numbers as text; the digest of type, shape and bytes for more."""
     if array.size <= 16 and array.dtype.kind in "iuf":
-        array = array.astype(np.float64)  # a matrix is the same as lists or in another type
+        array = array.astype(np.float64)  # lists and other types of numbers give equal digests
         if array.ndim == 1 and array.size <= SHORT:
             return ", ".join(f"{float(value)!r}" for value in array)
     elif form in ARRAYS:
@@ -255,7 +255,7 @@ def _array(array: NDArray[Any], form: str) -> str:
 
 
 def file_digest(path: Path, where: str = "") -> str:
-    """Return what stands for a file's bytes. Raises SceneError for what cannot be read."""
+    """Return the digest of a file's bytes. Raises SceneError for an unreadable file."""
     hashed = hashlib.sha256()
     try:
         with input_files.opened(path) as file:
@@ -273,9 +273,9 @@ def _digest(values: Any) -> str:
     return DIGEST + hashlib.sha256(text.encode()).hexdigest()
 
 
-def _change(own: Plain, given: Plain) -> str:
+def _change(before: Plain, after: Plain) -> str:
     """Describe the change of a value for people."""
-    shown = [_shown(value) for value in (own, given)]
+    shown = [_shown(value) for value in (before, after)]
     return "its content differs" if shown == ["..", ".."] else " -> ".join(shown)
 
 

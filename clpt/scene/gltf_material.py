@@ -1,5 +1,6 @@
-"""Parts of materials as glTF has them, from plain values: factors times textures,
-alpha, normals, sides, and light. All readers that have such materials ask here.
+"""Parts of glTF's materials from plain values: factors times textures, alpha, normals, sides.
+
+All readers of such materials use these functions.
 """
 
 from __future__ import annotations
@@ -10,20 +11,20 @@ import numpy as np
 
 from clpt.scene.lights import Area
 from clpt.scene.materials import Mask, Material, NormalMap, Null, TwoSided
-from clpt.scene.params import Texture
+from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap, Product
 from clpt.scene.values import Textured, TexturedNumber
 from clpt.spectra import RGBUnbounded
 
 RGB = tuple[float, ...]
 WHITE = (1.0, 1.0, 1.0)
-CUTOFF = 0.5  # of alpha, where a material does not say one
+CUTOFF = 0.5  # default of alpha
 MODES = ("OPAQUE", "MASK", "BLEND")
-ONE_SIDE = Null()  # of a surface that is drawn from its front alone
+ONE_SIDE = Null()  # the back of a surface that only its front shows
 
 
 def tinted(image: Bitmap | None, rgb: RGB) -> Textured:
-    """Return a colour, times an image where there is one."""
+    """Return a colour, multiplied by an image if any."""
     if image is None:
         return rgb
     if rgb == WHITE:
@@ -33,7 +34,7 @@ def tinted(image: Bitmap | None, rgb: RGB) -> Textured:
 
 
 def times(image: Bitmap | None, value: float) -> TexturedNumber:
-    """Return a number, times an image's channel where there is one."""
+    """Return a number, multiplied by an image's channel if any."""
     if image is None:
         return value
     return image if value == 1.0 else Product(first=image, second=value)
@@ -42,7 +43,7 @@ def times(image: Bitmap | None, value: float) -> TexturedNumber:
 def opacity(
     mode: str, factor: float, image: Bitmap | None, cutoff: float = CUTOFF
 ) -> float | Texture | None:
-    """Return the share of light that meets a surface; None where all does.
+    """Return the share of light that meets a surface; None for all light.
 
     mode: of MODES; factor: alpha of the base colour; image: its texture, whose alpha counts.
     """
@@ -57,7 +58,7 @@ def opacity(
 
 
 def with_normals(inner: Material, image: Bitmap | None, scale: float = 1.0) -> Material:
-    """Return a material with a normal map, where there is one."""
+    """Return a material with a normal map, if any."""
     if image is None:
         return inner
     return NormalMap(material=inner, map=image, scale=scale, along_v=True)
@@ -73,7 +74,7 @@ def finished(
     leaf = inner.material if isinstance(inner, NormalMap) else inner
     if share is not None:
         inner = Mask(material=inner, opacity=share)
-        if emission is not None:  # what is not there does not shine
+        if emission is not None:  # absent parts of a surface emit nothing
             radiance = Product(first=emission.radiance, second=share)
             emission = dataclasses.replace(emission, radiance=radiance)
     if leaf.transmits:
@@ -82,7 +83,7 @@ def finished(
 
 
 def _alpha(image: Bitmap) -> Bitmap | None:
-    """The alpha of an image as an image of its own; None where it has none."""
+    """Return the alpha of an image as an image; None without alpha."""
     pixels = np.asarray(image.image)
     if pixels.ndim < 3 or pixels.shape[2] < 4:
         return None
@@ -90,7 +91,7 @@ def _alpha(image: Bitmap) -> Bitmap | None:
 
 
 def _cut(alpha: Bitmap, cutoff: float) -> Bitmap:
-    """An image that is 1 where the alpha of a texel reaches the cutoff, else 0."""
+    """Return an image that is 1 where the alpha of a texel reaches the cutoff, else 0."""
     pixels = np.asarray(alpha.image)
     shares = pixels / 255.0 if pixels.dtype == np.uint8 else pixels
     return dataclasses.replace(alpha, image=(shares >= cutoff - 1e-6).astype(np.float32))

@@ -25,9 +25,9 @@ from clpt.spectra.spaces import TEMPERATURES
 from clpt.spectra.spectrum import LONGEST, SHORTEST
 
 MOST_BANDS = 1024
-GAUSSIAN_CUT = 4.0  # standard deviations at which a Gaussian without a radius ends
+GAUSSIAN_CUT = 4.0  # radius of a Gaussian without `radius` [standard deviations]
 FEWEST_LIGHT_PATHS = 1.0 / 64
-MOST_GUIDE_PATHS = 1 << 24  # sums of what they carry have 32 bits
+MOST_GUIDE_PATHS = 1 << 24  # sums of their contributions have 32 bits
 DEEPEST = 4000  # path state has 12 bits for the depth
 MOST_GROUPS = 64  # of wavelengths
 MOST_PHOTON_MEMORY = 8192  # [MiB]; words of photons are numbered by 31 bits
@@ -36,7 +36,7 @@ NARROWEST = 0.01  # [nm], a range of wavelengths
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Integrator(Kind):
-    """Base of all integrators, with what holds of one that has no such parameter."""
+    """Base of all integrators, with values for kinds that lack a parameter."""
 
     max_depth = -1
     rr_depth = DEEPEST
@@ -58,7 +58,7 @@ class Integrator(Kind):
         return self.light_paths == AUTO
 
     def for_denoiser(self) -> Integrator:
-        """Return the integrator that takes the place of this one if the picture is denoised."""
+        """Return the integrator that replaces this integrator if the picture is denoised."""
         return self
 
     @property
@@ -74,7 +74,8 @@ class Integrator(Kind):
                 raise SceneError(f"must be {least}, not {depth!r}", where=f"{self.kind}.{name}")
 
 
-LONG = 64  # depth from which panes of thin glass on the way do not matter
+LIGHT_FINDING = {"light_paths", "guiding", "guide_paths"}  # parameters of how light is found
+LONG = 64  # least depth of paths where panes of thin glass on the way do not matter
 
 
 def is_long(max_depth: int) -> bool:
@@ -92,10 +93,9 @@ class Path(Integrator):
     `max_depth` counts surfaces and the light: 1 shows only lights, 2 adds direct light.
 
     With `light_paths` paths start at lights too: each vertex is joined to the camera, and weighed
-    against what the camera's paths find. Caustics that the camera sees directly converge then. The
-    camera must be `perspective` or `thin_lens`. A number below 1 is a share: 0.5 is one for every
-    second sample. With "auto" there are some where something is specular and a light is small,
-    else none.
+    against the camera's paths. Caustics that the camera sees directly converge then. The camera
+    must be `perspective` or `thin_lens`. A number below 1 is a share: at 0.5 every second sample
+    has a light path. "auto" starts light paths where a surface is specular and a light is small.
     """
 
     max_depth: int = host(8, "longest path; -1: no limit")
@@ -116,19 +116,19 @@ class Path(Integrator):
 
     def check(self) -> None:
         super().check()
-        given: Any = plain(self.light_paths)
-        object.__setattr__(self, "light_paths", given)
-        if self.guiding and given not in (0, AUTO):
+        light_paths: Any = plain(self.light_paths)
+        object.__setattr__(self, "light_paths", light_paths)
+        if self.guiding and light_paths not in (0, AUTO):
             message = "guiding is for paths from the camera alone: ask for no light_paths"
             raise SceneError(message, where=f"{self.kind}.guiding")
         whole(self.guide_paths, 0, MOST_GUIDE_PATHS, where=f"{self.kind}.guide_paths")
-        if isinstance(given, str) and given == AUTO:
+        if isinstance(light_paths, str) and light_paths == AUTO:
             return
-        if not is_number(given) or not (
-            given == 0 or FEWEST_LIGHT_PATHS <= given <= MOST_LIGHT_PATHS
+        if not is_number(light_paths) or not (
+            light_paths == 0 or FEWEST_LIGHT_PATHS <= light_paths <= MOST_LIGHT_PATHS
         ):
             fewest = f"{FEWEST_LIGHT_PATHS:g}"
-            message = f"must be 0, {fewest} to {MOST_LIGHT_PATHS}, or {AUTO!r}, not {given!r}"
+            message = f"must be 0, {fewest} to {MOST_LIGHT_PATHS}, or {AUTO!r}, not {light_paths!r}"
             raise SceneError(message, where=f"{self.kind}.light_paths")
 
 
@@ -191,8 +191,8 @@ class Auto(Integrator):
 
 
 def shared(integrator: Integrator, other: Integrator) -> dict[str, Any]:
-    """Return the parameters of an integrator that another one has too, but how it finds light."""
-    known = fields_of(other).keys() - {"light_paths", "guiding", "guide_paths"}
+    """Return the parameters that two integrators share, except LIGHT_FINDING."""
+    known = fields_of(other).keys() - LIGHT_FINDING
     return {name: value for name, value in fields_of(integrator).items() if name in known}
 
 
@@ -219,8 +219,8 @@ class Whitted(Integrator):
 class ParticleTracer(Integrator):
     """Light tracing: paths start at lights, and every vertex is joined to the camera.
 
-    Finds caustics, also of the smallest lights; what the camera would see through glass and in
-    mirrors stays black. A sample per pixel is one light path for every pixel of the film.
+    Finds caustics, also of the smallest lights; views through glass and in mirrors stay black. A
+    sample per pixel is a light path for every pixel of the film.
     The camera must be `perspective` or `thin_lens`.
     """
 
@@ -234,9 +234,9 @@ class ParticleTracer(Integrator):
 class Sampler(Kind):
     """Base of all samplers: each number is a function of (seed, pixel, sample, dimension).
 
-    rate: the variance of a mean of n samples falls as n^-rate, about. octaves: what samples of
-    even and of odd octaves tell (kernels/film/film.cl), over that variance, about. If it falls as
-    n^-p this is (2^p - 1) / (2 - 2^(p - 1)), which is of coarser points: p is 1.1 for it.
+    rate: the variance of a mean of n samples falls about as n^-rate. octaves: the variance that
+    samples of even and of odd octaves estimate (kernels/film/film.cl), over the true variance. If
+    the variance falls as n^-p, the ratio is (2^p - 1) / (2 - 2^(p - 1)), here with p = 1.1.
     """
 
     rate = 1.05
@@ -250,7 +250,7 @@ class Sobol(Sampler):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Zsobol(Sampler):
-    """One Sobol sequence for all pixels, so that what is left of noise is fine-grained.
+    """A single Sobol sequence for all pixels, so that the remaining noise is fine-grained.
 
     Neighbours err in opposite directions (Ahmed and Wonka 2020), best at the scene's `spp`; a
     pixel by itself has the error of `sobol`.
@@ -280,7 +280,7 @@ class Filter(Kind):
 
     @property
     def half_width(self) -> float:
-        """The distance from its centre at which it ends [pixels]."""
+        """The distance from its centre to its end [pixels]."""
         return self.radius
 
     @property
@@ -365,7 +365,7 @@ class Mitchell(Filter):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lanczos(Filter):
-    """The sinc function under a window, the middle of a wider one; with negative lobes."""
+    """The sinc function under a window, the main lobe of a wider sinc; with negative lobes."""
 
     radius: float = real(3.0, "half width", "pixels", 0.01, 16.0)
     lobes: float = real(3.0, "where the window would end", "pixels", 0.01, 16.0)
@@ -388,10 +388,10 @@ class BlackmanHarris(Filter):
 
 
 def _width_and_height(size: tuple[int, int]) -> dict[str, int]:
-    given = wholes(size, 2)
-    if given is None:
+    numbers = wholes(size, 2)
+    if numbers is None:
         raise SceneError(f"must be (width, height), not {size!r}", where="size")
-    return {"width": given[0], "height": given[1]}
+    return {"width": numbers[0], "height": numbers[1]}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -493,42 +493,42 @@ class Film(Kind):
             known = f"{', '.join(OBSERVERS)}, nor a Sensor"
             raise SceneError(f"{self.sensor!r} is none of {known}", where="film.sensor")
         object.__setattr__(self, "white_balance", _white_balance(self.white_balance))
-        given: str | tuple[str, ...] = self.layers
-        object.__setattr__(self, "layers", (given,) if isinstance(given, str) else tuple(given))
+        names: str | tuple[str, ...] = self.layers
+        object.__setattr__(self, "layers", (names,) if isinstance(names, str) else tuple(names))
         for name in self.layers:
             if name not in LAYERS:
                 raise UnknownKindError("layer", str(name), LAYERS, where="film.layers")
 
     def _checked_crop(self) -> tuple[int, int, int, int]:
         """The crop as whole numbers. Raises SceneError where it does not lie in the film."""
-        given = wholes(self.crop, 4)
-        if given is None:
+        crop = wholes(self.crop, 4)
+        if crop is None:
             raise SceneError(f"must be four whole numbers, not {self.crop!r}", where="film.crop")
-        x, y, width, height = given
+        x, y, width, height = crop
         fits = min(x, y) >= 0 and x + width <= self.width and y + height <= self.height
         if not fits or min(width, height) < 1:
             film = f"{self.width}x{self.height}"
-            raise SceneError(f"{given} does not lie in the film of {film}", where="film.crop")
+            raise SceneError(f"{crop} does not lie in the film of {film}", where="film.crop")
         return x, y, width, height
 
 
-def _white_balance(given: Any) -> str | float | tuple[float, float]:
+def _white_balance(value: Any) -> str | float | tuple[float, float]:
     """A name, a temperature [K] or (x, y), checked. Raises SceneError."""
     where = "film.white_balance"
-    if isinstance(given, str):
-        if given != "none" and given not in illuminants():
-            raise UnknownKindError("illuminant", given, ("none", *illuminants()), where=where)
-        return given
-    if is_number(given):
+    if isinstance(value, str):
+        if value != "none" and value not in illuminants():
+            raise UnknownKindError("illuminant", value, ("none", *illuminants()), where=where)
+        return value
+    if is_number(value):
         coolest, hottest = TEMPERATURES
-        if not coolest <= given <= hottest:
-            message = f"a colour temperature is {coolest:g} to {hottest:g} K, not {given:g}"
+        if not coolest <= value <= hottest:
+            message = f"a colour temperature is {coolest:g} to {hottest:g} K, not {value:g}"
             raise SceneError(message, where=where)
-        return float(given)
+        return float(value)
     try:
-        x, y = (scalars.real(value) for value in given)
+        x, y = (scalars.real(value) for value in value)
     except (TypeError, ValueError):
-        message = f"must be none, an illuminant, a temperature [K] or (x, y), not {given!r}"
+        message = f"must be none, an illuminant, a temperature [K] or (x, y), not {value!r}"
         raise SceneError(message, where=where) from None
     if not (x >= 0.0 and y > 0.0 and x + y <= 1.0):
         raise SceneError(f"({x:g}, {y:g}) is no chromaticity of light", where=where)

@@ -20,9 +20,9 @@ class Layer:
     """A picture beside the picture.
 
     channels: their names in an .exr. form: what is kept of a pixel: means of numbers that are
-    "near" 1, or of any size ("long"), over its first 64 samples; the "id" that its first sample
-    has met; the "light" of all samples; a "matte": names that its first 64 samples have met, and
-    how often; "film": nothing, it is made of the film. blender: its name in Blender, or one after
+    "near" 1, or of any size ("long"), over its first 64 samples; the "id" that its first sample has
+    met; the "light" of all samples; a "matte": names that its first 64 samples have met, and how
+    often; "film": nothing, it is made of the film. blender: its name in Blender, or a name after
     Blender's manner. denoising: of the first surface that is neither a mirror nor smooth glass,
     else of the first. exr: what an .exr calls its channels, where other programs expect names that
     are not the layer's, a dot and `channels`. flipped: the channels whose sign Blender turns.

@@ -40,7 +40,7 @@ from clpt.spectra import (
 from clpt.spectra.spectrum import WIDEST, extremes
 
 SOOT = 0.26  # E(m), the imaginary part of (m^2 - 1) / (m^2 + 2) without its sign
-COLDEST = 100.0  # [K] below which nothing is seen of a black body
+COLDEST = 100.0  # [K], of the coldest visible black body
 ON_POINTS = ("emission_grid", "temperature", "albedo_grid", "color_grid")  # of a `Grid`
 OCTAVE = CLOUD_OCTAVES["finer"]
 CLOUD_LEAST, CLOUD_MOST, CLOUD_FINEST = 32, 256, 1024  # points along a cloud's longest side
@@ -167,8 +167,8 @@ class Homogeneous(Medium):
 
     @property
     def is_chromatic(self) -> bool:
-        given = (self.sigma_a, self.sigma_s, self.sigma_t)
-        return not all(map(_is_grey, given))
+        coefficients = (self.sigma_a, self.sigma_s, self.sigma_t)
+        return not all(map(_is_grey, coefficients))
 
     def coefficients(self, spectral: bool) -> tuple[Spectrum, Spectrum]:
         a: Any = self.sigma_a
@@ -218,30 +218,31 @@ class Dyed(Homogeneous):
     def glows(self) -> bool:
         """Whether it has a dye that gives out light."""
         dye = self.dye
-        given = isinstance(dye, Fluorophore) and dye.quantum_yield > 0.0
-        return given and self.strength * self.scale > 0.0
+        emits = isinstance(dye, Fluorophore) and dye.quantum_yield > 0.0
+        return emits and self.strength * self.scale > 0.0
 
     @property
     def is_chromatic(self) -> bool:
         return self.dye is not None or super().is_chromatic
 
     def coefficients(self, spectral: bool) -> tuple[Spectrum, Spectrum]:
-        """Return the rest of the extinction, and how much a metre sends on [1/m].
+        """Return the absorption and the collisions of a metre [1/m].
 
-        The latter, the collisions, are what it scatters and what the dye gives out where light is
-        the same at all wavelengths. The former may be below zero: the dye takes light at others.
+        Collisions are its scattering and the dye's emission under light that is equal at all
+        wavelengths. The absorption is the extinction without the collisions; it may be below zero,
+        since the dye absorbs at other wavelengths than it emits.
         """
         absorbs, scatters = super().coefficients(spectral)
         dye, strength = self.dye, self.strength * self.scale
         if not isinstance(dye, Fluorophore) or strength == 0.0:
             return absorbs, scatters
-        taken = _combined([absorbs, dye.absorption], lambda v: v[0] + strength * v[1], spectral)
+        absorbed = _combined([absorbs, dye.absorption], lambda v: v[0] + strength * v[1], spectral)
         if not spectral or not self.glows:
-            return taken, scatters
-        given = self._given
+            return absorbed, scatters
+        emitted = self._emitted
         return (
-            _combined([taken, given], lambda v: v[0] - strength * v[1], spectral),
-            _combined([scatters, given], lambda v: v[0] + strength * v[1], spectral),
+            _combined([absorbed, emitted], lambda v: v[0] - strength * v[1], spectral),
+            _combined([scatters, emitted], lambda v: v[0] + strength * v[1], spectral),
         )
 
     def collisions(self, spectral: bool) -> tuple[Phase, ...]:
@@ -262,7 +263,7 @@ class Dyed(Homogeneous):
         )
 
     @property
-    def _given(self) -> Spectrum:
+    def _emitted(self) -> Spectrum:
         """Return the spectrum that the dye emits under light that is equal at all wavelengths."""
         assert self.dye is not None
         out, into, values = self.dye.table
@@ -287,7 +288,7 @@ class Lattice(Medium):
 
     @property
     def noise(self) -> tuple[float, ...] | None:
-        """The numbers of the noise by which kernels make the density, None for an array."""
+        """The parameters of the noise that kernels turn into the density; None for an array."""
         return None
 
     @property
@@ -325,7 +326,7 @@ class Cloud(Lattice, Homogeneous):
     wispiness: float = real(1.0, "how much the noise is shifted", low=0.0, high=100.0)
     frequency: float = real(5.0, "cells of the first octave along a unit length", low=0.0, high=1e4)
     low: Vector3 = host((0.0, 0.0, 0.0), "a corner of the box", form="vector")
-    high: Vector3 = host((1.0, 1.0, 1.0), "the opposite one", form="vector")
+    high: Vector3 = host((1.0, 1.0, 1.0), "the opposite corner", form="vector")
     resolution: int = host(
         0, "points along the longest side of the box; 0: two for each cell of the finest octave, "
         f"from {CLOUD_LEAST} to {CLOUD_MOST}"
@@ -333,8 +334,8 @@ class Cloud(Lattice, Homogeneous):
 
     def check(self) -> None:
         for name, corner in (("low", self.low), ("high", self.high)):
-            found = np.asarray(corner, float)
-            if found.shape != (3,) or not np.isfinite(found).all():
+            point = np.asarray(corner, float)
+            if point.shape != (3,) or not np.isfinite(point).all():
                 raise SceneError("must be three numbers", where=f"{self.kind}.{name}")
         corners = np.array([self.low, self.high], float)
         object.__setattr__(self, "low", tuple(corners.min(axis=0).tolist()))
@@ -365,9 +366,9 @@ class Cloud(Lattice, Homogeneous):
 
     @property
     def box(self) -> NDArray[np.float64]:
-        own = np.diag([*self._sides, 1.0])
-        own[:3, 3] = self.low
-        return np.asarray(self.to_world, float) @ own
+        matrix = np.diag([*self._sides, 1.0])
+        matrix[:3, 3] = self.low
+        return np.asarray(self.to_world, float) @ matrix
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -375,8 +376,8 @@ class Grid(Lattice, Homogeneous):
     """A homogeneous medium whose coefficients are multiplied by a density on a grid.
 
     The density (nx, ny, nz) is that at the centres of the cells of a box, trilinear between these;
-    beyond the outermost ones it is theirs, and outside of the box there is nothing. It is an array
-    of numpy or of pyopencl, or a `Volume`, whose box `to_world` then moves; by default it is 1.
+    beyond the outermost centres it is constant, and outside of the box it is 0. It is an array of
+    numpy or of pyopencl, or a `Volume`, whose box `to_world` then moves; by default it is 1.
 
     `emission_grid` and `temperature` are the same for its light. An array has the box of the
     density, and the coarser of both is made as fine as the other. A `Volume` is taken at the points
@@ -414,13 +415,15 @@ class Grid(Lattice, Homogeneous):
 
     @property
     def size(self) -> tuple[int, ...]:
-        found: tuple[int, ...] = self.density.shape
-        return found
+        shape: tuple[int, ...] = self.density.shape
+        return shape
 
     def check(self) -> None:
-        own = np.asarray(self.to_world, float)
+        to_world = np.asarray(self.to_world, float)
         if isinstance(self.density, Volume):
-            object.__setattr__(self, "to_world", own @ np.asarray(self.density.to_world, float))
+            object.__setattr__(
+                self, "to_world", to_world @ np.asarray(self.density.to_world, float)
+            )
             object.__setattr__(self, "density", self.density.values)
         super().check()
         check_volume(self.density, f"{self.kind}.density")
@@ -430,25 +433,27 @@ class Grid(Lattice, Homogeneous):
             message = "give `emission_grid` or `temperature`, not both"
             raise SceneError(message, where=self.kind)
         for name in ON_POINTS:
-            self._fit(name, own)
+            self._fit(name, to_world)
 
-    def _fit(self, name: str, own: Matrix4) -> None:
+    def _fit(self, name: str, to_world: Matrix4) -> None:
         """Bring numbers to the points of the density, or that to theirs where they are more."""
-        given, where = fields_of(self)[name], f"{self.kind}.{name}"
-        if given is None:
+        volume, where = fields_of(self)[name], f"{self.kind}.{name}"
+        if volume is None:
             return
-        values = given.values if isinstance(given, Volume) else given
+        values = volume.values if isinstance(volume, Volume) else volume
         coloured = name in ("albedo_grid", "color_grid")
         check_volume(values, where, colours=coloured)
         if coloured and not (isinstance(values, np.ndarray) and values.max() <= 1.0):
             raise SceneError("must be an array of numpy, of numbers up to 1", where=where)
         box = np.asarray(self.to_world, float)
-        placed = own @ np.asarray(given.to_world, float) if isinstance(given, Volume) else box
+        placed = (
+            to_world @ np.asarray(volume.to_world, float) if isinstance(volume, Volume) else box
+        )
         if values.shape[:3] != self.density.shape or not np.allclose(placed, box, 1e-6, 1e-9):
             if not (isinstance(values, np.ndarray) and isinstance(self.density, np.ndarray)):
                 raise SceneError("on a device it must have the density's shape", where=where)
             finer = np.prod(values.shape[:3]) > np.prod(self.density.shape)
-            if finer and not isinstance(given, Volume):
+            if finer and not isinstance(volume, Volume):
                 density = resampled(self.density, box, values.shape[:3], box)
                 object.__setattr__(self, "density", density)
             else:
@@ -464,8 +469,8 @@ class Grid(Lattice, Homogeneous):
         if self.temperature is None:
             return super().light
         dark = self.brightness == 0.0 or _is_zero(self.coefficients(spectral=True)[0])
-        found = self.temperature
-        hottest = 0.0 if dark else float(np.max(on_host(found)))
+        temperature = self.temperature
+        hottest = 0.0 if dark else float(np.max(on_host(temperature)))
         return spectra.Blackbody(hottest, self.brightness) if hottest > COLDEST else None
 
 
@@ -523,7 +528,7 @@ def _unbounded(value: object) -> Any:
 
 
 def _single_albedo(reflected: ArrayLike, g: float) -> Any:
-    """The share that a medium scatters, of which a thick body reflects so much of even light."""
+    """Return the single-scattering albedo of a thick body from its diffuse reflectance."""
     r = np.clip(np.asarray(reflected, np.float64), 0.0, 1.0)
     b = 1.139 + 1.17 * r
     s2 = (2.0 * (1.0 - r) / (b + np.sqrt(b * b - 0.556 * (1.0 - r)))) ** 2
@@ -554,7 +559,7 @@ def _lit(value: Any) -> Spectrum:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mixture(Lattice):
-    """Several media in one place: their coefficients add up, and each keeps its phase function.
+    """Several media in the same place: coefficients add up, and each keeps its phase function.
 
     Each part is `homogeneous`, and then everywhere in the box, or a `grid` with a density of its
     own. Grids have the same box, which `to_world` moves. Along each axis there are as many points
@@ -608,15 +613,15 @@ class Mixture(Lattice):
 
     @property
     def box(self) -> NDArray[np.float64]:
-        own = np.asarray(self.to_world, float)
-        return own @ self.grids[0].box if self.grids else own
+        to_world = np.asarray(self.to_world, float)
+        return to_world @ self.grids[0].box if self.grids else to_world
 
     @property
     def scatters(self) -> bool:
         return any(part.scatters for part in self.parts)
 
     def collisions(self, spectral: bool) -> tuple[Phase, ...]:
-        return tuple(one for p in self.parts if p.scatters for one in p.collisions(spectral))
+        return tuple(phase for p in self.parts if p.scatters for phase in p.collisions(spectral))
 
     @property
     def is_chromatic(self) -> bool:
@@ -627,7 +632,7 @@ class Mixture(Lattice):
         return None
 
     def coefficients(self, spectral: bool) -> tuple[Spectrum, Spectrum]:
-        """Return those of all parts where each is densest [1/m], which bound what is anywhere."""
+        """Return the sums over all parts at their greatest densities [1/m], an upper bound."""
         absorbs, scatters = (
             _combined(list(each), lambda v: sum(map(np.multiply, self._densest, v)), spectral)
             for each in zip(*self.of_parts(spectral), strict=True)
@@ -635,13 +640,14 @@ class Mixture(Lattice):
         return absorbs, scatters
 
     def of_parts(self, spectral: bool) -> list[tuple[Spectrum, Spectrum]]:
-        """Return how much a metre of each part absorbs and scatters [1/m].
+        """Return the absorption and scattering of each part [1/m].
 
-        At wavelengths that are whole nanometres, so that sums of them are exact.
+        Tables are at whole nanometres, so that their sums are exact.
         """
-        found = [part.coefficients(spectral) for part in self.parts]
+        coefficients = [part.coefficients(spectral) for part in self.parts]
         return [
-            (_alone(absorbs, spectral), _alone(scatters, spectral)) for absorbs, scatters in found
+            (_alone(absorbs, spectral), _alone(scatters, spectral))
+            for absorbs, scatters in coefficients
         ]
 
     @cached_property
@@ -649,7 +655,9 @@ class Mixture(Lattice):
         densities: list[Any] = [
             part.density if isinstance(part, Grid) else None for part in self.parts
         ]
-        return [1.0 if one is None else float(np.max(on_host(one))) for one in densities]
+        return [
+            1.0 if density is None else float(np.max(on_host(density))) for density in densities
+        ]
 
 
 KINDS: tuple[type[Medium], ...] = (Homogeneous, Grid, Cloud, Dyed, Soot, Mixture)

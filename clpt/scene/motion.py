@@ -24,7 +24,7 @@ class Keys:
 
     Between two keys translation and scale change linearly, and a rotation turns evenly on the
     shortest way (Shoemake and Duff 1992: a matrix is T R S, S symmetric). Before the first key and
-    after the last one nothing moves. A turn of half a circle or more needs keys in between.
+    after the last key nothing moves. A turn of half a circle or more needs keys in between.
 
     Raises SceneError for times that do not ascend, matrices that are not affine, singular or not
     finite, and a mirror image between two keys.
@@ -42,8 +42,8 @@ class Keys:
         if not len(times):
             raise SceneError("must have at least one key", where="motion")
         if matrices.shape != (len(times), 4, 4):
-            found = f"{len(times)} times and transforms {matrices.shape}"
-            raise SceneError(f"needs a 4x4 matrix for each time, found {found}", where="motion")
+            counts = f"{len(times)} times and transforms {matrices.shape}"
+            raise SceneError(f"needs a 4x4 matrix for each time, found {counts}", where="motion")
         check_times(times.tolist(), "motion")
         for i, matrix in enumerate(matrices):
             where = f"motion.transforms[{i}]"
@@ -83,7 +83,7 @@ class Deformation:
     points: (k, n, 3) for k times and n vertices of a mesh, (k, n, 4) for points of curves and for
     many spheres with the radii, which spheres may do without.
     normals: (k, n, 3) of a mesh's vertices, or None. Both become float32.
-    Before the first time and after the last one nothing moves.
+    Before the first time and after the last time nothing moves.
 
     Raises SceneError for times that do not ascend, arrays of other shapes, and values that are not
     finite.
@@ -107,8 +107,8 @@ class Deformation:
         if normals is not None:
             normals = _keyed(normals, f"{where}.normals", len(times), (3,))
             if normals.shape[1] != points.shape[1]:
-                found = f"{normals.shape[1]} for {points.shape[1]} points"
-                raise SceneError(f"needs as many normals as points, found {found}", where=where)
+                counts = f"{normals.shape[1]} for {points.shape[1]} points"
+                raise SceneError(f"needs as many normals as points, found {counts}", where=where)
         object.__setattr__(self, "times", tuple(times.tolist()))
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "normals", normals)
@@ -121,17 +121,19 @@ class Deformation:
             share, i, j = 0.0, max(i, 0), max(i, 0)
         else:
             share, j = (time - times[i]) / (times[i + 1] - times[i]), i + 1
-        found = []
+        interpolated = []
         for values in (self.points, self.normals):
             still = values is None or share == 0.0
-            one = None if values is None else values[i]
-            both = one if still else (1.0 - share) * values[i] + share * values[j]
-            found.append(None if both is None else np.asarray(both, np.float32))
-        return found[0], found[1]  # type: ignore[return-value]
+            key = None if values is None else values[i]
+            between = key if still else (1.0 - share) * values[i] + share * values[j]
+            interpolated.append(None if between is None else np.asarray(between, np.float32))
+        return interpolated[0], interpolated[1]  # type: ignore[return-value]
 
     def while_open(self, shutter: Shutter) -> tuple[float, ...]:
-        """Return the times at which points change their way, from when it opens to when it closes;
-        one time if they stand still."""
+        """Return the times [s] of keys while a shutter is open, its opening and its closing.
+
+        Points at rest have a single time.
+        """
         inner = [t for t in self.times if shutter.open < t < shutter.close]
         times = (shutter.open, *inner, shutter.close)
         first, turned = self.at(times[0])
@@ -145,50 +147,50 @@ class Deformation:
 
 
 def _keyed(values: Any, where: str, count: int, widths: tuple[int, ...]) -> NDArray[np.float32]:
-    """An array (count, n, one of widths) float32. Raises SceneError."""
+    """Return an array (count, n, w) float32 with a width w in `widths`. Raises SceneError."""
     try:
-        rows = [np.shape(one) for one in values]
+        rows = [np.shape(key) for key in values]
         odd = next((i for i, shape in enumerate(rows) if shape != rows[0]), None)
-        found = np.asarray(in_memory(values) if odd is None else (), np.float32)
+        array = np.asarray(in_memory(values) if odd is None else (), np.float32)
     except (TypeError, ValueError) as error:
         raise SceneError(f"are not numbers: {error}", where=where) from error
     if odd is not None:
         message = f"key {odd} has {rows[odd]}, the first {rows[0]}: all must have as many"
         raise SceneError(message, where=where)
-    if found.ndim != 3 or len(found) != count or found.shape[2] not in widths:
+    if array.ndim != 3 or len(array) != count or array.shape[2] not in widths:
         columns = " or ".join(map(str, widths))
-        message = f"must be ({count}, n, {columns}) for {count} times, found {found.shape}"
+        message = f"must be ({count}, n, {columns}) for {count} times, found {array.shape}"
         raise SceneError(message, where=where)
-    wrong = ~np.isfinite(found).all(axis=(1, 2))
+    wrong = ~np.isfinite(array).all(axis=(1, 2))
     if wrong.any():
         raise SceneError(f"key {int(np.argmax(wrong))} is not finite", where=where)
-    return found
+    return array
 
 
-def placement(thing: object) -> NDArray[np.float64] | None:
-    """Return where a shape, light or camera is, (4, 4); None for what is at no place."""
-    if hasattr(thing, "to_world"):
-        return np.asarray(thing.to_world, np.float64)
-    if hasattr(thing, "position"):
-        return transforms.translate(thing.position)
-    if hasattr(thing, "direction"):
-        d = np.asarray(thing.direction, np.float64)
+def placement(movable: object) -> NDArray[np.float64] | None:
+    """Return the placement (4, 4) of a shape, light or camera; None if it has none."""
+    if hasattr(movable, "to_world"):
+        return np.asarray(movable.to_world, np.float64)
+    if hasattr(movable, "position"):
+        return transforms.translate(movable.position)
+    if hasattr(movable, "direction"):
+        d = np.asarray(movable.direction, np.float64)
         up = [0.0, 1.0, 0.0] if abs(d[1]) < 0.9 * np.linalg.norm(d) else [1.0, 0.0, 0.0]
         return transforms.look_at([0.0, 0.0, 0.0], d, up)
     return None
 
 
-def through(thing: Any, times: Sequence[float], placements: ArrayLike) -> Any:
+def through(movable: Any, times: Sequence[float], placements: ArrayLike) -> Any:
     """Return a shape, light or camera that is at placements (k, 4, 4) at times [s], by keys.
 
     It turns about its own origin. Raises SceneError as `Keys` does.
     """
     keys = Keys(times, placements)
-    if hasattr(thing, "to_world"):
-        return replace(thing, to_world=np.eye(4), motion=keys)
-    if hasattr(thing, "position"):
-        return replace(thing, position=(0.0, 0.0, 0.0), motion=keys)
-    return replace(thing, direction=(0.0, 0.0, 1.0), motion=keys)
+    if hasattr(movable, "to_world"):
+        return replace(movable, to_world=np.eye(4), motion=keys)
+    if hasattr(movable, "position"):
+        return replace(movable, position=(0.0, 0.0, 0.0), motion=keys)
+    return replace(movable, direction=(0.0, 0.0, 1.0), motion=keys)
 
 
 def check_times(times: Sequence[float], where: str) -> None:

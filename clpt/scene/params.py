@@ -1,7 +1,7 @@
 """Declarations of the parameters of a kind.
 
-A kind is a frozen dataclass that derives from `Kind`. One of the functions below declares each
-field and gives it a role (`clpt.scene.roles`). The role decides which values it accepts, its type
+A kind is a frozen dataclass that derives from `Kind`. The functions below declare each field
+and give it a role (`clpt.scene.roles`). The role decides which values it accepts, its type
 in the kernels, and its entry in the documentation and the JSON schema:
 
 =============  =====================================  ==========================  ===============
@@ -19,7 +19,7 @@ reradiation    Reradiation, None                      Spectrum, its rows' sums  
 measurement    Measurement, None                      Measurement                 no
 merl           MerlTable, None                        MerlTable                   no
 flag           bool                                   int                         no
-choice         one of the names listed                int, the name's position    no
+choice         a name of a list                       int, the name's position    no
 orders         numbers of orders -n to n              real[17], of -8 to 8        no
 layers         Layers, from the outside in            Layers                      their profile
 host forms     what the lowering needs, see HostForm  -                           -
@@ -108,7 +108,7 @@ def quantity(default: object, doc: str, low: float = -math.inf, high: float = ma
 
 
 def angular(doc: str) -> Any:
-    """Declare a table over the cosine of an angle; `clpt.scene.phases.Tabulated` says of what."""
+    """Declare a table over the cosine of an angle; see `clpt.scene.phases.Tabulated`."""
     return _field((1.0, 1.0), Param(roles.ANGULAR, doc))
 
 
@@ -147,7 +147,7 @@ def flag(default: bool, doc: str) -> Any:
 
 
 def choice(default: str | None, doc: str, choices: Sequence[str]) -> Any:
-    """Declare one of several names; with the default None, also None."""
+    """Declare a choice between names; with the default None, also None."""
     optional = default is None
     return _field(default, Param(roles.CHOICE, doc, choices=tuple(choices), optional=optional))
 
@@ -172,7 +172,7 @@ def host(
 ) -> Any:
     """Declare what only the host needs: geometry, matrices, nested kinds.
 
-    form: what it holds; None for what the type of the default implies. positive: of a number.
+    form: of its values; None: implied by the type of the default. positive: of a number.
     """
     role, low = roles.host(form or _form_of(default)), 0.0 if positive else -math.inf
     return _field(default, Param(role, doc, unit, low, positive=positive))
@@ -196,8 +196,8 @@ _FORMS: dict[type, HostForm] = {bool: "boolean", int: "integer", float: "number"
 class Shorthand:
     """Arguments of a kind that stand for some of its parameters.
 
-    arguments: what each is, by its name. stands_for: the parameters. spell: called with those of
-    the arguments that are given, returns values of the parameters by name.
+    arguments: the declaration of each, by its name. stands_for: the parameters. spell: takes the
+    arguments that a caller passes, and returns values of the parameters by name.
     """
 
     arguments: Mapping[str, Param]
@@ -206,23 +206,23 @@ class Shorthand:
 
 
 class KindType(type):
-    """The type of kinds: what all of them do with the arguments that they are called with.
+    """The type of kinds: it checks the arguments of a call.
 
-    A name that the kind does not have raises UnusedParameterError with the nearest ones. Shorthands
-    become the parameters that they stand for. What is wrong with an object tells its name.
+    An unknown name raises UnusedParameterError with the nearest names. Shorthands become the
+    parameters that they stand for. Errors contain the object's name.
     """
 
-    def __call__(cls, /, *values: object, **given: object) -> Any:
+    def __call__(cls, /, *values: object, **arguments: object) -> Any:
         kind = cast("type[Kind]", cls)
         if values:
             example = next(iter((*device_params(kind), *_field_names(kind))), "")
             message = f"{cls.__name__} takes its parameters by name: {cls.__name__}({example}=...)"
             raise TypeError(message)
         try:
-            plain = _spelled_out(kind, given)
-            return super().__call__(**{name: in_memory(one) for name, one in plain.items()})
+            plain = _spelled_out(kind, arguments)
+            return super().__call__(**{name: in_memory(value) for name, value in plain.items()})
         except SceneError as error:
-            name, where = given.get("name"), error.where or kind.kind
+            name, where = arguments.get("name"), error.where or kind.kind
             if name and isinstance(name, str) and where.startswith(kind.kind):
                 error.place_at(f"{kind.kind} {name!r}{where.removeprefix(kind.kind)}")
             raise
@@ -234,28 +234,30 @@ OF_FILES = {  # keys of objects in a scene file, and what Python has instead
 }
 
 
-def _spelled_out(kind: type[Kind], given: dict[str, object]) -> dict[str, object]:
+def _spelled_out(kind: type[Kind], arguments: dict[str, object]) -> dict[str, object]:
     """Return arguments of a kind without shorthands. Raises SceneError, UnusedParameterError."""
     known, short = _field_names(kind), shorthands(kind)
-    for name in given:
+    for name in arguments:
         if name in OF_FILES:
             raise SceneError(f"{name!r} is for scene files: {OF_FILES[name]}", where=kind.kind)
         if name not in known and name not in short:
             raise UnusedParameterError(kind.kind, name, (*known, *short))
-    plain = {name: value for name, value in given.items() if name not in short}
+    plain = {name: value for name, value in arguments.items() if name not in short}
     for shorthand in kind.shorthands:
-        asked = {name: given[name] for name in shorthand.arguments if given.get(name) is not None}
-        for name, value in asked.items():
+        spelled = {
+            name: arguments[name] for name in shorthand.arguments if arguments.get(name) is not None
+        }
+        for name, value in spelled.items():
             check_unmasked(value, f"{kind.kind}.{name}")
-        for name in shorthand.stands_for if asked else ():
+        for name in shorthand.stands_for if spelled else ():
             if name in plain:
-                first = next(iter(asked))
+                first = next(iter(spelled))
                 message = f"{first!r} stands for {name!r} too; give either"
                 raise SceneError(message, where=f"{kind.kind}.{first}")
         try:
-            plain |= shorthand.spell(**asked) if asked else {}
+            plain |= shorthand.spell(**spelled) if spelled else {}
         except SceneError as error:
-            error.place_at(f"{kind.kind}.{error.where or next(iter(asked))}")
+            error.place_at(f"{kind.kind}.{error.where or next(iter(spelled))}")
             raise
     return plain
 
@@ -274,11 +276,13 @@ class Kind(metaclass=KindType):
     kind: ClassVar[str] = "kind"
     shorthands: ClassVar[tuple[Shorthand, ...]] = ()
     needs_wavelengths: ClassVar[bool] = False  # its struct in the kernels has `lambdas`
-    # Where all numbers of one of these are above 0, its struct has the `luminance` of `base_color`,
-    # and its kernel file includes core/luminance.cl.
+    # Groups of parameters. Where all parameters of a group are above 0, its struct has the
+    # `luminance` of `base_color`, and its kernel file includes core/luminance.cl.
     tints: ClassVar[tuple[tuple[str, ...], ...]] = ()
-    is_tree: ClassVar[bool] = True  # its parts become one text in the kernels, each at every use
+    is_texture: ClassVar[bool] = False  # its values vary over a surface or in space
+    is_tree: ClassVar[bool] = True  # its parts become a single kernel text, each at every use
     _size: ClassVar[tuple[int, int]] = (1, 1)  # of an object: its parts, and how deep they lie
+    has_textures: ClassVar[bool] = False  # of an object: a parameter that kernels read is a texture
 
     def __init_subclass__(cls) -> None:
         if "kind" not in vars(cls):  # a class may take the kernels of another kind
@@ -286,14 +290,16 @@ class Kind(metaclass=KindType):
         cls.__repr__ = Kind.__repr__  # type: ignore[method-assign]  # `dataclass` leaves it then
 
     def __post_init__(self) -> None:
-        parts, depth = 1, 0
+        parts, depth, textured = 1, 0, False
         for name, param in params(type(self)).items():
             value = _checked(getattr(self, name), param, f"{self.kind}.{name}")
             object.__setattr__(self, name, value)
+            textured |= param.role.place != "host" and isinstance(value, Kind) and value.is_texture
             for inner in value if isinstance(value, tuple) else (value,):
                 if isinstance(inner, Kind):
                     parts, depth = parts + inner._size[0], max(depth, inner._size[1])
         object.__setattr__(self, "_size", (parts, depth + 1))
+        object.__setattr__(self, "has_textures", textured)
         if self.is_tree and (parts > MOST_PARTS or depth >= MOST_NESTED):
             message = f"has more than {MOST_PARTS} parts, shared ones counted at each use"
             if parts <= MOST_PARTS:
@@ -312,11 +318,6 @@ class Kind(metaclass=KindType):
         return f"{type(self).__name__}({', '.join(changed)})"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Texture(Kind):
-    """Base of all textures."""
-
-
 @cache
 @cache  # thousands of objects ask
 def _declared(cls: type[Kind]) -> Mapping[str, Param]:
@@ -326,8 +327,8 @@ def _declared(cls: type[Kind]) -> Mapping[str, Param]:
 
 @cache
 def _declared_of(cls: type[Kind], place: str) -> Mapping[str, Param]:
-    found = {name: p for name, p in _declared(cls).items() if p.role.place == place}
-    return MappingProxyType(found)
+    declared = {name: p for name, p in _declared(cls).items() if p.role.place == place}
+    return MappingProxyType(declared)
 
 
 def params(cls: type[Kind]) -> Mapping[str, Param]:
@@ -338,7 +339,9 @@ def params(cls: type[Kind]) -> Mapping[str, Param]:
 @cache
 def shorthands(cls: type[Kind]) -> Mapping[str, Param]:
     """Return the arguments of a kind that stand for parameters, by name; see `Shorthand`."""
-    merged = {name: param for one in cls.shorthands for name, param in one.arguments.items()}
+    merged = {
+        name: param for shorthand in cls.shorthands for name, param in shorthand.arguments.items()
+    }
     return MappingProxyType(merged)
 
 
@@ -353,9 +356,9 @@ def defaults(cls: type[Kind]) -> dict[str, Any]:
 
 @cache
 def _usual(cls: type[Kind]) -> Mapping[str, Any]:
-    """Return the defaults of a kind as its objects have them, but for what must be given."""
-    given = {name: v for name, v in defaults(cls).items() if v is not dataclasses.MISSING}
-    return {name: _checked(v, _declared(cls)[name], cls.kind) for name, v in given.items()}
+    """Return the checked defaults of a kind, without its required parameters."""
+    declared = {name: v for name, v in defaults(cls).items() if v is not dataclasses.MISSING}
+    return {name: _checked(v, _declared(cls)[name], cls.kind) for name, v in declared.items()}
 
 
 def fields_of(kind: Kind) -> dict[str, Any]:
@@ -366,7 +369,7 @@ def fields_of(kind: Kind) -> dict[str, Any]:
 
 @cache
 def _fields(cls: type[Kind]) -> tuple[tuple[str, ...], Callable[[Any], tuple[Any, ...]]]:
-    """The names of a class's fields, and what reads them all at once, and more."""
+    """Return the names of a class's fields, and a function that reads all of them."""
     names = tuple(field.name for field in dataclasses.fields(cls))
     return names, attrgetter(*names, "__class__", "__class__")  # of two or more: a tuple
 
@@ -392,7 +395,7 @@ def interior_params(cls: type[Kind]) -> Mapping[str, Param]:
 
 
 def _checked(value: object, param: Param, where: str) -> Any:
-    if isinstance(value, Texture) and param.role.place != "host":
+    if isinstance(value, Kind) and value.is_texture and param.role.place != "host":
         if not param.textured:
             raise SceneError("cannot be a texture", where=where)
         return value

@@ -1,8 +1,7 @@
-"""Phase functions: how much light a point of a medium sends where.
+"""Phase functions: the angular distribution of scattering in a medium.
 
-A phase function has a pair kernels/media/kinds/<kind>.cl. It scatters at a point as a material does
-at a
-surface: its local frame has z along the ray back to where light was last.
+A phase function has a pair kernels/media/kinds/<kind>.cl. It scatters at a point as a material
+scatters at a surface: its local frame has z along the ray back to the previous vertex.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ MOST_ROWS = 512  # of a table by wavelength
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Phase(Scatterer):
-    """Base of all phase functions: how much light a point of a medium sends where, in 1/sr."""
+    """Base of all phase functions, in 1/sr."""
 
     folder: ClassVar[str] = "media/kinds"
     is_phase = True
@@ -44,7 +43,7 @@ class Isotropic(Phase):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HenyeyGreenstein(Phase):
-    """Henyey and Greenstein 1941: one number tells how much goes forward."""
+    """Henyey and Greenstein 1941: a single number is the mean cosine."""
 
     chromatic = True
 
@@ -66,14 +65,14 @@ class Draine(Phase):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tabulated(Phase):
-    """Measured or calculated: a table over the cosine of the angle by which light turns.
+    """Measured or calculated: a table over the cosine of the scattering angle.
 
     values: numbers (n,) from 0, in any unit, or a row for each wavelength (m, n); cosines: of each
     number, ascending from -1 to 1, by default even; wavelengths: of each row [nm], ascending. It is
     linear between, holds its end rows, and is scaled so that its integral over directions is 1. Its
-    parameters are then float64 arrays, (m, n) and (n,) and (m,).
+    parameters become float64 arrays, (m, n) and (n,) and (m,).
 
-    Raises SceneError where it is none.
+    Raises SceneError for arrays of other forms or values.
     """
 
     chromatic = True
@@ -116,8 +115,8 @@ class Tabulated(Phase):
         """Return cosines (n,), densities (m, n) [1/sr], and the first row's wavelength and the
         distance of two rows [nm].
 
-        spectral: the rows are even in wavelength; else they are of the three colours, or there is
-        one.
+        spectral: the rows are even in wavelength; else there are rows of the three colours, or a
+        single row.
         """
         values, cosines, lambdas = map(np.asarray, (self.values, self.cosines, self.wavelengths))
         if len(values) == 1:
@@ -136,14 +135,14 @@ class Tabulated(Phase):
         whole = _whole(rows, cosines)
         return cosines, rows / whole[:, None], 0.0, 1.0
 
-    def _numbers(self, name: str, given: object) -> NDArray[np.float64]:
+    def _numbers(self, name: str, values: object) -> NDArray[np.float64]:
         try:
-            made = np.array(given, np.float64)
+            numbers = np.array(values, np.float64)
         except (TypeError, ValueError):
             raise self._error(name, "must be numbers, in rows of one length") from None
-        if not np.isfinite(made).all():
+        if not np.isfinite(numbers).all():
             raise self._error(name, "must be finite")
-        return made
+        return numbers
 
     def _error(self, name: str, message: str) -> SceneError:
         return SceneError(message, where=f"{self.kind}.{name}")
@@ -151,14 +150,14 @@ class Tabulated(Phase):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Blend(Phase):
-    """Two phase functions, of which each scatters its share of the light."""
+    """Two phase functions; each scatters its share of the light."""
 
     weight: float = real(0.5, "share of the second", low=0.0, high=1.0)
     first: Phase = host(Isotropic(), "a phase function", form="phase")
-    second: Phase = host(Isotropic(), "another one", form="phase")
+    second: Phase = host(Isotropic(), "another phase function", form="phase")
 
     def check(self) -> None:
-        """Raise SceneError for what is no phase function."""
+        """Raise SceneError for a part that is no phase function."""
         parts: dict[str, object] = {"first": self.first, "second": self.second}
         for name, part in parts.items():
             if not isinstance(part, Phase):
@@ -179,9 +178,10 @@ class Rayleigh(Phase):
 class Reradiating(Phase):
     """Isotropic scattering with fluorescence: light also leaves at longer wavelengths than it came.
 
-    Of what collides the share `reflectance` keeps its wavelength, and `reradiation` tells what is
-    given out at others. For particles that collide with all wavelengths alike; `dyed` makes one for
-    what absorbs by wavelength. In RGB mode it has the colour that it has under D65, at most white.
+    The share `reflectance` of colliding light keeps its wavelength; `reradiation` is the emission
+    at other wavelengths. The particles collide with all wavelengths alike; for absorption that
+    depends on the wavelength use `dyed`. In RGB mode its colour is its colour under D65, at most
+    white.
     """
 
     fluoresces = True
@@ -218,7 +218,7 @@ class PerCollision(Reradiation):
 
 
 def _whole(rows: NDArray[Any], cosines: NDArray[Any]) -> NDArray[np.float64]:
-    """Integrals over directions of rows (m, n) that are linear between cosines (n,)."""
+    """Return integrals over directions of rows (m, n) that are linear between cosines (n,)."""
     return np.pi * ((rows[:, 1:] + rows[:, :-1]) @ np.diff(cosines))
 
 

@@ -1,9 +1,9 @@
 """Roles of parameters: what a value may be, and what it means.
 
-A role is an object, and tables have an entry for each: `clpt.render.records.parameter_words` says
+A role is an object, and tables have an entry for each: `clpt.render.records.materials` says
 how a value stands in kernels, `clpt.render.materials.encoder` how it becomes words,
 `clpt.render.materials.cases` how kernels load it, `clpt.formats.native.forms` how it is written
-in scene.json, and `clpt.testing.settings` draws one for a test.
+in scene.json, and `clpt.testing.settings` draws a value for a test.
 """
 
 from __future__ import annotations
@@ -35,15 +35,16 @@ from clpt.spectra.spectrum import Role as Meaning
 from clpt.spectra.spectrum import check_reach, extremes
 
 ORDERS = GRATING_SIZES["orders"]
-ROUNDING = 1e-6  # by which a spectrum may be beyond its limits
+ROUNDING = 1e-6  # largest excess of a spectrum over its limits
 
 
 @dataclass(frozen=True)
 class Role:
-    """A role of a parameter; this one takes any value.
+    """A role of a parameter; the base takes any value.
 
-    name: in kernels and files. place: "row" of what kernels read of a kind; "inside", behind that,
-    of a body; "host" where kernels have nothing of that name. advice: where a number is too large.
+    name: in kernels and files. place: "row" for a value in a kind's row; "inside" for a value after
+    it, of a body's inside; "host" for a value that kernels do not read. advice: for a number that
+    is too large.
     """
 
     name: str
@@ -54,13 +55,13 @@ class Role:
         return self.name
 
     def check(self, value: object, param: Param, where: str | None) -> Any:
-        """Return what is meant by a value that is no texture. Raises SceneError."""
+        """Return the checked value of a parameter that is no texture. Raises SceneError."""
         return scalars.plain(value)
 
 
 @dataclass(frozen=True)
 class Param:
-    """One parameter: role, documentation, unit, limits."""
+    """A parameter: role, documentation, unit, limits."""
 
     role: Role
     doc: str = ""
@@ -79,14 +80,14 @@ class Real(Role):
     """A number within its limits."""
 
     def check(self, value: object, param: Param, where: str | None) -> float:
-        found = scalars.number(value, where)
-        if param.positive and found <= 0.0:
+        number = scalars.number(value, where)
+        if param.positive and number <= 0.0:
             raise SceneError(f"must be above 0, not {value}", where=where)
-        if not param.low <= found <= param.high:
-            advice = f"; {param.role.advice}" if param.role.advice and found > param.high else ""
+        if not param.low <= number <= param.high:
+            advice = f"; {param.role.advice}" if param.role.advice and number > param.high else ""
             message = f"{value} is outside [{param.low:g}, {param.high:g}]{advice}"
             raise SceneError(message, where=where)
-        return found
+        return number
 
 
 class Whole(Role):
@@ -109,7 +110,7 @@ def _is_list(value: object) -> TypeGuard[list[Any] | tuple[Any, ...] | NDArray[A
 
 
 class Choice(Role):
-    """One of the names that the parameter lists."""
+    """A name of the parameter's list."""
 
     def check(self, value: object, param: Param, where: str | None) -> Any:
         known = isinstance(value, str) and value in param.choices
@@ -168,13 +169,12 @@ class Data(Role):
 
 @dataclass(frozen=True)
 class Spectral(Role):
-    """A spectrum, or what stands for one: a number, three numbers, perhaps a name.
+    """A spectrum, or a number, three numbers or a name for a spectrum.
 
-    meaning: how it is turned to rgb, see `clpt.spectra.spectrum`. colour: what three numbers in a
-    file are, None where they stay three numbers. codes: "#rrggbb" is a colour too, in sRGB. names:
-    finds the spectrum of a name. measured: it
-    is a quantity of matter, whose tables go on beyond their ends. grey: kernels are told where it
-    has no colour.
+    meaning: the conversion to rgb, see `clpt.spectra.spectrum`. colour: the class of three numbers
+    in a file; None: they stay three numbers. codes: "#rrggbb" is a colour too, in sRGB. names:
+    returns the spectrum of a name. measured: it is a quantity of matter; its tables hold their end
+    values. grey: kernels have a separate load for a value without colour.
     """
 
     meaning: Meaning = "unbounded"
@@ -233,16 +233,16 @@ class Spectral(Role):
         if isinstance(value, RGBUnbounded) and min(value.r, value.g, value.b) < self._least(param):
             shown = ", ".join(f"{part:g}" for part in (value.r, value.g, value.b))
             raise SceneError(f"a colour cannot be negative here: {shown}", where=where)
-        for found, at in extremes(spectra.index(value) if self.measured else value):
-            if abs(found) > LARGEST:
-                message = f"{found:g} at {at:g} nm is beyond {LARGEST:g}, where float32 ends"
+        for number, at in extremes(spectra.index(value) if self.measured else value):
+            if abs(number) > LARGEST:
+                message = f"{number:g} at {at:g} nm is beyond {LARGEST:g}, where float32 ends"
                 raise SceneError(message, where=where)
-            if not param.low - ROUNDING <= found <= param.high + ROUNDING:
+            if not param.low - ROUNDING <= number <= param.high + ROUNDING:
                 limits = f"[{param.low:g}, {param.high:g}]"
-                raise SceneError(f"{found:g} at {at:g} nm is outside {limits}", where=where)
+                raise SceneError(f"{number:g} at {at:g} nm is outside {limits}", where=where)
 
     def _least(self, param: Param) -> float:
-        """The least number of a colour."""
+        """Return the least number of a colour."""
         return param.low
 
 
@@ -272,12 +272,14 @@ class Factor(Spectral):
 
 
 class Coefficient(Spectral):
-    """A coefficient of the inside of a body; one that is 0 at all wavelengths is the number 0."""
+    """A coefficient of the inside of a body; a spectrum of 0 becomes the number 0."""
 
     def check(self, value: object, param: Param, where: str | None) -> Any:
-        made = super().check(value, param, where)
-        none = isinstance(made, Spectrum) and all(found == 0.0 for found, _ in extremes(made))
-        return Constant(0.0) if none else made
+        spectrum = super().check(value, param, where)
+        is_zero = isinstance(spectrum, Spectrum) and all(
+            number == 0.0 for number, _ in extremes(spectrum)
+        )
+        return Constant(0.0) if is_zero else spectrum
 
 
 class Quantity(Factor):
@@ -332,7 +334,7 @@ class OptionalReal(Real):
 
 @dataclass(frozen=True)
 class Vector(Role):
-    """Three numbers; those of a direction cannot all be 0."""
+    """Three numbers; a direction is not (0, 0, 0)."""
 
     def check(self, value: object, param: Param, where: str | None) -> Any:
         try:
@@ -350,7 +352,7 @@ class Vector(Role):
 
 @dataclass(frozen=True)
 class Matrix(Role):
-    """A square matrix, or one on a device, whose form is not looked at."""
+    """A square matrix; a matrix on a device is not checked."""
 
     def check(self, value: object, param: Param, where: str | None) -> Any:
         wanted = (3, 3) if self.name == "matrix3" else (4, 4)
@@ -369,7 +371,7 @@ _HOSTS: dict[str, type[Role]] = {
     "boolean": Flag, "integer": Whole, "number": Real, "optional_number": OptionalReal,
     "vector": Vector, "direction": Vector, "matrix3": Matrix, "matrix4": Matrix,
 }  # fmt: skip
-# What a host parameter holds. clpt/formats/native/forms.py reads, writes and describes each form.
+# The form of a host parameter. clpt/formats/native/forms.py reads, writes and describes each form.
 HostForm = Literal[
     "boolean", "integer", "number", "text", "names", "numbers",
     "vector", "direction", "matrix3", "matrix4",
@@ -382,5 +384,5 @@ HostForm = Literal[
 
 
 def host(form: HostForm | Literal["host"]) -> Role:
-    """Return the role of what only the host needs; "host" where a scene file cannot hold it."""
+    """Return the role of a parameter of the host; "host": scene files cannot hold it."""
     return _HOSTS.get(form, Role)(form, "host")

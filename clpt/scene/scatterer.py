@@ -1,4 +1,4 @@
-"""The base of materials and phase functions: both decide where light goes from a point."""
+"""The base of materials and phase functions."""
 
 from __future__ import annotations
 
@@ -11,15 +11,19 @@ from clpt.scene.params import Kind, fields_of
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scatterer(Kind):
-    """Base of materials and phase functions, with what kernels ask of a kind."""
+    """Base of materials and phase functions, with the properties that kernels depend on."""
 
     folder: ClassVar[str] = "materials/kinds"  # of its file in the kernels folder
     is_phase: ClassVar[bool] = False  # it scatters in a medium, not at a surface
     source: ClassVar[str | Path | None] = None
-    delta: ClassVar[bool] = False  # every lobe is one: a light cannot be sampled through it
+    delta: ClassVar[bool] = (
+        False  # all its lobes are delta functions: no light can be sampled through it
+    )
     uses_lobe_sample: ClassVar[bool] = False  # `sample` uses u.z
     chromatic: ClassVar[bool] = False  # the pdf differs between wavelengths: it has `pdfs`
-    lobes_apart: ClassVar[bool] = False  # no direction has light of two lobes, if one refracts
+    lobes_apart: ClassVar[bool] = (
+        False  # a direction has light of a single lobe, if a lobe refracts
+    )
     disperses: ClassVar[bool] = False  # whatever its parameters, directions depend on wavelength
     refracts: ClassVar[bool] = False  # they do so where a parameter of the role index does
     fluoresces: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`
@@ -36,12 +40,12 @@ class Scatterer(Kind):
 
     @property
     def directing(self) -> tuple[object, ...]:
-        """The values or textures that tell a coat's normals, and directions along the surface."""
+        """The values or textures of a coat's normals, and of directions along the surface."""
         return ()
 
     @property
     def uses_tangents(self) -> bool:
-        """Whether what it does differs between the tangent and across."""
-        given = fields_of(self)
-        u, v = given.get("alpha_u"), given.get("alpha_v")
+        """Whether its scattering depends on the direction of the tangent."""
+        values = fields_of(self)
+        u, v = values.get("alpha_u"), values.get("alpha_v")
         return u is not v and u != v

@@ -121,11 +121,12 @@ class Mesh(Shape):
     def from_trimesh(cls, geometry: Any, **parameters: Any) -> Mesh:
         """Return a `trimesh.Trimesh` as a mesh: its vertices, faces, uvs, colours and material.
 
-        geometry: its arrays are shared where they have clpt's types already. Colours of vertices
-        or faces, 8-bit sRGB, become the linear attribute `vertex_color` or `face_color`, which the
-        material shows; a material with its images becomes one of clpt's, and a light if it glows.
-        parameters: further ones of the mesh, such as material, to_world, name, or normals="smooth";
-        without normals the triangles are flat. A `material` takes the place of trimesh's.
+        geometry: its arrays are shared where they have clpt's types already. Colours of vertices or
+        faces, 8-bit sRGB, become the linear attribute `vertex_color` or `face_color`, which the
+        material shows; a material with its images becomes a material of clpt, and a light if it
+        glows. parameters: further parameters of the mesh, such as material, to_world, name, or
+        normals="smooth"; without normals the triangles are flat. A `material` takes the place of
+        trimesh's.
 
         Raises SceneError for an object that is not a Trimesh; `Scene.from_trimesh` takes scenes.
         """
@@ -133,20 +134,20 @@ class Mesh(Shape):
             advice = "; Scene.from_trimesh takes a scene" if trimeshes.is_scene(geometry) else ""
             message = f"must be a trimesh.Trimesh, not {type(geometry).__name__}{advice}"
             raise SceneError(message, where="mesh")
-        visual, given = geometry.visual, dict(parameters)
+        visual, values = geometry.visual, dict(parameters)
         uvs, colours = getattr(visual, "uv", None), trimeshes.colours_of(visual)
         if uvs is not None:
-            given.setdefault("uvs", np.ascontiguousarray(uvs, np.float32))
+            values.setdefault("uvs", np.ascontiguousarray(uvs, np.float32))
         if colours:
-            given["attributes"] = {**colours, **given.get("attributes", {})}
-            given.setdefault("material", trimeshes.coloured(next(iter(colours))))
-        if "material" not in given and (found := trimeshes.material_of(visual)):
-            given["material"], emission = found
-            given.setdefault("emission", emission)
+            values["attributes"] = {**colours, **values.get("attributes", {})}
+            values.setdefault("material", trimeshes.coloured(next(iter(colours))))
+        if "material" not in values and (shown := trimeshes.material_of(visual)):
+            values["material"], emission = shown
+            values.setdefault("emission", emission)
         return cls(
             vertices=np.ascontiguousarray(geometry.vertices, np.float32),
             faces=np.ascontiguousarray(geometry.faces, np.uint32),
-            **given,
+            **values,
         )
 
 
@@ -160,7 +161,7 @@ class Sphere(Shape):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Spheres(Shape):
-    """Many spheres in one shape, as particles; each is met as a `sphere` is.
+    """Many spheres in a single shape, such as particles; rays meet each as a `sphere`.
 
     A `mesh_attribute` texture reads the attributes: the first row is the first sphere's.
     """
@@ -248,7 +249,7 @@ class SdfGrid(Shape):
     The front is where it is positive. Corners of triangles lie on that surface. Inside, a triangle
     is off it by at most .005 of a cell on a ball 11 cells across, and .09 at a sharp edge, with 2
     `pieces`; by a quarter of that with twice the pieces.
-    uv are 0 everywhere: a texture has one value all over it.
+    uv are 0 everywhere: a texture is constant over it.
     """
 
     values: ArrayLike = host(
@@ -264,7 +265,7 @@ class Group:
 
     shapes: placed by their own `to_world` in the group's space; name: for messages and files.
 
-    Raises SceneError for what is no shape, and for an instance: groups do not nest.
+    Raises SceneError for an object that is no shape, and for an instance: groups do not nest.
     """
 
     shapes: tuple[Shape, ...] = ()
@@ -274,9 +275,9 @@ class Group:
         object.__setattr__(self, "shapes", tuple(self.shapes))
         for i, shape in enumerate(self.shapes):
             if isinstance(shape, Instance) or not isinstance(shape, Shape):
-                found = "an instance" if isinstance(shape, Instance) else repr(shape)
+                kind = "an instance" if isinstance(shape, Instance) else repr(shape)
                 where = f"group {self.name!r}.shapes[{i}]"
-                raise SceneError(f"a group holds shapes, not {found}", where=where)
+                raise SceneError(f"a group holds shapes, not {kind}", where=where)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -294,7 +295,7 @@ class Instance(Shape):
         return self.group.shapes
 
     def check(self) -> None:
-        """Raise SceneError for what is no group."""
+        """Raise SceneError unless `group` is a group."""
         if not isinstance(self.group, Group):
             raise SceneError(f"must be a group, not {self.group!r}", where="instance.group")
 

@@ -1,4 +1,4 @@
-"""Values of parameters as `repr` shows them: in one line, for people."""
+"""Values of parameters as `repr` shows them: in a line, for people."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from clpt.spectra import Constant, Spectrum
 
-MATRIX = 16  # numbers that an array shows; of a larger one its shape
+MATRIX = 16  # most numbers that an array shows; a larger array shows its shape
 LONGEST = 60  # characters of a spectrum
 
 

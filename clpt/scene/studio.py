@@ -1,4 +1,4 @@
-"""The studio of a bare mesh: a camera that frames it, a backdrop, a warm light and a cool one."""
+"""The studio of a bare mesh: a camera that frames it, a backdrop, a warm and a cool light."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ UPS: dict[str, transforms.Matrix] = {"y": transforms.IDENTITY, "z": Z_UP}
 
 
 def parts(
-    things: Sequence[shapes.Shape],
+    scene_shapes: Sequence[shapes.Shape],
     *,
     camera: cameras.Camera | None = None,
     own_lights: Sequence[lights.Light] = (),
@@ -45,7 +45,7 @@ def parts(
     if up not in UPS:
         raise SceneError(f"{up!r} is none of {', '.join(UPS)}", where="up")
     turn = UPS[up]
-    low, high = world_bounds(things)
+    low, high = world_bounds(scene_shapes)
     centre, radius = middle(low, high)
     extra_shapes: list[shapes.Shape] = []
     extra_lights: list[lights.Light] = []
@@ -60,8 +60,8 @@ def parts(
     counts = {"shapes": len(extra_shapes), "lights": len(extra_lights)}
     added = {"camera": camera is None, **counts, "up": up}
     return {
-        "camera": camera or framing_camera(things, turn),
-        "shapes": [*things, *extra_shapes],
+        "camera": camera or framing_camera(scene_shapes, turn),
+        "shapes": [*scene_shapes, *extra_shapes],
         "lights": [*own_lights, *extra_lights],
         "film": integrators.Film(filter=integrators.Gaussian()),
         "extra": {"studio": added},
@@ -101,7 +101,7 @@ def _backdrop(floor: NDArray[np.float64], radius: float, up: transforms.Matrix) 
 
 
 def _distant_key(up: transforms.Matrix) -> lights.Light:
-    """Return a light about as bright as the square one, from the same side."""
+    """Return a light about as bright as the square light, from the same side."""
     return lights.Directional(direction=tuple(-direction(KEY_FROM, up)), irradiance=KEY_IRRADIANCE)
 
 

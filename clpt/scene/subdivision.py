@@ -15,13 +15,13 @@ from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.files import budget
 
-PER_TRIANGLE = 512  # bytes of memory for each of the finest, while they are made
+PER_TRIANGLE = 512  # bytes of memory for each of the finest triangles during subdivision
 
 
 def loop(points: Floats, faces: Integers, levels: int) -> tuple[Floats, Integers, Floats]:
     """Subdivide `levels` times; return limit points (n, 3), faces (m, 3) and limit normals (n, 3).
 
-    Raises SceneError for a mesh in which an edge has more than two triangles, or that gets too big.
+    Raises SceneError for an edge of more than two triangles, and for a mesh that becomes too large.
     """
     budget.check(PER_TRIANGLE * len(faces) * 4**levels, f"{levels} levels of subdivision")
     for _ in range(levels):
@@ -55,13 +55,13 @@ class _Edges:
         self.on_border[self.ends[self.border].reshape(-1)] = True
 
     def ring(self, points: Floats, borders: bool = False) -> Floats:
-        """The sum of each vertex's neighbours, or of those along the border."""
+        """Return the sum of each vertex's neighbours, or of its neighbours along the border."""
         ends = self.ends[self.border] if borders else self.ends
         total = np.zeros((self.count, points.shape[1]))
-        for one, other in ((0, 1), (1, 0)):
+        for near, other in ((0, 1), (1, 0)):
             for axis in range(points.shape[1]):
                 weights = points[ends[:, other], axis]
-                total[:, axis] += np.bincount(ends[:, one], weights, self.count)
+                total[:, axis] += np.bincount(ends[:, near], weights, self.count)
         return total
 
 
@@ -106,10 +106,10 @@ def _normals(points: Floats, faces: Integers, edges: _Edges) -> Floats:
         s += across[:, None] * points[at]
         t += along[:, None] * points[at]
         at = onward(vertex, at)
-    own = np.select(
+    weight = np.select(
         [edges.valence == 2, edges.valence == 3, edges.valence == 4], [-2.0, -1.0, -2.0]
     )
-    s += np.where(edges.on_border, own, 0.0)[:, None] * points
+    s += np.where(edges.on_border, weight, 0.0)[:, None] * points
     normals, flat = np.cross(s, t), _flat_normals(points, faces)
     weak = np.linalg.norm(normals, axis=1) < 1e-12
     normals[weak] = flat[weak]

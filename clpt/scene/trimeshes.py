@@ -26,14 +26,14 @@ class Camera(Protocol):
     fov: Sequence[float]
 
 
-def is_scene(thing: object) -> bool:
-    """Return whether a thing is a scene of trimesh."""
-    return hasattr(thing, "graph") and hasattr(thing, "geometry")
+def is_scene(value: object) -> bool:
+    """Return whether a value is a scene of trimesh."""
+    return hasattr(value, "graph") and hasattr(value, "geometry")
 
 
-def is_mesh(thing: object) -> bool:
-    """Return whether a thing is a mesh of trimesh."""
-    return hasattr(thing, "faces") and hasattr(thing, "vertices") and hasattr(thing, "visual")
+def is_mesh(value: object) -> bool:
+    """Return whether a value is a mesh of trimesh."""
+    return hasattr(value, "faces") and hasattr(value, "vertices") and hasattr(value, "visual")
 
 
 def colours_of(visual: object) -> dict[str, NDArray[np.float32]]:
@@ -54,56 +54,59 @@ def coloured(name: str) -> Material:
 def material_of(visual: object) -> tuple[Material, Light | None] | None:
     """Return the material of a mesh with uvs and its light, None where it has no material.
 
-    A `PBRMaterial` becomes what clpt.load makes of glTF, a `SimpleMaterial` a matt surface. Beside
-    an image the colour that trimesh gives to what has none counts as white.
+    A `PBRMaterial` becomes the same as in glTF, a `SimpleMaterial` a matt surface. Beside an image,
+    trimesh's default colour counts as white.
     """
-    given = _of(visual, "material", object)
-    if given is None:
+    material = _of(visual, "material", object)
+    if material is None:
         return None
-    name = _of(given, "name", str) or ""
-    if hasattr(given, "baseColorFactor"):
-        return _physical(given, name)
-    image, colour = _image(given, "image"), _levels(given, "diffuse", (0.5,) * 3)
+    name = _of(material, "name", str) or ""
+    if hasattr(material, "baseColorFactor"):
+        return _physical(material, name)
+    image, colour = _image(material, "image"), _levels(material, "diffuse", (0.5,) * 3)
     if image is not None and colour == UNSAID:
         colour = gltf_material.WHITE
     shown = gltf_material.tinted(image, colour[:3])
     return TwoSided(front=Diffuse(reflectance=shown, name=name)), None
 
 
-def _physical(given: object, name: str) -> tuple[Material, Light | None]:
+def _physical(material: object, name: str) -> tuple[Material, Light | None]:
     """Return the material and the light of a `PBRMaterial`."""
     numbers: dict[str, TexturedNumber] = {}
     for channel, parameter in (("b", "metallic"), ("g", "roughness")):
-        image = _image(given, "metallicRoughnessTexture", raw=True, channel=channel)
-        value = _number(given, f"{parameter}Factor", 1.0)
+        image = _image(material, "metallicRoughnessTexture", raw=True, channel=channel)
+        value = _number(material, f"{parameter}Factor", 1.0)
         numbers[parameter] = gltf_material.times(image, value)
-    base = _image(given, "baseColorTexture")
-    factor = _levels(given, "baseColorFactor", (1.0,) * 4)
+    base = _image(material, "baseColorTexture")
+    factor = _levels(material, "baseColorFactor", (1.0,) * 4)
     inner: Material = GltfSurface(
         base_color=gltf_material.tinted(base, factor[:3]), metallic=numbers["metallic"],
         roughness=numbers["roughness"], name=name,
     )  # fmt: skip
-    inner = gltf_material.with_normals(inner, _image(given, "normalTexture", raw=True))
-    cutoff = _number(given, "alphaCutoff", gltf_material.CUTOFF)
-    mode, alpha = _of(given, "alphaMode", str) or "OPAQUE", (*factor, 1.0)[3]
+    inner = gltf_material.with_normals(inner, _image(material, "normalTexture", raw=True))
+    cutoff = _number(material, "alphaCutoff", gltf_material.CUTOFF)
+    mode, alpha = _of(material, "alphaMode", str) or "OPAQUE", (*factor, 1.0)[3]
     share = gltf_material.opacity(mode, alpha, base, cutoff)
-    both = bool(_of(given, "doubleSided", (bool, np.bool_)))
-    return gltf_material.finished(inner, share, _glow(given, both), both=both)
+    both = bool(_of(material, "doubleSided", (bool, np.bool_)))
+    return gltf_material.finished(inner, share, _glow(material, both), both=both)
 
 
-def _glow(given: object, both: bool) -> Area | None:
+def _glow(material: object, both: bool) -> Area | None:
     """Return the light of a material that is emissive."""
-    image, factor = _image(given, "emissiveTexture"), _levels(given, "emissiveFactor", (0.0,) * 3)
+    image, factor = (
+        _image(material, "emissiveTexture"),
+        _levels(material, "emissiveFactor", (0.0,) * 3),
+    )
     if max(factor) == 0.0:
         return None
     return Area(radiance=gltf_material.tinted(image, factor[:3]), two_sided=both)
 
 
 def _image(
-    given: object, name: str, *, raw: bool = False, channel: str = "luminance"
+    material: object, name: str, *, raw: bool = False, channel: str = "luminance"
 ) -> Bitmap | None:
     """Return the image of a material as a texture, None where it has none."""
-    image = _of(given, name, object)
+    image = _of(material, name, object)
     if image is None:
         return None
     if hasattr(image, "convert") and _of(image, "mode", str) not in ("L", "RGB", "RGBA"):
@@ -112,28 +115,28 @@ def _image(
     return Bitmap(image=np.asarray(image), raw=raw, channel=channel)
 
 
-def _levels(given: object, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
+def _levels(material: object, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
     """Return a colour of a material: linear, whole numbers of 255 or floats to 1."""
-    value = _of(given, name, object)
+    value = _of(material, name, object)
     if value is None:
         return default
     numbers = np.asarray(value)
     numbers = numbers / 255.0 if numbers.dtype.kind in "iu" else numbers.astype(float)
-    return tuple(float(one) for one in np.clip(numbers, 0.0, None))
+    return tuple(float(level) for level in np.clip(numbers, 0.0, None))
 
 
-def _number(given: object, name: str, default: float) -> float:
+def _number(material: object, name: str, default: float) -> float:
     """Return a number of a material."""
-    value = _of(given, name, object)
+    value = _of(material, name, object)
     return default if value is None else scalars.number(value, f"material.{name}")
 
 
 _T = TypeVar("_T")
 
 
-def _of(thing: object, name: str, kind: type[_T] | tuple[type[_T], ...]) -> _T | None:
+def _of(owner: object, name: str, kind: type[_T] | tuple[type[_T], ...]) -> _T | None:
     """Return an attribute where it is of a type, else None."""
-    value = getattr(thing, name, None)
+    value = getattr(owner, name, None)
     return value if isinstance(value, kind) else None
 
 

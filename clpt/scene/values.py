@@ -1,7 +1,7 @@
 """Types of the values that parameters of a scene accept, for type checkers.
 
-The dataclasses convert what they are given: a colour becomes a `clpt.spectra.Spectrum`. So a
-parameter that was read back has one of these types too.
+The dataclasses convert their arguments: a colour becomes a `clpt.spectra.Spectrum`. So the value of
+a parameter has such a type too.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, Protocol, TypeAlias
 from numpy.typing import NDArray
 
 from clpt.images.spectral_exr import SpectralImage
-from clpt.scene.params import Texture
+from clpt.scene.texture_values import Texture
 from clpt.spectra import Spectrum
 
 

@@ -1,4 +1,4 @@
-"""Where a scene is seen from: poses of cameras, orbits around what there is, surroundings."""
+"""Viewpoints: poses of cameras, orbits around a scene, surroundings."""
 
 from __future__ import annotations
 
@@ -77,8 +77,9 @@ def up_of(scene: Scene) -> transforms.Matrix:
 def orbiting(scene: Scene, azimuth: float, elevation: float, distance: float = 1.0) -> Perspective:
     """Return a camera that looks at the middle of a scene and sees all of it.
 
-    azimuth [degrees]: 0 is in front, 90 on the right; elevation [degrees]: 90 is above; distance:
-    in those that frame the whole scene. Raises SceneError where the scene is too large.
+    azimuth [degrees]: 0 is in front, 90 on the right; elevation [degrees]: 90 is above; distance: a
+    factor on the distance that frames the whole scene. Raises SceneError where the scene is too
+    large.
     """
     around, above = math.radians(azimuth), math.radians(elevation)
     aside, ahead = math.sin(around), math.cos(around)
@@ -93,7 +94,7 @@ def surrounded(scene: Scene, image: str | Path, rotation: float = 0.0) -> Scene:
     """Return a scene in an image, without its own surroundings and without the studio's light.
 
     rotation: of the image about the vertical [degrees]. A 1 in the image shows 1 on a screen, so
-    the film's `display_exposure` is taken off. Raises SceneError for what is no image.
+    the film's `display_exposure` is taken off. Raises SceneError for a file that is no image.
     """
     images.check_input(Path(image))
     studio = scene.extra.get("studio", {})

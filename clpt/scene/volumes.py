@@ -1,4 +1,4 @@
-"""Numbers on a grid in a box: what a file of volumes holds, and what media are made of."""
+"""Numbers on a grid in a box, as in files of volumes and in media."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Volume:
 
 
 def check_density(values: np.ndarray, where: str) -> None:
-    """Raise SceneError for numbers that no density can be."""
+    """Raise SceneError for numbers that are negative or not finite."""
     if values.dtype.kind not in "fui":
         raise SceneError(f"must hold numbers, not {values.dtype}", where=where)
     low, high = float(values.min()), float(values.max())
@@ -40,8 +40,10 @@ def check_density(values: np.ndarray, where: str) -> None:
 
 
 def check_volume(values: object, where: str, colours: bool = False) -> None:
-    """Raise SceneError for what is no array (nx, ny, nz), with three `colours` (nx, ny, nz, 3), of
-    numbers that are finite and not negative. Arrays on a device are not read."""
+    """Raise SceneError unless values are (nx, ny, nz), or (nx, ny, nz, 3) for `colours`.
+
+    The numbers must be finite and not negative. Arrays on a device are not read.
+    """
     axes, shown = ((3,), "(nx, ny, nz, 3)") if colours else ((), "(nx, ny, nz)")
     if not hasattr(values, "shape"):
         raise SceneError("must be an array with the axes x, y and z", where=where)
@@ -67,7 +69,7 @@ def resampled(
     size = np.array(values.shape[:3])
     axes = [(np.arange(n) + 0.5) / n for n in shape]
     matrix = np.linalg.inv(np.asarray(to_world, float)) @ np.asarray(onto, float)
-    made = np.empty((*shape, *values.shape[3:]), np.float32)
+    points = np.empty((*shape, *values.shape[3:]), np.float32)
     y, z = (axis.ravel() for axis in np.meshgrid(axes[1], axes[2], indexing="ij"))
     for i, x in enumerate(axes[0]):  # a slice at a time: grids may be large
         unit = np.stack([np.full_like(y, x), y, z], axis=1) @ matrix[:3, :3].T + matrix[:3, 3]
@@ -80,5 +82,5 @@ def resampled(
             weight = np.where(corner, share, 1.0 - share).prod(axis=1) * inside
             index = tuple(np.minimum(low + corner, size - 1).T)
             sums += weight.reshape(-1, *[1] * (values.ndim - 3)) * values[index]
-        made[i] = sums.reshape(made.shape[1:])
-    return made
+        points[i] = sums.reshape(points.shape[1:])
+    return points

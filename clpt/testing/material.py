@@ -9,11 +9,12 @@ import numpy as np
 
 from clpt import device, spectra
 from clpt.render.records import custom_materials
-from clpt.render.records.parameter_words import ORDERS_WORDS
+from clpt.render.records.materials import ORDERS_WORDS
 from clpt.scene import roles
 from clpt.scene.materials import LEAVES, Material
-from clpt.scene.params import Texture, device_params, fields_of
+from clpt.scene.params import device_params, fields_of
 from clpt.scene.roles import Param, Role, Spectral
+from clpt.scene.textures import Texture
 from clpt.testing import checks
 from clpt.testing.probe import LAMBDAS, Probe
 from clpt.testing.settings import settings, white

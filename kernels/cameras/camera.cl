@@ -23,7 +23,7 @@
  *
  * film: position on the film, x and y in [0, 1], y down; lens: a point of the unit square;
  * index: of the glass at the hero's wavelength, for which alone the ray then holds.
- * The struct is a uniform Record in clpt/render/records/camera_rows.py.
+ * The struct is a uniform Record in clpt/render/records/camera.py.
  */
 typedef struct {
     vec3 o, d; /* [m]; unit length. The origin lies on the near plane. */

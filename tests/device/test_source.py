@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from clpt.device.source import Part, assemble, kernels_folder
@@ -167,15 +169,37 @@ def test_an_include_inside_an_if_is_refused():
         assemble("a", {"a": '#ifdef X\n#include "b"\n#endif', "b": ""})
 
 
-def test_a_file_has_two_halves() -> None:
-    """An include takes the step, or the twin that does nothing, with the rows of the file."""
-    step = assemble("a", {"a": '#include "spectra/hero_alone.cl"'}, library=True)
-    twin = assemble("a", {"a": '#include "spectra/hero_alone.cl#none"'}, library=True)
-    assert "Twin" not in step.text and "LOBE_DISPERSE" not in twin.text
-    text = (kernels_folder() / "spectra/hero_alone.cl").read_text("utf-8").splitlines()
-    rows = twin.text.splitlines()
-    at = next(i for i, row in enumerate(rows) if "hero_goes_alone" in row)
-    file, line = twin.location(at + 1)
-    assert file == "spectra/hero_alone.cl" and line is not None and text[line - 1] == rows[at]
-    with pytest.raises(KernelBuildError, match="no file"):
-        assemble("a", {"a": '#include "core/lanes.cl#none"'})
+def test_an_include_takes_a_section(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """It takes a step or the step's twin; the shared text of the steps comes once, before both."""
+    rows = [
+        "/* Steps of a trip. */", "typedef int Trip;", "", "/* Step walk: on foot. */",
+        "void walk(Trip t) { slow(t); }", "", "/* Twin, at home. */", "void walk(Trip t) {}", "",
+"/* Step ride: on a horse. */", "void ride(Trip t) {}",
+    ]  # fmt: skip
+    (tmp_path / "trip.cl").write_text("\n".join(rows))
+    monkeypatch.setattr("clpt.device.source.kernels_folder", lambda: tmp_path)
+    source = assemble(
+        "a", {"a": '#include "trip.cl#walk#none"\n#include "trip.cl#ride"'}, library=True
+    )
+    assert source.text.count("typedef int Trip;") == 1 and "slow" not in source.text
+    assert "Twin" not in source.text
+    text = source.text.splitlines()
+    for wanted in (rows[7], rows[10]):
+        assert source.location(text.index(wanted) + 1) == ("trip.cl", rows.index(wanted) + 1)
+    for name in ("trip.cl#run", "trip.cl#ride#none", "trip.cl#none"):
+        with pytest.raises(KernelBuildError, match="no file"):
+            assemble("a", {"a": f'#include "{name}"'})
+
+
+@pytest.mark.parametrize("step", ["", "/* Step. */\n"])
+def test_a_file_has_a_step_without_a_name(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, step: str
+) -> None:
+    begin = f"/* A trip. */\n#define FAR 1\n{step}"
+    text = "void walk(void) { FAR; }\n\n/* Twin, at home. */\nvoid walk(void) {}\n"
+    (tmp_path / "trip.cl").write_text(begin + text)
+    monkeypatch.setattr("clpt.device.source.kernels_folder", lambda: tmp_path)
+    taken = assemble("a", {"a": '#include "trip.cl"'}, library=True).text
+    twin = assemble("a", {"a": '#include "trip.cl#none"'}, library=True).text
+    assert "FAR; }" in taken and "walk(void) {}" not in taken
+    assert "walk(void) {}" in twin and ("#define FAR" in twin) == bool(step)

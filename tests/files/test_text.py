@@ -9,7 +9,7 @@ from clpt.errors import SceneError
 from clpt.files import text
 from clpt.formats import load
 from clpt.formats.ies import read as read_ies
-from clpt.formats.meshes import strands
+from clpt.formats.meshes.spheres_curves import read_strands
 
 WORD = "größe 1\n"
 
@@ -53,7 +53,7 @@ READERS = {
     "a.json": (JSON, lambda path: load(path).shapes[0].name, "größe"),
     "a.spd": ("# größe\n400 1\n700 2\n", lambda path: spectra.read_table(path).values[1], 2),
     "a.ies": (IES, lambda path: read_ies(path).candela[0, 0], 5),
-    "a.txt": ("0 0 0 1\n1 0 0 1\n", lambda path: strands.read(path)["points"][1, 0], 1),
+    "a.txt": ("0 0 0 1\n1 0 0 1\n", lambda path: read_strands(path)["points"][1, 0], 1),
 }
 
 
@@ -84,7 +84,7 @@ def test_xml_has_the_encoding_that_it_declares(tmp_path, encoding):
 )
 def test_readers_refuse_decimal_commas(tmp_path, name, content, line):
     (tmp_path / name).write_text(content)
-    read = {"a.txt": strands.read, "a.spd": spectra.read_table}.get(name, load)
+    read = {"a.txt": read_strands, "a.spd": spectra.read_table}.get(name, load)
     with pytest.raises(
         SceneError, match="write numbers with a decimal point, not a comma"
     ) as caught:

@@ -535,11 +535,11 @@ def _result(path: Path, memory: int, seconds: int) -> dict[str, str]:
 
 def main() -> None:
     """Read the files that are named, each in a process of its own."""
+    import clpt.formats.framing
     import clpt.formats.gltf
     import clpt.formats.mitsuba
     import clpt.formats.native
     import clpt.formats.pbrt
-    import clpt.formats.volumes.framing
     import clpt.render.flow.scene_to_tables  # noqa: F401
 
     memory, seconds = map(int, sys.argv[1:3])

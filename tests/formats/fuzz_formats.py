@@ -29,7 +29,7 @@ import numpy as np
 
 from clpt import images, lenses, measured, spectra
 from clpt.formats import eulumdat, ies, load, volumes
-from clpt.formats.meshes import mesh, mtl, particles, strands
+from clpt.formats.meshes import mesh, mtl, spheres_curves
 from clpt.formats.mitsuba.serialized import read as read_serialized
 from clpt.images import read_stored
 from clpt.images.spectral_exr import SpectralImage
@@ -549,12 +549,12 @@ FORMATS: dict[str, Format] = {
     "serialized": Format(
         ".serialized", lambda: [_serialized()], serialized, lambda path: read_serialized(path, 0)
     ),
-    "strands": Format(".txt", lambda: [STRANDS], words, strands.read),
+    "strands": Format(".txt", lambda: [STRANDS], words, spheres_curves.read_strands),
     "spheres": Format(
         ".npz",
         lambda: [_made("a.npz", lambda p: np.savez(p, centers=np.ones((3, 3)), radii=np.ones(3)))],
         npz,
-        particles.read,
+        spheres_curves.read_spheres,
     ),
     "densities npy": Format(
         ".npy",

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from clpt.cli import cli as main
 from clpt.errors import SceneError
-from clpt.formats import blockers, errors_of, load
+from clpt.formats import errors_of, load, reading
 
 XML = """<scene version="3.0.0">
 <sensor type="fisheye"/>
@@ -70,9 +70,9 @@ def test_a_file_without_errors_has_none(tmp_path):
 
 
 def test_hostile_files_have_a_limited_list(tmp_path):
-    many = "".join(f'<bsdf type="a{i}"/>' for i in range(3 * blockers.MOST))
+    many = "".join(f'<bsdf type="a{i}"/>' for i in range(3 * reading.MOST))
     (tmp_path / "a.xml").write_text(f'<scene version="3.0.0">{many}</scene>')
-    assert len(errors_of(tmp_path / "a.xml")) == blockers.MOST + 1
+    assert len(errors_of(tmp_path / "a.xml")) == reading.MOST + 1
 
 
 def test_other_formats_have_their_first(tmp_path):

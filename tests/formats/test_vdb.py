@@ -17,7 +17,7 @@ import pytest
 
 from clpt.errors import SceneError
 from clpt.formats import volumes
-from clpt.formats.volumes import packing, vdb
+from clpt.formats.volumes import sparse, vdb
 
 LOW = np.array([-3, 5, 126])  # the index of the lowest value
 VALUES = np.random.default_rng(1).random((6, 4, 9)).astype(np.float32)
@@ -267,7 +267,7 @@ def test_every_byte_may_be_wrong(written) -> None:
 
 def test_blosc_that_lies() -> None:
     blosc = pytest.importorskip("blosc")
-    unpack = packing.blosc_unpacker()
+    unpack = sparse.blosc_unpacker()
     good = blosc.compress(bytes(4096), typesize=4)
     assert unpack(good, 4096) == bytes(4096)
     for data in (b"", good[:10], good[:-1], good[:4] + struct.pack("<I", 1 << 30) + good[8:]):

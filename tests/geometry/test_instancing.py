@@ -15,7 +15,7 @@ from clpt.cli.info import info
 from clpt.errors import SceneError
 from clpt.formats.native import save
 from clpt.geometry import instancing
-from clpt.geometry.tessellate import tessellate
+from clpt.geometry.analytic import tessellate
 from clpt.geometry.triangles import triangulate
 from clpt.records import INSTANCE, SHAPE
 from clpt.render.flow.scene_to_tables import lower

@@ -12,7 +12,7 @@ from clpt.errors import SceneError
 from clpt.render.camera.encode import encode_camera
 from clpt.render.flow import stages
 from clpt.render.records import CameraFeatures
-from clpt.render.records import camera_rows as camera_records
+from clpt.render.records import camera as camera_records
 from clpt.scene import cameras as scene
 from tests.kernels.scene_harness import SceneProbe
 from tests.rotation import rotating

@@ -15,8 +15,8 @@ from clpt.records import LIGHT
 from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights import tree as light_tree
 from clpt.render.lights.tree_nodes import Lobes
-from clpt.render.records import light_rows as light_records
-from clpt.render.records.light_rows import LINE, WIDTH
+from clpt.render.records import lights as light_records
+from clpt.render.records.lights import LINE, WIDTH
 from clpt.scene.lights import Area, Constant, Directional, Goniometric, Point, Projector, Spot
 from clpt.scene.shapes import Disk, Mesh, Rectangle, Sphere
 from tests.kernels.harness import assert_lanes_agree

@@ -7,43 +7,42 @@ from collections import defaultdict
 from fnmatch import fnmatch
 from pathlib import Path
 
-from clpt.device.source import TWIN, kernels_folder
+from clpt.device.source import TWIN, kernels_folder, sections
 from clpt.render.flow import flags, programs
 from clpt.scene import KINDS
 
 ALTERNATIVES = (  # files, of each row of which a program has one at most
-    ("bvh/*_keyed.cl",),
-    ("transport/mis_merging_area*.cl",),
-    ("transport/mis_pdf*.cl",),
-    ("media/grid_collision*.cl",),
-    ("bvh/query*.cl",),
-    ("bvh/shapes_*.cl",),
-    ("bvh/mask8*.cl",),
-    ("bvh/wide8_levels.cl", "bvh/wide8_waiting.cl"),
+    ("bvh/*.cl#keyed",),
+    ("transport/mis_ratio.cl#area*",),
+    ("materials/bsdf.cl#*mis_pdf",),
+    ("media/grid_flight.cl#collision*",),
+    ("bvh/query.cl#*",),
+    ("bvh/shapes.cl#*",),
+    ("bvh/mask8.cl*",),
+    ("bvh/wide8_stack.cl*",),
     ("core/spectrum_*.cl",),
     ("core/texels_*.cl",),
     ("film/exposure.cl", "film/splatting.cl"),
     ("integrator/both.cl", "integrator/p*.cl", "integrator/whitted.cl"),
-    ("materials/boundary_*.cl",),
-    ("materials/thin_film*.cl",),
-    ("materials/boundary_bare.cl", "materials/layers_*.cl"),
-    ("materials/shading_frame.cl*", "media/phase_frame.cl"),
-    ("lights/kept_*.cl",),
+    ("materials/boundary.cl#?*",),
+    ("materials/film_stack.cl#?*",),
+    ("materials/shading_frame.cl*", "media/phase.cl#frame"),
+    ("lights/receiver.cl#kept*",),
     ("cameras/first_ray*.cl",),
-    ("media/vertex_bodies.cl", "media/vertex_media.cl"),
-    ("media/vertex_bodies_ways.cl", "media/vertex_media_ways.cl"),
-    ("media/vertex_dims.cl", "media/vertex_media_ways.cl#none"),
+    ("media/bodies.cl#vertex", "media/vertex_media.cl*"),
+    ("media/vertex_ways.cl#bodies", "media/vertex_ways.cl#media"),
+    ("media/vertex_ways.cl#dims", "media/vertex_ways.cl#media#none"),
     ("transport/guiding/guide.cl", "transport/guiding/guided_vertex.cl#none"),
-    ("transport/guiding/at_*.cl",),
-    ("materials/pair*.cl",),
+    ("transport/guiding/guide.cl#at_*",),
+    ("materials/bsdf.cl#*pair*",),
     ("samplers/pixel_sampler*.cl",),
-    ("transport/shadow_ray*.cl",),
+    ("transport/shadow_ray.cl*",),
     ("samplers/kinds/independent.cl", "core/sobol.cl"),
     ("integrator/steps/escapes*.cl",),
     ("integrator/steps/met_weight*.cl",),
     ("spectra/density.cl", "spectra/visible.cl", "spectra/rgb_read.cl"),
     ("spectra/rgb*.cl", "spectra/spectral*.cl"),
-    ("shapes/corner_rows*.cl",),
+    ("shapes/triangle.cl#*_rows",),
     ("tracing/curve_others*.cl",),
     ("tracing/instances_*.cl",),
     ("tracing/shape_rows_m*.cl", "tracing/shape_rows_single.cl"),
@@ -73,14 +72,10 @@ def defined(text: str) -> dict[str, set[str]]:
 
 
 def files() -> dict[str, str]:
-    """The texts of all kernel files by their paths in the folder; twins apart."""
-    root, texts = kernels_folder(), {}
-    for path in sorted(root.rglob("*.cl")):
-        name = path.relative_to(root).as_posix()
-        texts[name], begins, twin = path.read_text("utf-8").partition("\n/* Twin, ")
-        if begins:
-            texts[f"{name}{TWIN}"] = begins[1:] + twin
-    return texts
+    """The texts of all sections of kernel files by their names."""
+    root = kernels_folder()
+    names = sorted(path.relative_to(root).as_posix() for path in root.rglob("*.cl"))
+    return {f"{n}{end}": part.text for n in names for end, part in sections(root, n).items()}
 
 
 def meet(first: str, second: str, texts: dict[str, str]) -> bool:

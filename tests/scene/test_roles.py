@@ -12,12 +12,12 @@ from clpt import SceneError
 from clpt.formats.native import forms
 from clpt.render.materials import cases as parameters
 from clpt.render.materials import encoder
-from clpt.render.records import parameter_words
+from clpt.render.records.materials import MEMBERS
 from clpt.scene import materials, roles, textures
 from clpt.testing import settings
 
 TABLES = {
-    "members": parameter_words.MEMBERS,
+    "members": MEMBERS,
     "encodings": encoder.ENCODINGS,
     "forms": {role: forms.FORMS.get(role.name) for role in roles.DEVICE},
     # layers are drawn with their material; a table over angles has a kind of its own to check it

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ...choices import MOST_SAMPLES
-from ...render.pictures import DevicePictures
 from ...render.progress import Progress
+from ...render.resumable import ResumableRenderer
 from ...render.wavefront.wavefront import Counts
 from ..opening import DEVICE_SECONDS
 
@@ -32,7 +32,7 @@ class End:
 
 
 def render_samples(
-    renderer: DevicePictures,
+    renderer: ResumableRenderer,
     end: End,
     show: Callable[[Progress], None],
     after_pass: Callable[[], None] = lambda: None,

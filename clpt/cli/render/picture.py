@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ...errors import ClusterError
 from ...render.film.layer_channels import channels_of
 from ...render.film.saved_film import SavedFilm
-from ...render.pictures import DevicePictures
 from ...render.progress import Progress
+from ...render.resumable import ResumableRenderer
 from ...scene import Scene
 from ..display import Display, device_names
 from ..files import checkpoints, outputs
@@ -94,7 +94,7 @@ class _Former:
             first, end = job.until.numbers or (0, None)
             checkpoints.check(self.film, self.path, scene, first, end, gaps=gaps)
 
-    def go_on(self, renderer: DevicePictures, end: int | None, shown: Display) -> int | None:
+    def go_on(self, renderer: ResumableRenderer, end: int | None, shown: Display) -> int | None:
         """Give the film to a renderer; return the end of its samples, see `Until.end`."""
         if self.film is None:
             return end
@@ -150,7 +150,7 @@ class _Picture:
     def __init__(
         self,
         job: Job,
-        renderer: DevicePictures,
+        renderer: ResumableRenderer,
         former: _Former,
         shown: Display,
         factory: RendererFactory,

@@ -15,10 +15,11 @@ from ... import images
 from ...arrays import Floats32
 from ...geometry import analytic
 from ...geometry.lamps import plainly_lit
-from ...render.pictures import DevicePictures
+from ...render.resumable import ResumableRenderer
 from ...scene import Scene
 from ...scene.lights import Light, PoweredLamp
 from ...scene.shapes import Shape
+from ...scene.texture_values import mean
 from ...spectra import RGBIlluminant, Spectrum, watts
 from ..options.grading import Grading, for_screens
 from ..process import terminal
@@ -37,7 +38,7 @@ WHITE = watts(RGBIlluminant(1.0, 1.0, 1.0))  # of an emission of 1 [nm]
 ADVICE = "docs/lighting.md has a list: Why is it black?"
 
 
-def header(name: str, renderer: DevicePictures, where: str) -> str:
+def header(name: str, renderer: ResumableRenderer, where: str) -> str:
     """Return the line with the scene, its size, mode, integrator and device."""
     film, asked, chosen = renderer.scene.film, renderer.scene.integrator.kind, renderer.stats
     how = asked if asked == chosen.integrator else f"{asked} -> {chosen.integrator}"
@@ -45,7 +46,7 @@ def header(name: str, renderer: DevicePictures, where: str) -> str:
     return "  ".join((name, size, film.mode, how, where))
 
 
-def ending(renderer: DevicePictures, end: End, seconds: float) -> str:
+def ending(renderer: ResumableRenderer, end: End, seconds: float) -> str:
     """Return the line that says how far the render came, in so many seconds of all."""
     mean = renderer.counts.samples / renderer._wavefront.paths.pixels
     samples = f"{mean:.0f}" if mean >= 10 or mean == int(mean) else f"{mean:.2g}"
@@ -55,7 +56,7 @@ def ending(renderer: DevicePictures, end: End, seconds: float) -> str:
     return f"stopped at {samples}{of} spp, with the picture so far; {seconds:.1f} s in all"
 
 
-def before(renderer: DevicePictures, loading: float) -> None:
+def before(renderer: ResumableRenderer, loading: float) -> None:
     """Print sizes of the encoded scene, and times; loading: seconds for its file."""
     first, stats = renderer._wavefront, renderer.stats
     for on in renderer.devices:
@@ -93,7 +94,7 @@ def before(renderer: DevicePictures, loading: float) -> None:
         _line(label, f"{stats.seconds[name]:.2f} s")
 
 
-def after(renderer: DevicePictures) -> None:
+def after(renderer: ResumableRenderer) -> None:
     """Print the time of the first sample, shares of devices, and stages of the first device."""
     from ...cluster.multi_renderer import MultiRenderer  # here: a single device has no use for it
 
@@ -128,18 +129,20 @@ def _bytes(n: int) -> str:
     return f"{n / 2**20:.1f} MiB" if n >= 2**20 else f"{n / 2**10:.1f} KiB"
 
 
-def exposure_found(renderer: DevicePictures) -> float:
+def exposure_found(renderer: ResumableRenderer) -> float:
     """Return the stops of `--exposure auto`."""
     return images.auto_exposure(_pixels(renderer)) - renderer.scene.film.display_exposure
 
 
-def display_exposure(renderer: DevicePictures) -> str:
+def display_exposure(renderer: ResumableRenderer) -> str:
     """Return a sentence on the exposure that the scene's film has for screens, "" for none."""
     stops = renderer.scene.film.display_exposure
     return f"exposure {stops:+.1f} stops, of the scene: film.display_exposure" if stops else ""
 
 
-def remarks(renderer: DevicePictures, grading: Grading, targets: tuple[Path, ...]) -> Iterator[str]:
+def remarks(
+    renderer: ResumableRenderer, grading: Grading, targets: tuple[Path, ...]
+) -> Iterator[str]:
     """Yield sentences on a picture that shows little, with a remedy."""
     scene, pixels = renderer.scene, _pixels(renderer)
     display = scene.film.display_exposure
@@ -158,7 +161,7 @@ def remarks(renderer: DevicePictures, grading: Grading, targets: tuple[Path, ...
     yield from _outshone(scene)
 
 
-def _pixels(renderer: DevicePictures) -> Floats32:
+def _pixels(renderer: ResumableRenderer) -> Floats32:
     """The picture so far in linear Rec. 709, (h, w, c)."""
     colours = renderer.picture()
     return images.to_rec709(images.straight(colours), renderer.scene.film.output_space)
@@ -186,7 +189,7 @@ def _outshone(scene: Scene) -> Iterator[str]:
 def _watts(lamp: Light, look: Look) -> float:
     """The emission of a lamp from 360 to 830 nm, such as its intensity [W/sr]."""
     values = [
-        watts(value) if isinstance(value, Spectrum) else WHITE * light_power.brightness(value, look)
+        watts(value) if isinstance(value, Spectrum) else WHITE * mean(value, look)
         for value in emissions_of(lamp).values()
     ]
     return float(np.mean(values)) if values else 0.0
@@ -200,7 +203,7 @@ def _shape_watts(shape: Shape, look: Look) -> float:
     return _watts(emission, look) * emission.extent(analytic.area(shape))
 
 
-def refusals(renderer: DevicePictures) -> list[str]:
+def refusals(renderer: ResumableRenderer) -> list[str]:
     """Return a sentence for each fault of samples or pixels of a render."""
     sentences = []
     if rejected := renderer.counts.rejected:

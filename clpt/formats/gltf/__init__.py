@@ -10,22 +10,18 @@ from typing import Any
 
 from clpt.choices import Missing
 from clpt.errors import SceneError, nearest
+from clpt.formats import framing
 from clpt.formats.gltf import (
     animation,
-    cameras,
+    cameras_lights,
     checks,
     draco,
-    lights,
     materials,
     meshes,
     meshopt,
-    motion,
     nodes,
-    pointers,
-    variants,
-)  # fmt: skip
+)
 from clpt.formats.gltf.document import Document, Scale
-from clpt.formats.meshes import framing
 from clpt.formats.meshes.mesh import MeshFile
 from clpt.scene import Scene
 from clpt.scene.shapes import Mesh
@@ -35,25 +31,25 @@ VARIABLES = (
 )  # fmt: skip
 SUPPORTED = (
     draco.NAME, *meshopt.EXTENSIONS, "KHR_mesh_quantization", "KHR_texture_transform",
-    "EXT_texture_webp", lights.NAME, meshes.INSTANCING, *materials.EXTENSIONS,
-    pointers.NAME,
+    "EXT_texture_webp", cameras_lights.LIGHTS, meshes.INSTANCING, *materials.EXTENSIONS,
+    animation.POINTER,
     "FB_ngon_encoding",  # says which triangles make a polygon: the picture is the same
 )  # fmt: skip
-VARIANTS = variants.NAME
+VARIANTS = materials.VARIANTS
 
 __all__ = ["load", "read_mesh"]
 
 
 def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
-    """Read a glTF file; a camera or light that it lacks is added, as for a bare mesh.
+    """Read a glTF file; a missing camera or light is added, as for a bare mesh.
 
     variables: `time` [s] of an animation (the first, or the `animation` of that number or name);
     without it nodes have their own transforms, and materials, lights and cameras their own numbers.
     `camera` and `scene` choose by number or name.
     `shutter` [s] is how long light comes to the film from `time` on, while nodes move.
-    `variant` chooses among material variants. `lumens`: of a watt, as clpt.formats.gltf.lights has
-    it. `multiple_scattering`: 1 keeps what facets reflect to each other.
-    missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
+    `variant` chooses among material variants. `lumens`: of a watt, see cameras_lights.py.
+    `multiple_scattering`: 1 keeps the light that facets reflect to each other.
+    missing: see clpt.load. Raises SceneError with the JSON path of the wrong value.
     """
     if "shutter" in variables:
         length = _seconds(path, variables.pop("shutter"), "shutter")
@@ -61,21 +57,27 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
             raise SceneError(f"the shutter {length:g} s must be from zero", file=path)
         time = _seconds(path, variables.pop("time", 0.0))
         if length > 0.0:
-            return motion.between(lambda t: load(path, missing, **variables, time=t), time, length)
+            return animation.scene_over_shutter(
+                lambda t: _load(path, missing, {**variables, "time": t}), time, length
+            )
         variables["time"] = time
+    return _load(path, missing, variables)
+
+
+def _load(path: Path, missing: Missing, variables: dict[str, Any]) -> Scene:
     document, graph = _open(path, variables, missing)
-    chosen = cameras.chosen(graph, _text(variables.get("camera")))
+    chosen = cameras_lights.chosen_camera(graph, _text(variables.get("camera")))
     shapes = meshes.shapes(graph)
     if not shapes:
         document.warn("holds no triangles")
     scene = framing.show(
         shapes,
         camera=chosen[0] if chosen else None,
-        own_lights=lights.lights_of(graph),
+        own_lights=cameras_lights.lights_of(graph),
         file=path,
     )
     scene.warnings = document.warnings
-    scene.extra["cameras"] = cameras.descriptions(graph)
+    scene.extra["cameras"] = cameras_lights.camera_descriptions(graph)
     scene.extra["animations"] = animation.descriptions(document)
     scene.extra |= _provenance(document)
     film = dataclasses.replace(scene.film, display_exposure=document.scale.stops)
@@ -89,14 +91,14 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
 def _provenance(document: Document) -> dict[str, Any]:
     """Return the names of several scenes, and who made the file, for people."""
     scenes = document.root.children("scenes")
-    found: dict[str, Any] = {"scenes": [], "asset": {}}
+    provenance: dict[str, Any] = {"scenes": [], "asset": {}}
     with suppress(SceneError):  # texts that are none harm no picture
         if len(scenes) > 1:
-            found["scenes"] = [scene.text("name", str(i)) for i, scene in enumerate(scenes)]
+            provenance["scenes"] = [scene.text("name", str(i)) for i, scene in enumerate(scenes)]
     for key in ("generator", "copyright"):
         with suppress(SceneError):
-            found["asset"] |= {key: document.root.needed("asset").text(key)}
-    return found
+            provenance["asset"] |= {key: document.root.needed("asset").text(key)}
+    return provenance
 
 
 def read_mesh(path: Path) -> MeshFile:
@@ -118,7 +120,7 @@ def _open(
         advice = nearest(unknown[0], VARIABLES)
         raise SceneError(f"glTF has no variable {unknown[0]!r}{advice}", file=path)
     document.multiple_scattering = _number(path, variables, "multiple_scattering", 0.0, 0.0, 1.0)
-    document.variant = variants.chosen(document, _text(variables.get("variant")))
+    document.variant = materials.chosen_variant(document, _text(variables.get("variant")))
     _check_extensions(document)
     checks.check(document)
     pose: nodes.Pose = {}
@@ -126,10 +128,10 @@ def _open(
         chosen = _text(variables.get("animation"))
         pose = animation.pose(document, chosen, _seconds(path, variables.get("time", 0.0)))
     graph = nodes.graph(document, _text(variables.get("scene")), pose)
-    lumens = lights.lumens_of(document)
+    lumens = cameras_lights.lumens_of(document)
     if "lumens" in variables:
         lumens = _number(path, variables, "lumens", 1.0, 1e-6, 1e6)
-    document.scale = lights.scale_of(graph, lumens)
+    document.scale = cameras_lights.scale_of(graph, lumens)
     return document, graph
 
 
@@ -142,7 +144,7 @@ def _check_extensions(document: Document) -> None:
             raise document.root.error(message, f"extensionsRequired[{number}]")
     for name in [*document.root.texts("extensionsUsed"), *required]:
         if name == VARIANTS:
-            if document.variant is None and (names := variants.names(document)):
+            if document.variant is None and (names := materials.variant_names(document)):
                 known = ", ".join(map(str, names))
                 document.warn(f"the default materials are shown; -D variant=NAME chooses: {known}")
         elif name not in SUPPORTED:
@@ -154,10 +156,10 @@ def _text(value: object) -> str | None:
 
 
 def _number(
-    path: Path, given: dict[str, Any], name: str, usual: float, low: float, high: float
+    path: Path, variables: dict[str, Any], name: str, usual: float, low: float, high: float
 ) -> float:
     """A variable as a number within its limits. Raises SceneError."""
-    value = given.get(name, usual)
+    value = variables.get(name, usual)
     try:
         number = float(value)
     except (TypeError, ValueError):

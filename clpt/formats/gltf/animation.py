@@ -1,19 +1,26 @@
-"""Animations: what nodes' transforms, morph weights and, by pointers, other numbers are at a time.
+"""Animations: transforms of nodes, morph weights and, by pointers, other numbers at a time.
 
-glTF 3.11 and its appendix C; KHR_animation_pointer.
+glTF 3.11 and its appendix C; KHR_animation_pointer. While a shutter is open, the scene at several
+times becomes keys of motions.
 """
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from clpt.arrays import Floats
+from clpt.arrays import Floats, Matrix
 from clpt.errors import SceneError
-from clpt.formats.gltf import pointers
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Document, Element
+from clpt.scene import Scene
+from clpt.scene.motion import Deformation, Shutter, placement, through
+from clpt.scene.shapes import Group, Instance, Mesh
 
 PATHS = {
     "translation": ("VEC3",),
@@ -28,27 +35,27 @@ INTERPOLATIONS = ("LINEAR", "STEP", "CUBICSPLINE")
 def pose(document: Document, chosen: str | None, time: float) -> dict[tuple[int, str], Floats]:
     """Return the values by (node, "rotation" or the like) that an animation sets at a time [s].
 
-    chosen: its number or name; the first one if None. What pointers point to elsewhere is written
-    into the document. Raises SceneError if there is no such animation.
+    chosen: its number or name; None: the first animation. Values that pointers set elsewhere are
+    written into the document. Raises SceneError if there is no such animation.
     """
-    found: dict[tuple[int, str], Floats] = {}
+    pose_values: dict[tuple[int, str], Floats] = {}
     for channel in _chosen(document, chosen).children("channels"):
         target = channel.needed("target")
         node = target.index("node", "nodes", None)
         path = target.text("path")
         if path == "pointer":
-            names = pointers.parts(channel)
-            on_node = pointers.node_path(names)
+            names = parts(channel)
+            on_node = node_path(names)
             if on_node is not None and on_node[0] < document.root.count("nodes"):
-                found[on_node] = _sampled(channel, on_node[1], time)
-            elif not pointers.put(document.root, names, _sampled(channel, path, time)):
+                pose_values[on_node] = _sampled(channel, on_node[1], time)
+            elif not put(document.root, names, _sampled(channel, path, time)):
                 channel.warn(f"left out: nothing is known to move at '/{'/'.join(names)}'")
             continue
         if node is None or path not in PATHS:
             channel.warn(f"left out: {path!r} of no node that is known")
             continue
-        found[node, path] = _sampled(channel, path, time)
-    return found
+        pose_values[node, path] = _sampled(channel, path, time)
+    return pose_values
 
 
 def descriptions(document: Document) -> list[str]:
@@ -60,7 +67,7 @@ def descriptions(document: Document) -> list[str]:
 def _length(animation: Element) -> str:
     """Return how long an animation takes, for people; nothing where the file does not say."""
     ends: list[float] = []
-    with suppress(SceneError):  # one that is broken is told when it is chosen
+    with suppress(SceneError):  # a broken animation is reported when it is chosen
         for sampler in animation.children("samplers"):
             times = sampler.entry("input", "accessors")
             ends += () if times is None else times.numbers("max", None, ())
@@ -139,3 +146,167 @@ def _values(sampler: Element, key: str, types: tuple[str, ...]) -> Floats:
     if accessor is None:
         raise sampler.error(f"{key!r} is missing")
     return floats(accessor, types).astype(np.float64)
+
+
+KEYS = 9  # while the shutter is open
+NEAR = 1e-3  # largest distance of a vertex from its path between keys, over the mesh's size
+
+
+def scene_over_shutter(load: Callable[[float], Scene], time: float, length: float) -> Scene:
+    """Return the scene at a time [s], whose nodes move while a shutter is open for `length` [s].
+
+    load: gives the scene at a time. What skins and morphs move has as few keys as keep vertices
+    within NEAR of the mesh's size of where they are at KEYS times.
+    """
+    times = np.linspace(time, time + length, KEYS)
+    scenes = [load(float(t)) for t in times]
+    scene, warnings = scenes[0], list(scenes[0].warnings)
+    if any(len(other.shapes) != len(scene.shapes) for other in scenes):
+        warnings.append("shutter: shapes come or go while it is open, so that nothing moves")
+        return dataclasses.replace(scene, warnings=warnings)
+    added = scene.extra["studio"]  # what stands still, see clpt.formats.framing
+    count = len(scene.shapes) - added["shapes"]
+    groups: dict[int, Group] = {}
+    shapes: list[Any] = []
+    for i in range(count):
+        ways = [each.shapes[i] for each in scenes]
+        moved = _moving(ways, times, warnings, f"shapes[{i}]")
+        shapes.append(_deforming(moved, ways, times, warnings, groups))
+    shapes += scene.shapes[count:]
+    lights: list[Any] = list(scene.lights)
+    camera: Any = scene.camera
+    if not added["lights"]:
+        lights = [
+            _moving([each.lights[i] for each in scenes], times, warnings, f"lights[{i}]")
+            for i in range(len(lights))
+        ]
+    if not added["camera"]:
+        camera = _moving([each.camera for each in scenes], times, warnings, "camera")
+    shutter = Shutter(time, time + length)
+    camera = dataclasses.replace(camera, shutter=shutter)
+    return dataclasses.replace(
+        scene, shapes=shapes, lights=lights, camera=camera, warnings=warnings
+    )
+
+
+def _deforming(
+    shape: object,
+    ways: Sequence[Any],
+    times: Matrix,
+    warnings: list[str],
+    groups: dict[int, Group],
+) -> Any:
+    """A shape with keys of its vertices, if they are elsewhere at other times.
+
+    ways: the shape at all times; groups: those of instances, by that of the first time.
+    """
+    if isinstance(shape, Instance) and all(isinstance(way, Instance) for way in ways):
+        first = ways[0].group
+        if id(first) not in groups:
+            at_all = zip(*(way.group.shapes for way in ways), strict=False)
+            parts = [_deforming(shapes[0], shapes, times, warnings, groups) for shapes in at_all]
+            same = all(new is old for new, old in zip(parts, first.shapes, strict=False))
+            groups[id(first)] = first if same else dataclasses.replace(first, shapes=tuple(parts))
+        return dataclasses.replace(shape, group=groups[id(first)])
+    if not (isinstance(shape, Mesh) and all(isinstance(way, Mesh) for way in ways)):
+        return shape
+    name = f"shutter: {f'mesh {shape.name!r}' if shape.name else 'a mesh'} stays as at `time`"
+    if any(not np.array_equal(way.faces, shape.faces) for way in ways):
+        warnings.append(f"{name}: its triangles are others at other times")
+        return shape
+    points = np.stack([np.asarray(way.vertices) for way in ways])
+    normals = None
+    if all(way.normals is not None for way in ways):
+        normals = np.stack([np.asarray(way.normals) for way in ways])
+    if not np.ptp(points, axis=0).any() and (normals is None or not np.ptp(normals, axis=0).any()):
+        return shape
+    step = _step(points)
+    normals = None if normals is None else normals[::step]
+    keys = Deformation(times[::step].tolist(), points[::step], normals)
+    return dataclasses.replace(shape, deformation=keys)
+
+
+def _step(points: NDArray[np.float32]) -> int:
+    """Return the step of the keys that are enough; (k, n, 3), even, k - 1 a power of two."""
+    last = len(points) - 1
+    allowed = NEAR * float(np.ptp(points.reshape(-1, 3), axis=0).max())
+    step = last
+    while step > 1:
+        share = np.arange(step)[:, None, None] / step
+        far = 0.0
+        for first in range(0, last, step):
+            scene_over_shutter = points[first] * (1.0 - share) + points[first + step] * share
+            far = max(far, float(np.abs(points[first : first + step] - scene_over_shutter).max()))
+        if far <= allowed:
+            break
+        step //= 2
+    return step
+
+
+def _moving(ways: Sequence[Any], times: Matrix, warnings: list[str], where: str) -> Any:
+    """A thing at its first time with keys, if it is elsewhere at others."""
+    first = ways[0]
+    placed = [placement(way) for way in ways]
+    if any(matrix is None for matrix in placed):
+        return first
+    matrices = np.stack([matrix for matrix in placed if matrix is not None])
+    if np.array_equal(matrices, np.broadcast_to(matrices[0], matrices.shape)):
+        return first
+    try:
+        return through(first, times.tolist(), matrices)
+    except SceneError as error:
+        warnings.append(f"shutter: {where} stays as at `time`: {error}")
+        return first
+
+
+POINTER = "KHR_animation_pointer"
+OF_NODES = ("translation", "rotation", "scale", "weights")
+TABLES = ("materials", "cameras", "meshes", "extensions")  # whose numbers may change
+LISTS = ("weights",)  # even a single number of them is a list
+
+
+def parts(channel: Element) -> list[str]:
+    """Return the parts of a channel's pointer (RFC 6901). Raises SceneError where it is none."""
+    extension = channel.needed("target").extension(POINTER)
+    if extension is None:
+        raise channel.error(f"a target of the path 'pointer' needs {POINTER}", "target")
+    text = extension.text("pointer")
+    if not text.startswith("/"):
+        raise extension.error(f"{text!r} is no JSON pointer: it must begin with '/'", "pointer")
+    return [part.replace("~1", "/").replace("~0", "~") for part in text[1:].split("/")]
+
+
+def node_path(names: list[str]) -> tuple[int, str] | None:
+    """Return the node and the path of a pointer that means what other channels mean, or None."""
+    if len(names) == 3 and names[0] == "nodes" and names[1].isdigit() and names[2] in OF_NODES:
+        return int(names[1]), names[2]
+    return None
+
+
+def put(root: Element, names: list[str], values: NDArray[np.float64]) -> bool:
+    """Write values where a pointer points to; return False if the document has no such member.
+
+    Omitted objects on the path are added, as their numbers have defaults. An omitted texture is
+    not, as it needs an image.
+    """
+    if names[0] not in TABLES or len(names) < 3 or (names[0] == "meshes" and names[2:] != [*LISTS]):
+        return False
+    at: Any = root.value
+    for number, name in enumerate(names[:-1]):
+        if name.endswith("Texture") and not (isinstance(at, dict) and name in at):
+            return False
+        if isinstance(at, dict) and (number > 1 or name in at):
+            at = at.setdefault(name, {})
+        elif isinstance(at, list) and name.isdigit() and int(name) < len(at):
+            at = at[int(name)]
+        else:
+            return False
+    last, single = names[-1], len(values) == 1 and names[-1] not in LISTS
+    stored: Any = float(values[0]) if single else values.tolist()
+    if isinstance(at, list) and last.isdigit() and int(last) < len(at):
+        at[int(last)] = stored
+        return True
+    if not isinstance(at, dict) or isinstance(at.get(last), str | dict):
+        return False
+    at[last] = values[0] > 0.5 if isinstance(at.get(last), bool) else stored
+    return True

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from clpt.formats.gltf import accessors, cameras, lights
+from clpt.formats.gltf import accessors, cameras_lights
 from clpt.formats.gltf.document import Document, Element
 from clpt.formats.gltf.geometry import target_types, types
 
@@ -20,14 +20,14 @@ FLOAT = 5126
 
 
 def check(document: Document) -> None:
-    """Raise SceneError for what does not fit together, wherever it stands."""
+    """Raise SceneError for references and values that contradict each other."""
     for table, function in TABLES.items():
         for element in document.root.children(table):
             function(element)
     document.root.index("scene", "scenes", None)
-    extension = document.root.extension(lights.NAME)
+    extension = document.root.extension(cameras_lights.LIGHTS)
     for light in [] if extension is None else extension.children("lights"):
-        lights.light(light, np.eye(4))
+        cameras_lights.light(light, np.eye(4))
 
 
 def _view(view: Element) -> None:
@@ -139,7 +139,7 @@ TABLES: dict[str, Callable[[Element], object]] = {
     "textures": _texture,
     "materials": _material,
     "meshes": _mesh,
-    "cameras": lambda camera: cameras.camera(camera, np.eye(4)),
+    "cameras": lambda camera: cameras_lights.camera(camera, np.eye(4)),
     "skins": _skin,
     "nodes": _node,
     "scenes": lambda scene: scene.indices("nodes", "nodes"),

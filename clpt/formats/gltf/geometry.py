@@ -1,4 +1,4 @@
-"""Geometry of a primitive: its triangles, and the attributes of its vertices."""
+"""Geometry of a primitive: triangles, attributes of vertices, and skins (glTF 3.7.3.3)."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats32
-from clpt.formats.gltf.accessors import normalised
+from clpt.files import budget
+from clpt.formats.gltf.accessors import floats, normalised
 from clpt.formats.gltf.document import Element
 
-TYPES = {  # of the accessors of an attribute, by what its name begins with
+TYPES = {  # of the accessors of an attribute, by the first part of its name
     "POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TANGENT": ("VEC4",), "TEXCOORD": ("VEC2",),
     "COLOR": ("VEC3", "VEC4"), "JOINTS": ("VEC4",), "WEIGHTS": ("VEC4",),
 }  # fmt: skip
@@ -52,3 +53,101 @@ def warn_of_whole_numbers(name: str, accessor: Element) -> None:
     whole = name.startswith(SHARES) and accessor.integer("componentType") != FLOAT
     if whole and not accessor.flag("normalized"):
         accessor.warn(f"{name} of whole numbers must be normalized; taken as it is")
+
+
+PER_VERTEX, PER_PART = 96, 256  # bytes that joints take, and vertices that count as a part
+CHUNK = 1 << 16  # vertices at a time: each takes a matrix
+
+
+def joint_matrices(skin: Element, to_world: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what takes vertices to the world for each joint, (joints, 4, 4)."""
+    joints = skin.indices("joints", "nodes")
+    if not joints:
+        raise skin.error("has no joints")
+    posed = to_world[joints]
+    accessor = skin.entry("inverseBindMatrices", "accessors")
+    if accessor is None:
+        return posed
+    inverse = floats(accessor, ("MAT4",)).astype(np.float64)
+    if len(inverse) < len(joints):
+        message = f"has {len(inverse)} matrices for {len(joints)} joints"
+        raise skin.error(message, "inverseBindMatrices")
+    return posed @ inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+
+
+def skinned(primitive: Element, geometry: Geometry, joints: NDArray[np.float64]) -> None:
+    """Move a primitive's vertices, normals and tangents into the world, as joints take them."""
+    pairs = _influences(primitive, geometry, len(joints))
+    if not pairs:
+        primitive.warn("has a skin, but no JOINTS_0 and WEIGHTS_0; it stays as it is")
+        pairs = [(np.zeros((len(geometry.attributes["POSITION"]), 1), int), np.ones((1, 1)))]
+    normals = geometry.attributes.get("NORMAL")
+    positions = geometry.attributes["POSITION"].astype(np.float64)
+    turned = None if normals is None else normals.astype(np.float64)
+    along = geometry.attributes.get("TANGENT")
+    along = None if along is None else along.astype(np.float64)
+    total = _total(primitive, pairs)
+    for first in range(0, len(positions), CHUNK):
+        part = slice(first, first + CHUNK)
+        blend = np.zeros((len(positions[part]), 4, 4))
+        for which, weights in pairs:
+            share = np.broadcast_to(weights / total, which.shape)[part]
+            blend += np.einsum("nk,nkij->nij", share, joints[which[part]])
+        moved = np.einsum("nij,nj->ni", blend[:, :3, :3], positions[part])
+        positions[part] = moved + blend[:, :3, 3]
+        if turned is not None:
+            turned[part] = np.einsum("nij,nj->ni", _cofactors(blend[:, :3, :3]), turned[part])
+        if along is not None:
+            along[part, :3] = np.einsum("nij,nj->ni", blend[:, :3, :3], along[part, :3])
+    geometry.attributes["POSITION"] = positions.astype(np.float32)
+    if turned is not None:
+        geometry.attributes["NORMAL"] = turned.astype(np.float32)
+    if along is not None:
+        geometry.attributes["TANGENT"] = along.astype(np.float32)
+
+
+def _total(
+    primitive: Element, pairs: list[tuple[NDArray[np.int64], NDArray[np.float64]]]
+) -> NDArray[np.float64]:
+    """Return the sum of each vertex' weights (n, 1); a vertex without any follows joint 0.
+
+    The specification wants a sum of 1. Exporters write vertices without weights, and viewers agree
+    on joint 0 for these.
+    """
+    total = sum(weights.sum(axis=1, keepdims=True) for _, weights in pairs)
+    free = ~(total[:, 0] > 0.0)
+    if free.any():
+        primitive.warn(f"{free.sum():,} vertices have no weights; they follow the joint 0")
+        pairs[0][0][free, 0], pairs[0][1][free, 0] = 0, 1.0
+        total = np.where(free[:, None], 1.0, total)
+    return total
+
+
+def _influences(
+    primitive: Element, geometry: Geometry, count: int
+) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
+    """Joints (n, 4) and their weights (n, 4), as many pairs as the primitive has sets."""
+    pairs: list[tuple[NDArray[np.int64], NDArray[np.float64]]] = []
+    while (
+        f"JOINTS_{len(pairs)}" in geometry.attributes
+        and f"WEIGHTS_{len(pairs)}" in geometry.attributes
+    ):
+        name = f"JOINTS_{len(pairs)}"
+        vertices = len(geometry.attributes[name])
+        size = PER_VERTEX * vertices * (len(pairs) + 1)
+        budget.check(size, f"{len(pairs) + 1} joints of its vertices", primitive.document.file)
+        budget.take_parts(vertices // PER_PART, "joints of its vertices", primitive.document.file)
+        which = geometry.attributes[name].astype(np.int64)
+        weights = geometry.attributes[f"WEIGHTS_{len(pairs)}"].astype(np.float64)
+        which = np.where(weights == 0.0, 0, which)
+        if which.max() >= count:
+            message = f"joint {which.max()} is outside of the skin's {count}"
+            raise primitive.error(message, f"attributes.{name}")
+        pairs.append((which, weights))
+    return pairs
+
+
+def _cofactors(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The inverse transposes (n, 3, 3) times their determinants: what turns normals."""
+    a, b, c = np.moveaxis(matrix, 2, 0)
+    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)

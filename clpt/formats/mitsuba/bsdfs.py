@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from clpt import measured, spectra
-from clpt.formats.blockers import attempt
-from clpt.formats.missing import EVEN, GREY
-from clpt.formats.mitsuba.fluorescence import fluorescent
-from clpt.formats.mitsuba.hair import at_yellow, hair
 from clpt.formats.mitsuba.limits import within
-from clpt.formats.mitsuba.principled import principled, principled_thin
+from clpt.formats.mitsuba.principled import (
+    at_yellow,
+    fluorescent,
+    hair,
+    principled,
+    principled_thin,
+)
 from clpt.formats.mitsuba.properties import Context, Properties, numbers, unknown
 from clpt.formats.mitsuba.spectra import (
     coefficient,
@@ -28,8 +30,9 @@ from clpt.formats.mitsuba.spectra import (
     texture,
 )
 from clpt.formats.mitsuba.xml import Element
-from clpt.formats.pbrt import coated_albedo
-from clpt.formats.pbrt.map_values import map_values
+from clpt.formats.pbrt import scattering
+from clpt.formats.pbrt.textures import map_values
+from clpt.formats.reading import EVEN, GREY, attempt
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.params import defaults, fields_of, params
@@ -155,7 +158,7 @@ def _old_metal(props: Properties, around: float) -> Parameters:
 
 
 def _around(props: Properties) -> float:
-    """Take Mitsuba 0.6's index around a metal, by which eta and k are divided."""
+    """Take Mitsuba 0.6's index around a metal; eta and k are relative to it."""
     child = props.named.get("ext_eta")
     if child is None:
         return AIR if props.context.old else 1.0
@@ -167,7 +170,7 @@ def _around(props: Properties) -> float:
 
 
 def _named_metal(child: Element, context: Context) -> tuple[Spectrum, Spectrum]:
-    """A metal by its name; a grey one where there are no free data."""
+    """Return a metal by its name; grey metal if no free data exist."""
     name = child.attribute("value")
     if name.removesuffix("_palik") not in WITHOUT_DATA:
         return spectra.metal(name)
@@ -255,7 +258,7 @@ def _rough_plastic(props: Properties) -> Parameters:
 
 
 def _polarized_plastic(props: Properties) -> Parameters:
-    """As Mitsuba's without polarisation, but for what its boundary reflects inwards."""
+    """As Mitsuba's without polarisation, except for the internal reflection of its boundary."""
     props.context.warn(props.element, "light has no polarisation here: taken as roughplastic")
     return {**_rough_plastic(props), "nonlinear": False}
 
@@ -389,7 +392,7 @@ def _coated(element: Element, context: Context) -> Material:
         context.warn(element, f"a coat over {inner.kind} is left out: it would darken it")
         return inner
     relative = at_yellow(indices["int_ior"]) / at_yellow(indices["ext_ior"])
-    inside = float(coated_albedo.EVEN @ coated_albedo.internal_fresnel(relative))
+    inside = float(scattering.EVEN @ scattering.internal_fresnel(relative))
     base = map_values(parts["reflectance"], lambda r: r / (1.0 + inside * r))
     plastic = {**kept, **indices, "diffuse_reflectance": base, "specular_reflectance": specular}
     if rough:

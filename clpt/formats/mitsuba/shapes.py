@@ -1,4 +1,4 @@
-"""Shapes of a Mitsuba scene."""
+"""Mitsuba 0.6's `maxSmoothAngle`: normals of a mesh that stays sharp at its creases."""
 
 from __future__ import annotations
 
@@ -14,19 +14,69 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats import volumes
-from clpt.formats.blockers import attempt
-from clpt.formats.meshes import mesh, strands
+from clpt.formats.meshes import mesh, spheres_curves
 from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
-from clpt.formats.mitsuba.creases import creased
 from clpt.formats.mitsuba.emitters import area
 from clpt.formats.mitsuba.media import body, side
 from clpt.formats.mitsuba.properties import Context, NoArea, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
-from clpt.geometry.normals import smooth_normals
+from clpt.formats.reading import attempt
+from clpt.geometry.polygons import smooth_normals
 from clpt.scene import shapes
 from clpt.scene.materials import Dielectric, Diffuse, Material, Null
-from clpt.scene.shapes import Group, Instance, Shape
+from clpt.scene.shapes import Group, Instance, Mesh, Shape
+
+MOST_TURNS = 64  # groups of triangles around a vertex; what is left after them stays together
+
+
+def creased(mesh: Mesh, angle: float) -> Mesh:
+    """Return a mesh without normals whose triangles share a vertex where they lie within an angle.
+
+    angle: of the triangles' normals [degrees]. As src/librender/trimesh.cpp (rebuildTopology):
+    at each position the first triangle without a group begins a group of all triangles within the
+    angle to it.
+    """
+    faces = np.asarray(mesh.faces, np.int64)
+    corners = faces.reshape(-1)
+    places = _places(mesh)[corners]
+    points = np.asarray(mesh.vertices, np.float64)[faces]
+    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.repeat(normals / np.where(lengths > 0.0, lengths, 1.0), 3, axis=0)
+    group = np.full(len(corners), -1)
+    least = np.cos(np.radians(min(angle, 180.0)))
+    for turn in range(MOST_TURNS):
+        waiting = np.flatnonzero(group < 0)
+        if not len(waiting):
+            break
+        kept, first = np.unique(places[waiting], return_index=True)
+        seeds = waiting[first][np.searchsorted(kept, places[waiting])]
+        near = np.einsum("ij,ij->i", normals[waiting], normals[seeds]) >= least
+        group[waiting[near | (waiting == seeds)]] = turn
+    keys = np.stack([places, group], axis=1)
+    _, first, joined = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    kept = corners[first]
+    return replace(
+        mesh,
+        vertices=mesh.vertices[kept],
+        faces=joined.reshape(-1, 3).astype(np.uint32),
+        normals=None,
+        uvs=None if mesh.uvs is None else mesh.uvs[kept],
+        attributes={
+            name: values[kept] if name.startswith("vertex_") else values
+            for name, values in mesh.attributes.items()
+        },
+    )
+
+
+def _places(mesh: Mesh) -> NDArray[Any]:
+    """Return for each vertex the number of its place: its position, and uv if it has any."""
+    parts = [np.asarray(mesh.vertices, np.float32)]
+    if mesh.uvs is not None:
+        parts.append(np.asarray(mesh.uvs, np.float32))
+    return np.unique(np.concatenate(parts, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
+
 
 Parameters = dict[str, Any]
 SDF_PIECES = 4  # of the side of a cell
@@ -53,7 +103,7 @@ def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
 
 
 def _single(element: Element, context: Context) -> list[Shape]:
-    """Make the shape of an element; none of an unknown kind where missing ones are grey."""
+    """Make the shape of an element; None for an unknown kind if missing kinds are grey."""
     if element.type == "instance":
         return [_instance(element, context)]
     if element.type not in PLUGINS:
@@ -121,7 +171,7 @@ def _instance(element: Element, context: Context) -> Shape:
 
 
 def _group(element: Element, context: Context) -> Group:
-    """Return the group that an element describes, one for all its instances."""
+    """Return the group that an element describes, shared by all its instances."""
 
     def make(element: Element) -> Group:
         props = Properties(element, context)
@@ -274,7 +324,7 @@ def _curves(props: Properties) -> Parameters:
     """Read strands; `to_world` moves their points and, as in Mitsuba, leaves their radii."""
     path, to_world = props.file(), props.placement(thin=True)
     try:
-        arrays = strands.read(path)
+        arrays = spheres_curves.read_strands(path)
     except SceneError as error:
         line = f":{error.line}" if error.line else ""
         raise props.element.error(f"{path.name}{line}: {error.message}") from None

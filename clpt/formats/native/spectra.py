@@ -1,6 +1,6 @@
 """Spectra in scene.json, read and written.
 
-A number is constant; [r, g, b] is a colour, linear, and "#rrggbb" is one in sRGB; as emission each
+A number is constant; [r, g, b] is a linear colour, "#rrggbb" a colour in sRGB; as emission each
 means that multiple of D65. A name is a glass as an index, and an illuminant as emission; an object
 has a `type` from SPECTRA and its fields, or `values` [[nm, value], ...], or a `file`.
 """
@@ -14,13 +14,13 @@ from typing import Any
 from clpt import spectra
 from clpt.errors import UnknownKindError
 from clpt.files import input_files
-from clpt.formats.colour import colour
 from clpt.formats.native.cursor import Cursor
+from clpt.formats.reading import colour
 from clpt.images.transfer import from_hex
 from clpt.scalars import is_number
 from clpt.scene.integrators import NO_AOV
-from clpt.scene.roles import COEFFICIENT, EMISSION, INDEX, Spectral
-from clpt.spectra import Spectrum
+from clpt.scene.roles import COEFFICIENT, EMISSION, INDEX, REFLECTANCE, Spectral
+from clpt.spectra import Constant, Donaldson, Fluorophore, Reradiation, Spectrum
 from clpt.spectra.spectrum import Outside
 
 SPECTRA: dict[str, type[Spectrum]] = {
@@ -164,3 +164,50 @@ def read_metal(cursor: Cursor) -> tuple[Spectrum, Spectrum]:
     if name not in spectra.metals():
         raise UnknownKindError("metal", name, spectra.metals(), **cursor.location())
     return spectra.metal(name)
+
+
+RERADIATIONS: dict[str, type[Reradiation]] = {"fluorophore": Fluorophore, "donaldson": Donaldson}
+
+
+def read_reradiation(cursor: Cursor) -> Reradiation | None:
+    """Return a re-radiation matrix; null is none."""
+    if cursor.value is None:
+        return None
+    if "file" in cursor.expect(dict):
+        cursor.check_keys("re-radiation", ("file",))
+        path = find_file(cursor.at("file"))
+        with cursor.locating():
+            return spectra.read_reradiation(path)
+    if kind_name(cursor, "re-radiation", RERADIATIONS) == "donaldson":
+        fields = ("out", "into", "rows")
+        cursor.check_keys("re-radiation", ("type", *fields), fields)
+        out, into = (tuple(cursor.at(name).numbers()) for name in ("out", "into"))
+        rows = tuple(tuple(row.numbers(len(into))) for row in cursor.at("rows").entries())
+        with cursor.locating():
+            return Donaldson(out, into, rows)
+    shapes = ("absorption", "emission")
+    cursor.check_keys("re-radiation", ("type", *shapes, "quantum_yield"), shapes)
+    absorption, emission = (_shape(cursor.at(name)) for name in shapes)
+    share = cursor.at("quantum_yield").number() if "quantum_yield" in cursor.value else 1.0
+    with cursor.locating():
+        return Fluorophore(absorption, emission, share)
+
+
+def _shape(cursor: Cursor) -> Spectrum:
+    value = read(cursor, REFLECTANCE)
+    return Constant(value) if isinstance(value, float) else value
+
+
+def write_reradiation(value: Reradiation | None) -> Any:
+    """Return what stands for a matrix in JSON, such that `read` gives it back."""
+    if isinstance(value, Fluorophore):
+        return {
+            "type": "fluorophore",
+            "absorption": write(value.absorption, REFLECTANCE),
+            "emission": write(value.emission, REFLECTANCE),
+            "quantum_yield": value.quantum_yield,
+        }
+    if isinstance(value, Donaldson):
+        rows = [list(row) for row in value.rows]
+        return {"type": "donaldson", "out": value.out, "into": value.into, "rows": rows}
+    return None

@@ -9,11 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from clpt.choices import Missing
-from clpt.formats.pbrt import build_scene, camera_film, films, old_materials, reader
+from clpt.formats.pbrt import build_scene, camera_film, old_materials, reader
 from clpt.formats.pbrt.build_scene import Progress
-from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.state import Definition, State
+from clpt.formats.pbrt.state import Contents, Definition, State
 from clpt.scene import Scene
 
 __all__ = ["load"]
@@ -33,17 +32,17 @@ def load(path: Path, progress: Progress | None = None, missing: Missing = "error
     options = contents.options
     camera = options.get("Camera") or _default_camera(path, contents)
     exposure = camera_film.exposure_time(camera.params, shared.old)
-    film = films.film(options.get("Film"), options.get("PixelFilter"), exposure, shared.old)
+    film = camera_film.film(options.get("Film"), options.get("PixelFilter"), exposure, shared.old)
     integrator = options.get("Integrator")
     if shared.old:
         shared.mirrors = old_materials.has_mirrors(contents)
     chosen = options.get("Sampler")
-    sampler, spp, seed = films.sampler(chosen)
+    sampler, spp, seed = camera_film.sampler(chosen)
     scene = Scene(
-        camera=camera_film.camera(camera, film, films.diagonal(options.get("Film"))),
+        camera=camera_film.camera(camera, film, camera_film.diagonal(options.get("Film"))),
         shapes=build_scene.shapes(contents, progress),
         lights=build_scene.lights(contents),
-        integrator=films.integrator(integrator, film),
+        integrator=camera_film.integrator(integrator, film),
         sampler=sampler,
         film=film,
         spp=spp,

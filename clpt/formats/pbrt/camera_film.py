@@ -1,8 +1,4 @@
-"""The part of a file before WorldBegin: camera, film, filter, sampler and integrator.
-
-pbrt's camera space has x to the right of the picture, ours to the left; `Scale -1 1 1` in a file
-mirrors the picture, as it does in pbrt.
-"""
+"""Cameras, films, filters, samplers and integrators of pbrt."""
 
 from __future__ import annotations
 
@@ -14,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from clpt import lenses, transforms
+from clpt.choices import MOST_LIGHT_PATHS
 from clpt.errors import UnknownKindError
 from clpt.formats.pbrt.media import medium
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, State
-from clpt.scene import cameras
-from clpt.scene.integrators import Film
+from clpt.scene import cameras, integrators
+from clpt.scene.integrators import Film, Filter, Integrator, Sampler
 from clpt.scene.motion import Keys, Shutter
 
 TO_RIGHT = np.diag([-1.0, 1.0, 1.0, 1.0])
@@ -60,7 +57,7 @@ def _moving(camera: cameras.Camera, state: State) -> cameras.Camera:
 
 
 def exposure_time(params: Parameters, old: bool) -> float:
-    """Take the time [s] for which the shutter is open; 1 in old files, which do not count it."""
+    """Take the time [s] of the open shutter; 1 in old files, which ignore it."""
     opens, closes = _shutter(params)
     time = closes - opens
     if old:
@@ -181,3 +178,249 @@ CAMERAS: dict[str, Callable[[Parameters, State, Film], cameras.Camera]] = {
     "orthographic": _orthographic,
     "spherical": _spherical,
 }
+
+
+FILMS = ("rgb", "gbuffer", "spectral")
+GBUFFER = ("albedo", "position", "geometric_normal", "shading_normal", "uv")
+SPACES = {
+    "srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3", "aces2065-1": "aces2065_1",
+}  # fmt: skip
+SAMPLERS = (
+    "halton", "sobol", "zsobol", "paddedsobol", "pmj02bn", "stratified", "independent",
+)  # fmt: skip
+STORED = ("filename", "savefp16")  # how a file is stored is decided when it is written
+SIZE = (("xresolution", 1280), ("yresolution", 720))
+OLD_SIZE = (("xresolution", 640), ("yresolution", 480))  # pbrt-v3, src/core/film.cpp
+DAYLIGHT = 6500.0  # [K], what pbrt takes a measured sensor's white to be
+
+
+def film(
+    definition: Definition | None, filter: Definition | None, exposure: float, old: bool
+) -> Film:
+    """Make the film; `exposure` is how long the shutter is open [s]. Raises SceneError.
+
+    old: whether the file is of version 2 or 3, whose film has a `scale` instead.
+    """
+    chosen = _filter(filter, old)
+    size = OLD_SIZE if old else SIZE
+    if definition is None:
+        return Film(width=size[0][1], height=size[1][1], filter=chosen)
+    params, state = definition.params, definition.state
+    if definition.kind not in FILMS:
+        raise UnknownKindError("film", definition.kind, FILMS, **params.location())
+    params.ignore(*STORED)
+    diagonal(definition)
+    if definition.kind == "gbuffer" and "world" not in params.one(
+        "coordinatesystem", "string", "camera"
+    ):
+        state.warn(params, "the layers of the film 'gbuffer' are in the world, not the camera")
+    width, height = (params.one(name, "integer", n) for name, n in size)
+    with params.locating():
+        made_film = Film(
+            width=width,
+            height=height,
+            filter=chosen,
+            crop=_crop(params, width, height),
+            **_colour(params, state, exposure),
+            **(_bands(params) if definition.kind == "spectral" else {}),
+            layers=GBUFFER if definition.kind == "gbuffer" else (),
+        )
+    if params.one("maxcomponentvalue", "float", math.inf) < math.inf:
+        state.warn(params, "'maxcomponentvalue' is left out: bright samples are kept as they are")
+    return made_film
+
+
+def diagonal(definition: Definition | None) -> float:
+    """Return the film's diagonal [mm], which only lenses traced by surfaces ask for."""
+    return 35.0 if definition is None else definition.params.above_zero("diagonal", 35.0)
+
+
+def _colour(params: Parameters, state: State, exposure: float) -> dict[str, Any]:
+    """Take the sensor: what becomes white, and the factor on the picture."""
+    sensor = params.one("sensor", "string", "cie1931")
+    balance = params.one("whitebalance", "float", 0.0)
+    if state.shared.old:
+        exposure = params.above_zero("scale", 1.0)
+    values: dict[str, Any] = {"exposure": exposure * params.above_zero("iso", 100.0) / 100.0}
+    if sensor != "cie1931":
+        state.warn(params, f"the sensor {sensor!r} is not known: cie1931 is used")
+        balance = balance or DAYLIGHT
+    if balance > 0.0:
+        values["white_balance"] = balance
+    return {**values, "output_space": SPACES[state.colour_space]}
+
+
+def _bands(params: Parameters) -> dict[str, Any]:
+    return {
+        "bands": params.one("nbuckets", "integer", 16),
+        "lambda_min": params.above_zero("lambdamin", 360.0),
+        "lambda_max": params.above_zero("lambdamax", 830.0),
+    }
+
+
+def _crop(params: Parameters, width: int, height: int) -> tuple[int, int, int, int] | None:
+    """Take the part of the film that is rendered: x, y, width and height, or None for all of it.
+
+    A `cropwindow` counts before `pixelbounds`; both give left, right, top, bottom.
+    """
+    bounds, window = params.several("pixelbounds", "integer"), params.several("cropwindow", "float")
+    for name, values in (("pixelbounds", bounds), ("cropwindow", window)):
+        if values is not None and len(values) != 4:
+            raise params.error(f"{name!r} must be 4 numbers, not {len(values)}")
+    if window is not None:
+        x, y = np.sort(np.clip(window[:2], 0, 1)), np.sort(np.clip(window[2:], 0, 1))
+        x, y = np.ceil(width * x), np.ceil(height * y)
+    elif bounds is not None:
+        x, y = np.clip(bounds[:2], 0, width), np.clip(bounds[2:], 0, height)
+    else:
+        return None
+    if not (x[0] < x[1] and y[0] < y[1]):
+        raise params.error("no pixel is left of the film by its crop window or pixel bounds")
+    return int(x[0]), int(y[0]), int(x[1] - x[0]), int(y[1] - y[0])
+
+
+def _filter(definition: Definition | None, old: bool) -> Filter:
+    if definition is None:
+        return integrators.Box() if old else integrators.Gaussian()
+    if definition.kind not in FILTERS:
+        raise UnknownKindError("filter", definition.kind, FILTERS, **definition.params.location())
+    with definition.params.locating():
+        return FILTERS[definition.kind](definition.params, definition.state)
+
+
+def _radius(params: Parameters, state: State, default: float) -> float:
+    """Take the radius [pixels]; clpt has a single radius for both axes."""
+    x, y = (params.above_zero(name, default) for name in ("xradius", "yradius"))
+    if x != y:
+        state.warn(params, f"one radius of {math.sqrt(x * y):.3g} pixels replaces two")
+    return math.sqrt(x * y)
+
+
+def _box(params: Parameters, state: State) -> Filter:
+    return integrators.Box(radius=_radius(params, state, 0.5))
+
+
+def _triangle(params: Parameters, state: State) -> Filter:
+    return integrators.Tent(radius=_radius(params, state, 2.0))
+
+
+def _gaussian(params: Parameters, state: State) -> Filter:
+    if state.shared.old:  # exp(-alpha d^2)
+        sigma = 1.0 / math.sqrt(2.0 * params.above_zero("alpha", 2.0))
+        return integrators.Gaussian(stddev=sigma, radius=_radius(params, state, 2.0))
+    radius = _radius(params, state, 1.5)
+    return integrators.Gaussian(stddev=params.above_zero("sigma", 0.5), radius=radius)
+
+
+def _mitchell(params: Parameters, state: State) -> Filter:
+    b, c = params.one("B", "float", 1 / 3), params.one("C", "float", 1 / 3)
+    return integrators.Mitchell(b=b, c=c, radius=_radius(params, state, 2.0))
+
+
+def _sinc(params: Parameters, state: State) -> Filter:
+    radius = _radius(params, state, 4.0)
+    return integrators.Lanczos(radius=radius, lobes=params.above_zero("tau", 3.0))
+
+
+FILTERS: dict[str, Callable[[Parameters, State], Filter]] = {
+    "box": _box,
+    "gaussian": _gaussian,
+    "mitchell": _mitchell,
+    "sinc": _sinc,
+    "triangle": _triangle,
+}
+
+
+def sampler(definition: Definition | None) -> tuple[Sampler, int, int | None]:
+    """Return the sampler, the samples of a pixel, and the seed if it is given.
+
+    Sobol stands for all but zsobol: other random numbers, the same picture in the end.
+    """
+    if definition is None:
+        return integrators.Sobol(), 16, None
+    params = definition.params
+    if definition.kind not in SAMPLERS:
+        raise UnknownKindError("sampler", definition.kind, SAMPLERS, **params.location())
+    if definition.kind == "stratified":
+        params.ignore("jitter")
+        spp = math.prod(params.one(name, "integer", 4) for name in ("xsamples", "ysamples"))
+    else:
+        spp = params.one("pixelsamples", "integer", 16)
+    params.ignore("randomization")
+    seed = params.one("seed", "integer", None)
+    if not 0 < spp < 2**31:
+        raise params.error(f"there must be at least one sample in a pixel, not {spp}")
+    result = integrators.Zsobol() if definition.kind == "zsobol" else integrators.Sobol()
+    return result, spp, None if seed is None else seed % 2**31
+
+
+LIGHT_PATHS = ("path", "volpath", "simplepath", "simplevolpath", "randomwalk")
+OTHERS = {  # what finds light in other ways than from the camera alone
+    "bdpt": ("visualizestrategies", "visualizeweights"),
+    "mlt": (
+        "bootstrapsamples", "chains", "mutationsperpixel", "largestepprobability", "sigma",
+    ),
+    "lightpath": (),
+}  # fmt: skip
+CHOSEN = "clpt chooses what suits the scene instead: path, light paths beside it, or vcm"
+PHOTONS = (
+    "its photons are those of vcm: they count beside paths from the camera and from lights, where "
+    "something sharp has gathered light; the radius is one for all pixels, and shrinks by the "
+    "number of passes, not by the photons found"
+)
+IGNORED = ("regularize", "lightsampler", "rrthreshold", "samplelights", "samplebsdf")
+MOST_DEPTH = 2**31 - 2
+NO_LIGHT = ("ao", "function", "ambientocclusion")
+OLD_OTHERS = ("directsamples", "causticphotons", "indirectphotons", "nused", "finalgather")
+
+
+def integrator(definition: Definition | None, film: Film) -> Integrator:
+    """Make the counterpart of pbrt's integrator; pbrt's depth is 1 less.
+
+    film: its pixels share pbrt's photons.
+    """
+    if definition is None:
+        return integrators.Path(max_depth=6, free_panes=False)
+    params, state = definition.params, definition.state
+    if definition.kind in NO_LIGHT:
+        raise params.error("this integrator shows no light; use 'path'")
+    if state.shared.old and definition.kind in ("directlighting", "whitted"):
+        return _direct(params, state)
+    known = (*LIGHT_PATHS, *OTHERS, "sppm")
+    if state.shared.old and definition.kind not in known:
+        state.warn(params, "is read as path")
+    elif definition.kind not in known:
+        raise UnknownKindError("integrator", definition.kind, known, **params.location())
+    params.ignore(*IGNORED, *OTHERS.get(definition.kind, ()))
+    depth = params.one("maxdepth", "integer", 5)
+    if depth < 0:
+        raise params.error(f"'maxdepth' cannot be negative: {depth}")
+    longest = min(depth, MOST_DEPTH) + 1
+    free = integrators.is_long(longest)
+    if definition.kind in OTHERS:
+        state.warn(params, CHOSEN)
+        return integrators.Auto(max_depth=longest, free_panes=free)
+    if definition.kind != "sppm":
+        params.ignore(*OLD_OTHERS if state.shared.old else ())
+        return integrators.Path(max_depth=longest, free_panes=free)
+    state.warn(params, PHOTONS)
+    return integrators.Vcm(max_depth=longest, free_panes=free, **_photons(params, film))
+
+
+def _direct(params: Parameters, state: State) -> Integrator:
+    """Direct light, which versions 2 and 3 follow through mirrors and glass as well."""
+    depth = params.one("maxdepth", "integer", 5)
+    if not state.shared.mirrors:
+        return integrators.Direct()
+    state.warn(
+        params, "is read as path, since mirrors or glass are there: other surfaces light each other"
+    )
+    return integrators.Path(max_depth=min(max(depth, 0), MOST_DEPTH) + 1, free_panes=False)
+
+
+def _photons(params: Parameters, film: Film) -> dict[str, Any]:
+    """Read the photons of `sppm`; pbrt's default radius of 1 suits few scenes: 0 takes ours."""
+    params.ignore("seed")
+    radius = params.above_zero("radius", 0.0) if "radius" in params else 0.0
+    each = params.one("photonsperiteration", "integer", -1) / math.prod(film.size)
+    return {"radius": radius, "light_paths": min(max(round(each), 1), MOST_LIGHT_PATHS)}

@@ -10,15 +10,24 @@ import numpy as np
 
 from clpt import measured
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats.pbrt import coated_albedo, old_materials
-from clpt.formats.pbrt.hair import hair
-from clpt.formats.pbrt.layered import both, coat, coated_diffuse, index_at_550, subsurface
-from clpt.formats.pbrt.map_values import map_values
+from clpt.formats.pbrt import old_materials, scattering
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.roughness import alphas, isotropic, rough, smooth, stretched
+from clpt.formats.pbrt.scattering import (
+    alphas,
+    both,
+    coat,
+    coated_diffuse,
+    hair,
+    index_at_550,
+    isotropic,
+    rough,
+    smooth,
+    stretched,
+    subsurface,
+)
 from clpt.formats.pbrt.spectra import named, spectrum
 from clpt.formats.pbrt.state import State
-from clpt.formats.pbrt.textures import normals, textured
+from clpt.formats.pbrt.textures import map_values, normals, textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.params import fields_of
@@ -105,7 +114,7 @@ def _metal(params: Parameters, state: State, prefix: str) -> dict[str, Any]:
 
 def _damped(metal: dict[str, Any], ior: float, thickness: float) -> dict[str, Any]:
     """A metal under a coat that absorbs, which is a factor on its reflection."""
-    return {**metal, "specular_reflectance": coated_albedo.transmitted(ior, thickness) ** 2}
+    return {**metal, "specular_reflectance": scattering.transmitted(ior, thickness) ** 2}
 
 
 def _extinction(r: Any) -> Any:
@@ -155,7 +164,7 @@ def _mix(params: Parameters, state: State) -> Material:
 
 
 def _one_sided(result: Material) -> Material:
-    """The material with the fronts alone of what is given to both sides."""
+    """Return the material with the front sides of its two-sided parts."""
     if isinstance(result, materials.TwoSided):
         return _one_sided(result.front)
     inner: dict[str, Any] = {

@@ -9,7 +9,7 @@ import numpy as np
 from clpt import transforms
 from clpt.errors import UnknownKindError, did_you_mean
 from clpt.formats import volumes
-from clpt.formats.pbrt import coated_albedo
+from clpt.formats.pbrt import scattering
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import spectrum
 from clpt.formats.pbrt.state import Definition, State
@@ -23,7 +23,7 @@ GRIDS = ("uniformgrid", "nanovdb", "rgbgrid", "cloud")
 HEAT = ("temperatureoffset", "temperaturecutoff", "temperaturescale")
 BLACK_BODY = {"normalised": True}  # so that it has 1 at its brightest wavelength
 _AROUND = ((1, 1), (1, 1), (1, 1), (0, 0))
-MILK = "Wholemilk"  # of which a medium is that says nothing
+DEFAULT_PRESET = "Wholemilk"  # pbrt's, for a medium without coefficients
 
 
 def medium(name: str, source: Parameters, state: State) -> Medium | None:
@@ -175,9 +175,9 @@ def _coefficients(params: Parameters, state: State, grid: bool) -> tuple[Any, An
             spectrum(params, "sigma_s", COEFFICIENT, state, item),
         )
     preset = params.one("preset", "string", "")
-    if preset and preset not in coated_albedo.MEDIA:
-        raise UnknownKindError("preset", preset, coated_albedo.MEDIA)
-    scatters, absorbs = (RGBUnbounded(*rgb) for rgb in coated_albedo.MEDIA[preset or MILK])
+    if preset and preset not in scattering.MEDIA:
+        raise UnknownKindError("preset", preset, scattering.MEDIA)
+    scatters, absorbs = (RGBUnbounded(*rgb) for rgb in scattering.MEDIA[preset or DEFAULT_PRESET])
     return (
         spectrum(params, "sigma_a", COEFFICIENT, state, absorbs),
         spectrum(params, "sigma_s", COEFFICIENT, state, scatters),

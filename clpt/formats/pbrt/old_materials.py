@@ -13,15 +13,11 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import UnknownKindError
-from clpt.formats.pbrt.files import Contents
-from clpt.formats.pbrt.hair import hair
-from clpt.formats.pbrt.layered import both, subsurface
-from clpt.formats.pbrt.map_values import map_values
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.roughness import rough
+from clpt.formats.pbrt.scattering import both, hair, rough, subsurface
 from clpt.formats.pbrt.spectra import named, spectrum
-from clpt.formats.pbrt.state import Definition, State
-from clpt.formats.pbrt.textures import textured
+from clpt.formats.pbrt.state import Contents, Definition, State
+from clpt.formats.pbrt.textures import map_values, textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.roles import INDEX, REAL, REFLECTANCE
@@ -54,7 +50,7 @@ def is_known(kind: str) -> bool:
 
 
 def has_mirrors(contents: Contents) -> bool:
-    """Return whether some material sends light on in one direction."""
+    """Return whether some material has a specular (delta) lobe."""
     definitions = [item for versions in contents.shared.materials.values() for item in versions]
     parts = [contents.shapes, *contents.objects.values()]
     used = [item.state.material for part in parts for item in part]
@@ -249,7 +245,7 @@ def _none(params: Parameters, state: State) -> Material:
 
 
 def _sum(lobes: Sequence[Lobe], params: Parameters, state: State) -> Material:
-    """Return the sum of lobes, each given by its factor and how it is made of one."""
+    """Return the sum of lobes, each a factor and a function that makes its material of a factor."""
     shining = [(value, make) for value, make in lobes if not _is_dark(value)]
     if not shining:
         return materials.Diffuse(reflectance=0.0)

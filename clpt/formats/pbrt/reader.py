@@ -11,11 +11,15 @@ from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError, did_you_mean
 from clpt.files import text
 from clpt.formats.pbrt import old_words
-from clpt.formats.pbrt.files import Contents
 from clpt.formats.pbrt.lexer import UPGRADE
 from clpt.formats.pbrt.params import Parameter, Parameters
-from clpt.formats.pbrt.state import TARGETS, Definition, State
-from clpt.formats.pbrt.transforms import TransformDirectives
+from clpt.formats.pbrt.state import (
+    TARGETS,
+    Contents,
+    Definition,
+    State,
+    TransformDirectives,
+)
 
 COLOUR_SPACES = ("srgb", "rec2020", "aces2065-1", "dci-p3")
 OPTIONS = ("Camera", "Film", "PixelFilter", "Sampler", "Integrator", "Accelerator")
@@ -130,7 +134,7 @@ class _Reader(TransformDirectives):
         self._end("Attribute")
 
     def transform_begin(self) -> None:
-        """As an AttributeBegin in version 4; in older ones it keeps transforms alone."""
+        """As an AttributeBegin in version 4; in older versions it keeps only transforms."""
         self._begin("Transform" if self.contents.shared.old else "Attribute")
 
     def transform_end(self) -> None:
@@ -223,7 +227,7 @@ class _Reader(TransformDirectives):
         return Definition(kind, params, state)
 
     def _last(self, values: list[Parameter]) -> list[Parameter]:
-        """Return the last of parameters of one name, as pbrt does (src/pbrt/paramdict.cpp)."""
+        """Return the last of parameters of a name, as pbrt does (src/pbrt/paramdict.cpp)."""
         last: dict[str, Parameter] = {}
         for parameter in values:
             if parameter.name in last:

@@ -1,7 +1,8 @@
-"""State while a PBRT file is read: the graphics state, and what all parts of the file share."""
+"""Reading a PBRT file and those that it includes, within limits."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from bisect import bisect_left
 from collections.abc import Callable
 from copy import copy
@@ -14,11 +15,86 @@ import numpy as np
 from clpt import transforms
 from clpt.choices import Missing
 from clpt.errors import SceneError, did_you_mean
-from clpt.files import input_files
-from clpt.formats.missing import grey_for
+from clpt.files import budget, input_files, text
+from clpt.formats.pbrt import old_words
+from clpt.formats.pbrt.lexer import Lexer
 from clpt.formats.pbrt.params import Parameter, Parameters
+from clpt.formats.reading import Located, grey_for
 from clpt.scene.materials import Material
 from clpt.scene.motion import Keys
+
+BYTES = 1024  # of a directive in memory, about
+DEEPEST = 32  # files that include each other
+
+
+@dataclass(eq=False)
+class Contents:
+    """The contents of a file: definitions in their order, and groups with their uses, by name."""
+
+    shared: Shared
+    shapes: list[Definition] = field(default_factory=list)
+    lights: list[Definition] = field(default_factory=list)
+    objects: dict[str, list[Definition]] = field(default_factory=dict)
+    uses: list[Definition] = field(default_factory=list)
+    options: dict[str, Definition] = field(default_factory=dict)
+    seed: int | None = None
+
+
+class Files(Located):
+    """Reads the files; `state` is the graphics state at the directive that is being read."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.contents = Contents(Shared(path.parent))
+        self.state = State(self.contents.shared, path.parent)
+        self.files: list[Path] = []
+        self.warned: set[str] = set()
+        self.lexer: Lexer
+        self.name = ""
+
+    @abstractmethod
+    def directive(self) -> None:
+        """Take the next directive and carry it out."""
+
+    def go_through(self, path: Path) -> None:
+        """Read a file, which an Include may have named."""
+        real = path.resolve()
+        if real in self.files:
+            raise self.lexer.error(f"{path.name} includes itself")
+        if len(self.files) >= DEEPEST:
+            raise self.lexer.error(f"{path.name} is included too deep: {DEEPEST} files in others")
+        outer, lexer = getattr(self, "lexer", None), Lexer(path)
+        shared = self.contents.shared
+        if outer is None:
+            shared.old = old_words.is_old(lexer.data)
+        if shared.old:
+            lexer.take_old()
+        self.files.append(real)
+        self.lexer, before = lexer, self.state.file_folder
+        self.state.file_folder = path.parent
+        while lexer.peek():
+            budget.take(BYTES, "its directives", path)
+            budget.take_parts(1, "its directives", path)
+            self.directive()
+        self.files.pop()
+        self.state.file_folder = before
+        if outer is not None:
+            self.lexer = outer
+
+    def location(self) -> dict[str, Any]:
+        return {"file": self.lexer.path, "line": self.lexer.line, "where": self.name}
+
+    def warn(self, text: str) -> None:
+        """Warn of something that the picture will lack, with this location."""
+        location = f"{self.lexer.path.name}:{self.lexer.line}: {self.name}"
+        self.contents.shared.warnings.append(f"{location}: {text}")
+
+    def warn_once(self, text: str) -> None:
+        """Warn, but only once of the same."""
+        if text not in self.warned:
+            self.warned.add(text)
+            self.warn(text)
+
 
 TARGETS = ("shape", "light", "material", "medium", "texture")
 
@@ -98,7 +174,7 @@ class State:
         return versions[max(at - 1, 0)]
 
     def motion(self) -> Keys | None:
-        """Return the keys of what the transforms move, None: it is still. Raises SceneError."""
+        """Return the keys of moving transforms, None if they are still. Raises SceneError."""
         if self.end is None or np.array_equal(self.end, self.ctm):
             return None
         return Keys(self.shared.times, np.stack([self.ctm, self.end]))
@@ -108,7 +184,7 @@ class State:
         return copy(self)
 
     def warn(self, source: Parameters | Parameter, text: str) -> None:
-        """Warn of what the picture will lack, with the file and line."""
+        """Warn of something that the picture will lack, with the file and line."""
         where = source.location()["where"]
         self.shared.warnings.append(f"{source.file.name}:{source.line}: {where}: {text}")
 
@@ -119,7 +195,7 @@ class State:
         self.warn(params, f"{error.message}; grey stands for it, or it is left out")
 
     def tell(self, text: str) -> None:
-        """Warn of what a file beside the scene has that is left out, once."""
+        """Warn once of a part of a file beside the scene that is left out."""
         if text not in self.shared.warnings:
             self.shared.warnings.append(text)
 
@@ -180,3 +256,72 @@ class State:
             ("material", definition), params, lambda: make(kind, params, state, name)
         )
         return material
+
+
+class TransformDirectives(Files):
+    """The directives that change `state.ctm`."""
+
+    def _concat(self, matrix: transforms.Matrix) -> None:
+        end = None if self.state.end is None else self.state.end @ matrix
+        self._set(self.state.ctm @ matrix, end)
+
+    def _set(self, matrix: transforms.Matrix, end: transforms.Matrix | None = None) -> None:
+        """Set the transforms that are active; end: at the last time, None for the same."""
+        end = matrix if end is None else end
+        if not (np.isfinite(matrix).all() and np.isfinite(end).all()):
+            raise SceneError("the transform is not finite any more")
+        state = self.state
+        at_first, at_last = state.active
+        former = state.ctm if state.end is None else state.end
+        end = end if at_last else former
+        state.ctm = matrix if at_first else state.ctm
+        state.end = None if end is state.ctm else end
+
+    def identity(self) -> None:
+        self._set(np.eye(4))
+
+    def translate(self) -> None:
+        self._concat(transforms.translate(self.lexer.numbers(3, "Translate")))
+
+    def scale(self) -> None:
+        self._concat(transforms.scale(self.lexer.numbers(3, "Scale")))
+
+    def rotate(self) -> None:
+        angle, *axis = self.lexer.numbers(4, "Rotate")
+        self._concat(transforms.rotate(axis, angle))
+
+    def look_at(self) -> None:
+        values = self.lexer.numbers(9, "LookAt")
+        self._concat(transforms.inverse(transforms.look_at(values[:3], values[3:6], values[6:])))
+
+    def transform(self) -> None:
+        self._set(self._matrix())
+
+    def concat_transform(self) -> None:
+        self._concat(self._matrix())
+
+    def _matrix(self) -> transforms.Matrix:
+        """Take 16 numbers, column by column."""
+        return self.lexer.numbers(16, self.name).reshape(4, 4).T.copy()
+
+    def coordinate_system(self) -> None:
+        self.contents.shared.systems[self.lexer.string("a name")] = self.state.ctm, self.state.end
+
+    def coord_sys_transform(self) -> None:
+        name = self.lexer.string("a name")
+        systems = self.contents.shared.systems
+        if name not in systems:
+            raise SceneError(f"there is no coordinate system {name!r}{did_you_mean(name, systems)}")
+        self._set(*systems[name])
+
+    def active_transform(self) -> None:
+        which = text.decode(self.lexer.next("All, StartTime or EndTime"))
+        if which not in ("All", "StartTime", "EndTime"):
+            raise SceneError(f"{which[:40]!r} is none of All, StartTime, EndTime")
+        self.state.active = which != "EndTime", which != "StartTime"
+
+    def transform_times(self) -> None:
+        first, last = self.lexer.numbers(2, "TransformTimes").tolist()
+        if not last > first:
+            raise SceneError(f"the last time, {last:g} s, must be after the first, {first:g} s")
+        self.contents.shared.times = first, last

@@ -19,7 +19,7 @@ from clpt.lenses import COATINGS, Prescription
 from clpt.lenses.glasses import LINE_D
 from clpt.lenses.prescription import DESIGN, reflectance
 from clpt.lenses.tracing import ZONES, FocusedLens, sag
-from clpt.render.records.camera_rows import GHOST_CELLS, LENS_SURFACE, RECORDS
+from clpt.render.records.camera import GHOST_CELLS, LENS_SURFACE, RECORDS
 from clpt.scene.cameras import Camera, Lens
 from clpt.scene.indices import check_index
 from clpt.scene.integrators import Film

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from clpt import bvh, transforms
 from clpt.arrays import Points, on_device
 from clpt.geometry import analytic, shapes, strands, triangles
-from clpt.geometry.tessellate import keeps_its_kind
+from clpt.geometry.analytic import keeps_its_kind
 from clpt.records import SHAPE, SHAPE_BITS
 from clpt.render.edit.moving_parts import (
     Boxes,
@@ -27,6 +27,7 @@ from clpt.render.edit.moving_parts import (
     MovingInstances,
     MovingSpheres,
 )
+from clpt.render.edit.plan import Plan
 from clpt.render.edit.scene_edit import Replacements
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
@@ -93,8 +94,8 @@ class Moving:
                 ranges.in_group = transforms.inverse(outer) @ shapes.placement(ranges.shape)
             self.ranges.setdefault(number, []).append(ranges)
 
-    def plan(self, scene: Scene, replaced: Replacements) -> Callable[[], None] | str:
-        """Return a function that enqueues new transforms and vertices of shapes, and refits trees.
+    def plan(self, scene: Scene, replaced: Replacements) -> Move | str:
+        """Return a plan of new transforms and vertices of shapes, and of refits of trees.
 
         scene: the present scene; replaced: the shapes that move, and their replacements. Returns
         the reason as a text if the scene must be lowered again.
@@ -106,16 +107,9 @@ class Moving:
         Raises SceneError for a transform that is singular, and arrays of the wrong shape or type.
         """
         try:
-            actions = self._plan(scene, replaced)
+            return Move(self, self._plan(scene, replaced))
         except CannotMove as reason:
             return str(reason)
-
-        def move() -> None:
-            for action in actions:
-                action()
-            self._fit_trees()
-
-        return move
 
     def _plan(self, scene: Scene, replaced: Replacements) -> list[Action]:
         """Return the actions that enqueue a move. Raises CannotMove."""
@@ -260,7 +254,7 @@ class Moving:
         return act
 
     def _boxes_of(self, tree: str, lowered: NDArray[np.float32]) -> Boxes:
-        """Return the boxes of a tree, which `_fit_trees` will refit."""
+        """Return the boxes of a tree, which `fit_trees` will refit."""
         if tree not in self._boxes:
             host = lowered.copy()
             self._boxes[tree] = host, self.target.buffers.upload("boxes of what moves", host)
@@ -374,7 +368,7 @@ class Moving:
             _ROOT, "smooth_normals", count, first=first, **tables, **ranges.around
         )
 
-    def _fit_trees(self) -> None:
+    def fit_trees(self) -> None:
         """Enqueue refits of the trees over shapes that moved."""
         target, trees = self.target, self.target.trees
         if "triangles" in self._moved:
@@ -388,6 +382,23 @@ class Moving:
         if "instance" in self._moved:
             target.moved_tables.add("instances")
         self._moved.clear()
+
+
+@dataclass(frozen=True, eq=False)
+class Move(Plan):
+    """New transforms and vertices of shapes that move; actions: write the tables of each shape."""
+
+    moving: Moving
+    actions: list[Action]
+
+    @property
+    def repeatable(self) -> bool:
+        return False
+
+    def write(self) -> None:
+        for action in self.actions:
+            action()
+        self.moving.fit_trees()
 
 
 def _check_fields(old: Shape, new: object) -> None:

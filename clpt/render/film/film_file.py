@@ -31,7 +31,7 @@ from clpt.images import exr_files
 from clpt.render.film.pictures import PictureForm
 from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.film.state import FilmState
-from clpt.render.records.layer_names import LayerNames
+from clpt.render.records.film import LayerNames
 from clpt.scene.fingerprint import Fingerprint
 from clpt.spectra.spaces import chromaticities
 

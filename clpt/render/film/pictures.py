@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from clpt.arrays import Image
 from clpt.errors import SceneError
 from clpt.images.spectral_exr import SpectralImage
-from clpt.render.records.layer_names import LayerNames
+from clpt.render.records.film import LayerNames
 from clpt.scene import Film
 
 if TYPE_CHECKING:
@@ -82,8 +82,8 @@ class Pictures(ABC):
         """
 
     @property
-    def beside(self) -> Mapping[str, Image]:
-        """Pictures that files show beside this picture, by name."""
+    def extra_pictures(self) -> Mapping[str, Image]:
+        """Further pictures for files that show this picture, by name."""
         return {}
 
     def image(self) -> Image:

@@ -48,7 +48,7 @@ def of_film(index: SceneIndex, layers: LayerFeatures) -> FilmFeatures:
         filter=FilterFeatures(film.filter.kind, index.filter_taps, index.filter_reach),
         layers=layers,
         bands=bool(film.bands),
-        alpha=index.alpha,
+        alpha=index.film.alpha,
     )
 
 
@@ -61,7 +61,7 @@ def of_transport(index: SceneIndex, profile: int, *, aimed: bool) -> TransportFe
     integrator, weighed = index.integrator.kind, index.weighed > 0
     return TransportFeatures(
         integrator=INTEGRATORS.get(integrator, integrator),
-        sampler=index.scene.sampler.kind,
+        sampler=index.sampler.kind,
         light_paths=index.light_paths,
         weighed=weighed,
         joined=index.joined and (index.light_paths or weighed),

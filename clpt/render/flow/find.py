@@ -90,7 +90,7 @@ def analyse(scene: Scene, cache: LoweringCache, before: Before | None = None) ->
     former = before.integrator if before else None
     lights = Lit(index, geometry, look, sources, sphere, lit.extinction)
     index, reason = decided(lights, former)
-    around, warnings = _at_the_camera(index, cache)
+    around, warnings = _at_the_camera(scene, index, cache)
     sealed = sealed_media(index, cache) if index.media else frozenset()
     aimed = aims(index, geometry, sphere[1])
     return Analysis(
@@ -121,9 +121,10 @@ def _media_at_lights(
     return replace(index, lit_media=found.refusal), found
 
 
-def _at_the_camera(index: SceneIndex, cache: LoweringCache) -> tuple[tuple[Any, ...], list[str]]:
+def _at_the_camera(
+    scene: Scene, index: SceneIndex, cache: LoweringCache
+) -> tuple[tuple[Any, ...], list[str]]:
     """Return the media or the bodies at the camera, and warnings."""
-    scene = index.scene
     around: tuple[Any, ...] = ()
     if index.nested:
         around = bodies_around(scene, matter_of, cache)

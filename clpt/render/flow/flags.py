@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from clpt.render.records import Features
 from clpt.render.records.macros import said
-from clpt.render.records.texture_rows import IMAGES
+from clpt.render.records.textures import IMAGES
 from clpt.scene.params import device_params
 from clpt.scene.scatterer import Scatterer
 

@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
 from clpt.geometry import instancing
-from clpt.geometry.primitive_rows import primitive_rows
+from clpt.geometry.instancing import primitive_rows
 from clpt.geometry.shapes import geometry as geometry_of
 from clpt.records import SHAPE_BITS
 from clpt.render.geometry.find import Geometry
 from clpt.render.lights.encode import LightRows
 from clpt.render.lights.find import row_order
 from clpt.render.records import LayerFeatures
-from clpt.render.records.layer_names import LayerNames
+from clpt.render.records.film import LayerNames
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.records.tables import TableStore
 from clpt.render.scene_index import SceneIndex

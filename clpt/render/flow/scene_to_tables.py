@@ -34,9 +34,9 @@ from clpt.render.media.light_media import light_media_words
 from clpt.render.motion.encode import lower_motion
 from clpt.render.records import Features, GeometryFeatures, LayerFeatures, SpectraFeatures
 from clpt.render.records.device_arrays import is_table
-from clpt.render.records.layer_names import LayerNames
+from clpt.render.records.film import LayerNames
 from clpt.render.records.lowering_cache import LoweringCache
-from clpt.render.records.parameter_words import row_words
+from clpt.render.records.materials import row_words
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.find import Density, density, emissions
 from clpt.render.textures.image_files import ImageFiles

@@ -101,16 +101,16 @@ def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
     margin = settings["margin"] = 0 if index.light_paths else index.filter_reach
     settings["tiles_x"] = -(-(width + 2 * margin) // 4)
     settings["padded_pixels"] = 16 * settings["tiles_x"] * -(-(height + 2 * margin) // 4)
-    settings["alpha"] = index.alpha
+    settings["alpha"] = index.film.alpha
     settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
     settings["bands"] = film.bands
 
 
 def _set_paths(settings: NDArray[np.void], index: SceneIndex) -> None:
     """Write what the sampler and the integrator say of paths."""
-    scene, integrator = index.scene, index.integrator
-    settings["seed"] = scene.seed
-    settings["sample_bits"] = min((max(scene.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
+    integrator = index.integrator
+    settings["seed"] = index.seed
+    settings["sample_bits"] = min((max(index.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
     depth = integrator.max_depth
     settings["max_depth"] = DEEPEST if depth < 0 else min(depth, DEEPEST)
     settings["rr_depth"] = min(integrator.rr_depth, DEEPEST)

@@ -14,9 +14,9 @@ from clpt.render.lights import emission_cases as emission
 from clpt.render.materials import cases as parameters
 from clpt.render.materials import thin_films
 from clpt.render.records import CameraFeatures, Features, GridFeatures, MaterialFeatures
-from clpt.render.records import camera_rows as camera_records
+from clpt.render.records import camera as camera_records
 from clpt.render.records.dispatch import Case, Function, active, function
-from clpt.render.records.parameter_words import MIXTURE, row_words, words
+from clpt.render.records.materials import MIXTURE, row_words, words
 from clpt.scene.materials import Dielectric
 from clpt.scene.params import device_params, interior_params
 from clpt.scene.roles import Role
@@ -200,7 +200,7 @@ def _pane_text(features: Features, cls: type[Scatterer]) -> list[str]:
     """The struct and the loader of thin glass."""
     sources = features.materials.sources_of(cls.kind)
     return [
-        '#include "materials/thin_slab.cl"\n',
+        '#include "materials/fresnel.cl#thin_slab"\n',
         parameters.struct_text(cls, sources),
         parameters.load_text(cls, sources, "materials"),
     ]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import on_device
-from clpt.geometry import holes, shapes
+from clpt.geometry import shapes, winding
 from clpt.geometry.winding import triangles_of
 from clpt.render.geometry.surroundings import every
 from clpt.render.records.lowering_cache import LoweringCache
@@ -60,6 +60,7 @@ def _insides(shape: Shape) -> Iterator[Any]:
         return
     for part in mt.parts(shape.material):
         thin = isinstance(part, mt.GltfSurface) and part.thin
+        thin |= isinstance(part, mt.Openpbr) and part.thin_walled
         if part.absorption != CLEAR and not thin:
             yield part.absorption
 
@@ -67,9 +68,9 @@ def _insides(shape: Shape) -> Iterator[Any]:
 def _largest_hole(shape: Shape, cached: LoweringCache | None) -> float:
     """Return the size of a shape's largest hole over the shape's area."""
     if cached is None:
-        return holes.largest_hole(*triangles_of(shape))
+        return winding.largest_hole(*triangles_of(shape))
     vertices, faces = triangles_of(shape, cached)
-    share: float = cached(holes.largest_hole, vertices, faces)
+    share: float = cached(winding.largest_hole, vertices, faces)
     return share
 
 
@@ -93,4 +94,4 @@ def hole_around(index: SceneIndex, inside: object, cached: LoweringCache | None)
         points.append(np.asarray(vertices, np.float64))
         faces.append(np.asarray(triangles, np.int64)[:, :: int(sign)] + first)
         first += len(vertices)
-    return holes.largest_hole(holes.together(np.concatenate(points)), np.concatenate(faces))
+    return winding.largest_hole(winding.snapped(np.concatenate(points)), np.concatenate(faces))

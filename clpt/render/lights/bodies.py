@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats, on_device
 from clpt.geometry import analytic, shapes
-from clpt.geometry.tessellate import keeps_its_kind
+from clpt.geometry.analytic import keeps_its_kind
 from clpt.geometry.winding import box
 from clpt.render.geometry.open_boundaries import HOLE, hole_around
 from clpt.render.geometry.surroundings import every
 from clpt.render.lights.bounds import Bounds, all_around
 from clpt.render.lights.bricks import BrickLights, black_bodies, brick_lights
 from clpt.render.materials.encoder import Encoder
-from clpt.render.records.light_rows import BODY, RECORDS
+from clpt.render.records.lights import BODY, RECORDS
 from clpt.render.scene_index import SceneIndex, leaves_of
 from clpt.render.spectra.look import Look
 from clpt.scene.media import Grid, Lattice, Medium

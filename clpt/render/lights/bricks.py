@@ -13,7 +13,7 @@ from clpt.arrays import on_host
 from clpt.records import BRICK_CELLS
 from clpt.render.lights.bounds import Bounds, all_around
 from clpt.render.materials.encoder import Encoder
-from clpt.render.records.light_rows import BRICK, RECORDS
+from clpt.render.records.lights import BRICK, RECORDS
 from clpt.scene.media import Grid, Lattice
 from clpt.scene.volumes import check_density
 from clpt.spectra import cie

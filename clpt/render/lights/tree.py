@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from clpt.arrays import Floats
 from clpt.render.lights.bounds import Bounds
 from clpt.render.lights.tree_nodes import Cones, Lobes, around, measure, merged, reach
-from clpt.render.records.light_rows import LINE, NODE, WIDTH
+from clpt.render.records.lights import LINE, NODE, WIDTH
 
 BINS = 12  # along an axis, between which a node may be split
 DEEPEST = 31  # levels below the root; half remain, with two bits of a trail each

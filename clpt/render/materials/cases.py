@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from clpt.layout import row_words
 from clpt.render.records import Features
 from clpt.render.records.dispatch import Case, choose, function, indented
-from clpt.render.records.parameter_words import (
+from clpt.render.records.materials import (
     NORMAL_MAP_WORDS,
     SPECTRUM_WORDS,
     array_size,
@@ -153,12 +153,15 @@ class Table:
 
 TABLES: dict[Role, Table] = {
     roles.ANGULAR: Table(
-        "angular_load", "materials/angular_table.cl", "materials/angular_load.cl", counted=False
+        "angular_load",
+        "materials/angular_table.cl",
+        "materials/angular_table.cl#load",
+        counted=False,
     ),
     roles.MEASUREMENT: Table(
-        "measurement_load", "materials/measurement.cl", "materials/measurement_load.cl"
+        "measurement_load", "materials/measurement.cl", "materials/measurement.cl#load"
     ),
-    roles.MERL: Table("merl_load_table", "materials/merl_table.cl", "materials/merl_load.cl"),
+    roles.MERL: Table("merl_load_table", "materials/merl_table.cl", "materials/merl_table.cl#load"),
 }
 # the loads of members that are neither spectra nor numbers
 LOADS: dict[Role, Callable[[_Read], str]] = {

@@ -16,15 +16,14 @@ import numpy as np
 from clpt.errors import SceneError
 from clpt.render.materials.encoder import Encoder
 from clpt.render.materials.normal_maps import NormalPerturbation
-from clpt.render.records.parameter_words import MIXTURE, NORMAL_MAP_WORDS
+from clpt.render.records.materials import MIXTURE, NORMAL_MAP_WORDS
 from clpt.render.scene_index import any_of
 from clpt.scene import materials as mt
 from clpt.scene import roles
-from clpt.scene.params import Kind, device_params, fields_of
+from clpt.scene.params import fields_of
 from clpt.scene.phases import Blend, Phase
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
-from clpt.scene.textures import Texture
 from clpt.spectra import RGB, RGBUnbounded, Spectrum
 
 _NULL, _BLACK = mt.Null(), mt.Diffuse(reflectance=0.0)
@@ -134,10 +133,10 @@ class MaterialWords:
         row = self._encoder.row(material, "materials", before)
         if row >= 1 << 24:
             raise SceneError("the scene has more than 16 million words of material parameters")
-        self.uvs |= _has_textures(material)
+        self.uvs |= material.has_textures
         self.tangents |= material.uses_tangents
         if isinstance(material, mt.Material):
-            self.uvs |= any(map(_has_textures, material.layers))
+            self.uvs |= any(layer.has_textures for layer in material.layers)
             self.absorption |= material.absorption != mt.CLEAR
         if material.transmits:
             self.transmitting.add(material.kind)
@@ -152,12 +151,6 @@ class MaterialWords:
         word = MIXTURE << 24 | self._encoder.store.append("mixtures", [*words, *children])
         self._depths[word] = 1 + max(self._depths.get(child, 0) for child in children)
         return word
-
-
-def _has_textures(kind: Kind) -> bool:
-    """Return whether a parameter that kernels read is a texture."""
-    values = fields_of(kind)
-    return any(isinstance(values[name], Texture) for name in device_params(type(kind)))
 
 
 def gloss_word(material: Scatterer) -> int:
@@ -200,6 +193,15 @@ def _principled(values: Values) -> tuple[float, float]:
     return _mean(values["roughness"], ROUGHLY) ** 2, _share(straight, (1.0 - metal) * albedo)
 
 
+def _openpbr(values: Values) -> tuple[float, float]:
+    metal, albedo = _mean(values["base_metalness"]), _mean(values["base_color"])
+    straight = metal * albedo + (1.0 - metal) * STRAIGHT
+    rough, coat = _mean(values["specular_roughness"], ROUGHLY), _mean(values["coat_weight"])
+    if coat > metal:
+        rough = min(rough, _mean(values["coat_roughness"], ROUGHLY))
+    return rough**2, _share(straight, (1.0 - metal) * albedo)
+
+
 def _phong(values: Values) -> tuple[float, float]:
     share = _share(_mean(values["specular"]), _mean(values["diffuse"]))
     return float(np.sqrt(2.0 / (4.0 * _mean(values["exponent"], EXPONENT) + 2.0))), share
@@ -215,5 +217,6 @@ _GLOSSY: dict[str, Callable[[Values], tuple[float, float]]] = {
     "rough_plastic": _plastic,
     "principled": _principled,
     "gltf_surface": _principled,
+    "openpbr": _openpbr,
     "phong": _phong,
 }

@@ -11,8 +11,7 @@ import numpy as np
 from clpt.arrays import Words
 from clpt.render.materials import thin_films
 from clpt.render.records.lowering_cache import LoweringCache
-from clpt.render.records.materials import Sources
-from clpt.render.records.parameter_words import LAYERS_WORDS, ORDERS_WORDS, words
+from clpt.render.records.materials import LAYERS_WORDS, ORDERS_WORDS, Sources, words
 from clpt.render.records.tables import TableStore, as_words
 from clpt.render.spectra.encode import SpectraTable
 from clpt.render.spectra.find import Density
@@ -23,7 +22,6 @@ from clpt.scene import roles
 from clpt.scene.materials import Material
 from clpt.scene.params import (
     Kind,
-    Texture,
     device_params,
     fields_of,
     interior_params,
@@ -31,6 +29,7 @@ from clpt.scene.params import (
     place_of,
 )
 from clpt.scene.roles import Param, Role, Spectral
+from clpt.scene.texture_values import is_texture
 from clpt.spectra import RGB, Constant, Sensor, Tabulated
 
 BLACK = (Constant(0.0), RGB(0.0, 0.0, 0.0))
@@ -157,9 +156,8 @@ class Encoder:
 
         owner: the kind with this parameter, if any.
         """
-        if isinstance(value, Texture):
-            value = self.textures.folded(value, param.role)
-        if isinstance(value, Texture):
+        value = self.textures.folded(value, param.role)
+        if is_texture(value):
             texture_words = np.zeros(words(param), np.uint32)
             texture_words[-1] = 1 + self.textures.row(value, param.role)
             return texture_words, "texture"

@@ -10,7 +10,7 @@ import numpy as np
 
 from clpt.arrays import Words
 from clpt.render.materials.encoder import Encoder
-from clpt.render.records.parameter_words import NORMAL_MAP_WORDS
+from clpt.render.records.materials import NORMAL_MAP_WORDS
 from clpt.scene import roles
 from clpt.scene.materials import BumpMap, NormalMap
 from clpt.scene.scatterer import Scatterer

@@ -18,8 +18,8 @@ from clpt.render.lights.encode import LightRows
 from clpt.render.materials.encode import MaterialWords
 from clpt.render.materials.encoder import Encoder
 from clpt.render.media import grids
-from clpt.render.records.media import MOST_AIMS
-from clpt.render.records.parameter_words import SPECTRUM_WORDS
+from clpt.render.records import MOST_AIMS
+from clpt.render.records.materials import SPECTRUM_WORDS
 from clpt.render.records.tables import as_words
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import materials as mt

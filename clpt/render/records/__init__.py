@@ -6,19 +6,14 @@ several subjects is a property of `Features`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 from clpt.render.records.camera import CameraFeatures
 from clpt.render.records.film import FilmFeatures, FilterFeatures, LayerFeatures
-from clpt.render.records.geometry import GeometryFeatures
 from clpt.render.records.lights import LightFeatures
-from clpt.render.records.macros import macro
+from clpt.render.records.macros import flag, macro, number
 from clpt.render.records.materials import MaterialFeatures
-from clpt.render.records.media import GridFeatures, MediaFeatures
-from clpt.render.records.motion import MotionFeatures
-from clpt.render.records.spectra import SpectraFeatures
 from clpt.render.records.textures import TextureFeatures
-from clpt.render.records.transport import TransportFeatures
 from clpt.scene.layers import LAYERS
 
 __all__ = [
@@ -42,6 +37,137 @@ __all__ = [
 
 SUM_WORDS = 3  # kernels/core/fixed.cl
 GROUP_WORDS = 3 * SUM_WORDS + 1  # of a pixel: three sums and a count, see kernels/film/film.cl
+
+
+@dataclass(frozen=True)
+class GeometryFeatures:
+    """The kinds of shapes that rays meet as they are, instances, and what vertices have."""
+
+    analytic: tuple[str, ...] = ()
+    instances: bool = flag("USES_INSTANCES")
+    only_instances: bool = flag("ONLY_INSTANCES")  # all triangles are of groups
+    few_instances: int = flag("FEW_INSTANCES", 0)  # how many, if a ray goes to each without a tree
+    normals: bool = False
+    uvs: bool = False
+    tangents: bool = flag("USES_TANGENTS")
+    vertex_tangents: int = flag("VERTEX_TANGENTS", 0)  # where in `distributions` meshes' own lie
+
+    @property
+    @macro("USES_ANALYTIC")
+    def has_analytic(self) -> bool:
+        """Whether rays meet shapes that are no triangles."""
+        return bool(self.analytic)
+
+
+MOST_AIMS = 8  # lamps near which flights end, see kernels/media/equiangular.cl
+
+
+@dataclass(frozen=True)
+class GridFeatures:
+    """Media whose density is on a grid."""
+
+    present: bool = False
+    emissive: bool = False  # some give out light
+    hot: bool = False  # some have a temperature
+    tinted: bool = False  # some have an albedo on a grid
+    coloured: bool = False  # some have colours of their extinction on a grid
+    mixed: int = flag("GRIDS_MIXED", 0)  # parts of the one that is made of most
+    bytes: bool = False  # some have 8 bits for each number
+
+
+@dataclass(frozen=True)
+class MediaFeatures:
+    """Media, and bodies whose insides absorb light."""
+
+    absorption: bool = False  # inside of a dielectric
+    present: bool = flag("USES_MEDIA")
+    chromatic: bool = False  # some extinction depends on the wavelength
+    emissive: bool = False  # some give out light
+    dyed: bool = False  # some have a dye that gives out light
+    sealed: bool = flag("SEALED_MEDIA")  # no ray to a light can leave some
+    escapes: bool = False  # rays of their own leave them toward lamps
+    bodies: bool = False  # they may overlap, of different priorities
+    aims: int = number("MEDIUM_AIMS")  # rows about lamps near which flights through media end
+    grids: GridFeatures = GridFeatures()
+
+    @property
+    def aim_cones(self) -> bool:
+        """Whether some of these lamps shine into a cone; then each has two rows."""
+        return self.aims > 0 and self.aims != 1 and self.aims != MOST_AIMS
+
+    @property
+    @macro("USES_ABSORPTION")
+    def absorbing(self) -> bool:
+        """Whether light may be lost on its way."""
+        return self.absorption or self.present
+
+
+@dataclass(frozen=True)
+class MotionFeatures:
+    """The things that move, and where the table of them is."""
+
+    camera: bool = False
+    instances: bool = flag("MOVES_INSTANCES")
+    shapes: bool = False  # analytic ones
+    lights: bool = False
+    vertices: bool = flag("MOVES_VERTICES")  # have a row for each key
+    spheres: bool = flag("MOVES_SPHERES")  # of shapes `spheres` have a row for each key
+    emitters: bool = False  # triangles of lights have a row for each key
+    scales: bool = flag("MOTION_SCALES")  # some motion scales
+    row: int | None = number("MOTION_ROW", None)  # where in `distributions` its table begins
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The names of what moves."""
+        parts = (field.name for field in fields(self) if field.name not in ("scales", "row"))
+        return tuple(name for name in parts if vars(self)[name])
+
+    @property
+    def present(self) -> bool:
+        """Whether anything moves."""
+        return bool(self.parts)
+
+
+@dataclass(frozen=True)
+class SpectraFeatures:
+    """The mode, and the grid of tabulated spectra."""
+
+    mode: str = "rgb"
+    size: int = number("SPECTRA_SIZE")  # values of a spectrum
+    step: float = 1.0  # between them [nm]
+    tabulated_density: bool = False  # of wavelengths
+
+    @property
+    def spectral(self) -> bool:
+        """Whether paths have wavelengths."""
+        return self.mode == "spectral"
+
+    @property
+    @macro("SPECTRA_STEP")
+    def step_text(self) -> str:
+        """The step in the text of kernels."""
+        return f"{self.step}f"
+
+
+@dataclass(frozen=True)
+class TransportFeatures:
+    """The integrator and the sampler, and what paths do; of one kind of paths of a scene."""
+
+    integrator: str = "path"
+    sampler: str = "sobol"
+    light_paths: bool = flag("LIGHT_PATHS")  # paths start at lights
+    weighed: bool = flag("SUMS_LIGHT_PATHS")  # light paths have sums beside the camera's paths'
+    joined: bool = flag("JOINS_CAMERA")  # those are joined to the camera
+    merged: bool = False  # those leave photons, which paths from the camera gather
+    guided: bool = flag("USES_GUIDE")  # directions of the camera's paths are learned
+    aimed: bool = False  # some light paths start toward what is sharp
+    lit_ghosts: bool = False  # light paths are ghosts of the lens, and no more
+    light_filter: tuple[int, int, int] = (0, 0, 0)  # of weighed light paths: taps, reach, profile
+
+    @property
+    def balanced(self) -> bool:
+        """Whether paths from the camera are weighed against light paths."""
+        return self.weighed and not self.lit_ghosts
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,98 @@
-"""Features of a camera: its kind, and what its lens does."""
+"""The camera: the records of its table, and its features."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from clpt.render.records.camera_rows import WEIGHTED
+from clpt.layout import Record
 from clpt.render.records.macros import flag
+
+_TO_WORLD = ("matrix", "camera space to world, row-major")
+
+_NEAR = ("real", "distance of the near plane [m]")
+
+_FAR = ("real", "distance of the far plane [m]")
+
+_PINHOLE = {
+    "to_world": _TO_WORLD,
+    "extent": ("vec2", "width and height of the film at distance 1"),
+    "offset": ("vec2", "of the principal point, in widths and heights of the film"),
+    "near": _NEAR,
+    "far": _FAR,
+}
+
+WEIGHTED = ("lens",)  # cameras whose rays have weights
+GHOST_CELLS = 1024  # of equal probability, from which pairs of reflecting surfaces are drawn
+
+RECORDS: dict[str, Record] = {
+    "perspective": Record("PerspectiveCamera", "A pinhole.", **_PINHOLE),
+    "thin_lens": Record(
+        "ThinLensCamera",
+        "A pinhole with an aperture.",
+        **_PINHOLE,
+        aperture_radius=("real", "of the lens [m]"),
+        focus_distance=("real", "of the plane in focus [m]"),
+        focal_length=("real", "at the design wavelength [m]"),
+        power=("real", "index - 1 of the glass at that wavelength"),
+        glass=("integer", "row in `spectra` of a glass that disperses"),
+    ),
+    "lens": Record(
+        "LensCamera",
+        "A lens of surfaces. Behind it follow tables; where: their first words, from to_world on.",
+        to_world=_TO_WORLD,
+        extent=("vec2", "width and height of the film [m]"),
+        back=("real", "from the film to the last surface [m]"),
+        exposure=("real", "by which irradiance is multiplied [1/sr]"),
+        surfaces=("integer", "where the rows of LensSurface begin, from the film on"),
+        count=("integer", "of surfaces"),
+        zones=("integer", "where the ellipses begin that rings of the film see"),
+        zones_per_metre=("real", "rings in a metre of the film's radius"),
+        last_zone=("integer", "number of the outermost ring"),
+        blades=("integer", "of the diaphragm; 0: it is round"),
+        blade_normals=("integer", "where the blades' normals begin"),
+        blade_distance=("real", "of a blade from the axis, in radii of the stop"),
+        ghosts=("real", "share of samples that are reflected twice"),
+        ghost_cells=("integer", "where the pairs of surfaces begin that they are drawn from"),
+        rear_radius=("real", "on the rear plane, of rays that meet the last surface [m]"),
+    ),
+    "orthographic": Record(
+        "OrthographicCamera",
+        "Parallel rays.",
+        to_world=_TO_WORLD,
+        aspect=("real", "height of the film over its width"),
+        near=_NEAR,
+        far=_FAR,
+    ),
+    "spherical": Record("SphericalCamera", "All directions around a point.", to_world=_TO_WORLD),
+    "matrix": Record(
+        "MatrixCamera",
+        "Unprojects clip coordinates x and y.",
+        direction=("vec3", "at x = y = 0; not normalised"),
+        direction_x=("vec3", "what it gains per x"),
+        direction_y=("vec3", "and per y"),
+        near=("spectrum", "point on the near plane at x = y = 0, homogeneous"),
+        near_x=("spectrum", "what it gains per x"),
+        near_y=("spectrum", "and per y"),
+    ),
+}
+
+LENS_SURFACE = Record(
+    "LensSurface",
+    "A surface of a lens in camera space, lengths in metres; curvatures as seen from the film.",
+    z=("real", "of the vertex, the film's being 0"),
+    curvature=("real", "above 0 where the centre is on the scene's side"),
+    conic=("real", "constant; 0: a sphere"),
+    radius=("real", "half the diameter"),
+    form=("integer", "0: a sphere or a plane, 1: a conic, 2: with aspheric terms"),
+    stop=("integer", "1: the diaphragm is here"),
+    near_index=("real", "on the film's side"),
+    far_index=("real", "on the scene's side"),
+    near_glass=("integer", "row in `spectra` of a glass that disperses, else -1"),
+    far_glass=("integer", "the same, on the scene's side"),
+    coats=("integer", "films on it"),
+    first_coat=("integer", "where these begin: index and thickness [nm], from the scene on"),
+    **{f"a{i}": ("real", f"sag [m] of (r / radius)^{2 * i + 4}") for i in range(8)},
+)
 
 
 @dataclass(frozen=True)

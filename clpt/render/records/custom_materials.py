@@ -17,7 +17,7 @@ from clpt import device
 from clpt.errors import SceneError
 from clpt.geometry import shape_records
 from clpt.records import INSTANCE, LIGHT, SETTINGS, SHAPE, SLABS
-from clpt.render.records import light_rows as light_records
+from clpt.render.records import lights as light_records
 from clpt.scene import KINDS
 from clpt.scene.materials import LEAVES, Material
 from clpt.scene.scatterer import Scatterer

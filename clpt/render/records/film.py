@@ -1,4 +1,4 @@
-"""Features of a film: its filter, its sums, and its layers beside the picture."""
+"""A film: the features of its filter, sums and layers, and the names in its layers."""
 
 from __future__ import annotations
 
@@ -145,3 +145,16 @@ class FilmFeatures:
     first_word: int = 0  # of those words of a pixel that paths add to
     bands: bool = flag("USES_BANDS")  # a spectral film
     alpha: bool = flag("USES_ALPHA")  # a film that tells what is covered
+
+
+@dataclass(frozen=True)
+class LayerNames:
+    """Names of what is in a scene, as far as its layers tell of it.
+
+    objects: of the scene's shapes, in their order; materials: of all materials, by number;
+    light_groups: those of lights.
+    """
+
+    objects: tuple[str, ...] = ()
+    materials: tuple[str, ...] = ()
+    light_groups: tuple[str, ...] = ()

@@ -1,13 +1,72 @@
-"""Features of materials, and where all values that kernels load come from."""
+"""Materials: the words of parameters in a row, and the features of materials."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from clpt.records import MATERIAL_KINDS, RERADIATION_SIZES
 from clpt.render.records.macros import flag, macro
-from clpt.scene.params import device_params
-from clpt.scene.roles import INDEX
+from clpt.scene import roles
+from clpt.scene.params import Kind, device_params, interior_params
+from clpt.scene.roles import INDEX, ORDERS, Param, Role
 from clpt.scene.scatterer import Scatterer
+
+NORMAL_MAP_WORDS = 23  # before a material's row, see kernels/materials/shading_frame.cl
+MIXTURE = MATERIAL_KINDS["mixture"]
+FILM_COSINES = 128  # of the table of a film's colours, from 0 to 1
+RERADIATION_STEP = RERADIATION_SIZES["step"]  # [nm] between the nodes of a matrix
+
+# How many words a parameter takes in a row of `materials`, `textures` or `light_params`.
+SPECTRUM_WORDS = 5  # x y z w and where the value comes from: 0 here, > 0 texture, < 0 table
+REAL_WORDS = 2  # the value, and 0 or 1 + the texture
+ORDERS_WORDS = 2 * ORDERS + 1
+ANGULAR_WORDS = 5  # of the table: first value, cosines, rows; first wavelength, rows a nm
+MEASUREMENT_WORDS = 1 + SPECTRUM_WORDS  # its first number; which colour a wavelength has
+MERL_WORDS = 4  # its first number; rows of what red, green and blue are
+LAYERS_WORDS = 2  # where the layers lie, see clpt.render.materials.thin_films; how many
+
+
+@dataclass(frozen=True)
+class Member:
+    """A value as kernels have it: words in its row, and `count` values of a type in its struct."""
+
+    words: int
+    lane_type: str
+    count: int = 1
+
+
+MEMBERS: dict[Role, Member] = {
+    **dict.fromkeys((*roles.SPECTRA, roles.RERADIATION), Member(SPECTRUM_WORDS, "Spectrum")),
+    roles.REAL: Member(REAL_WORDS, "real"),
+    roles.FLAG: Member(1, "integer"),
+    roles.CHOICE: Member(1, "integer"),
+    roles.ORDERS_OF_LIGHT: Member(ORDERS_WORDS, "real", ORDERS_WORDS),
+    roles.LAYERS: Member(LAYERS_WORDS, "Layers"),
+    roles.ANGULAR: Member(ANGULAR_WORDS, "AngularTable"),
+    roles.MEASUREMENT: Member(MEASUREMENT_WORDS, "Measurement"),
+    roles.MERL: Member(MERL_WORDS, "MerlTable"),
+}
+
+
+def words(param: Param) -> int:
+    """Return the number of 4-byte words that a parameter takes in its row."""
+    return MEMBERS[param.role].words
+
+
+def lane_type(param: Param) -> str:
+    """Return the parameter's type in a kind's struct."""
+    return MEMBERS[param.role].lane_type
+
+
+def array_size(param: Param) -> int:
+    """Return how many values of `lane_type` a parameter has in a kind's struct."""
+    return MEMBERS[param.role].count
+
+
+def row_words(cls: type[Kind]) -> int:
+    """Return the length of a kind's row."""
+    return sum(map(words, [*device_params(cls).values(), *interior_params(cls).values()]))
+
 
 Sources = frozenset[tuple[str, str, str]]
 

@@ -1,11 +1,114 @@
-"""Features of textures: their kinds and roles."""
+"""Textures: the records of their tables, and their features."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from clpt.layout import Record
 from clpt.render.records.macros import flag
-from clpt.render.records.texture_rows import MIPS
+
+_COMMON = {
+    "kind": ("integer", "position in the table of textures"),
+    "to_u": ("vec3", "u of the texture from (u, v, 1) of the surface"),
+    "to_v": ("vec3", "and v"),
+    "mapping": ("integer", "MAPPING_"),
+    "transform": ("integer", "first of twelve words in `textures`: from the world to the mapping"),
+}
+
+_SOLID = {
+    "kind": _COMMON["kind"],
+    "transform": ("integer", "first of twelve words in `textures`: from the world to the texture"),
+}
+
+_OCTAVES = {
+    "octaves": ("integer", "how many"),
+    "roughness": ("real", "how strong each is beside the one before"),
+}
+
+_IMAGE = {
+    **_COMMON,
+    "width": ("integer", "[texels]"),
+    "height": ("integer", "[texels]"),
+    "first": ("integer", "of its words in `images`"),
+    "filter": ("integer", "BITMAP_FILTER_"),
+    "wrap_u": ("integer", "BITMAP_WRAP_"),
+    "wrap_v": ("integer", "BITMAP_WRAP_"),
+    "decode": ("integer", "of 256 words in `images`: what bytes mean"),
+}
+
+RECORDS: dict[str, Record] = {
+    "bitmap": Record("Bitmap", "An image of floats.", **_IMAGE),
+    "packed_bitmap": Record("PackedBitmap", "An image of bytes.", **_IMAGE),
+    "checkerboard": Record(
+        "Checkerboard",
+        "Two colours.",
+        **_COMMON,
+        color0=("integer", "first of its five words in `textures`"),
+        color1=("integer", "first of its five words in `textures`"),
+    ),
+}
+
+RECORDS["dots"] = Record("Dots", "Round dots.", **_COMMON)
+
+RECORDS["checkers"] = Record("Checkers", "Cubes.", **_SOLID)
+
+RECORDS["noise"] = Record(
+    "Noise", "Octaves of noise.", **_SOLID, pattern=("integer", "NOISE_PATTERN_"), **_OCTAVES
+)
+
+RECORDS["marble"] = Record(
+    "Marble",
+    "Marble.",
+    **_SOLID,
+    **_OCTAVES,
+    scale=("real", "how fine it is"),
+    variation=("real", "how much the veins are disturbed"),
+    colours=("integer", "first of five words of each of nine in `textures`"),
+)
+
+RECORDS["mesh_attribute"] = Record(
+    "MeshAttribute",
+    "Values per vertex or face.",
+    kind=_COMMON["kind"],
+    number=("integer", "its place in the directories of `attributes`"),
+    per_face=("integer", "1: a value for each face; 0: for each vertex"),
+)
+
+RECORDS["spectral_bitmap"] = Record(
+    "SpectralBitmap",
+    "An image of spectra.",
+    **{**_IMAGE, "first": ("integer", "of its floats in `texels`; `bands` a texel")},
+    bands=("integer", "values in a texel"),
+    number=("integer", "row in `spectra`: the number of the band by wavelength"),
+)
+
+_LEVELS = {
+    "levels": ("integer", "how many, that of the image itself among them"),
+    "table": ("integer", "first of three words of each in `textures`: first word, width, height"),
+}
+
+# kinds of images with smaller copies, by the kind that each level is
+MIPS = {"mip_bitmap": "bitmap", "packed_mip_bitmap": "packed_bitmap"}
+
+RECORDS["mip_bitmap"] = Record("MipBitmap", "Levels of floats.", **_IMAGE, **_LEVELS)
+
+RECORDS["packed_mip_bitmap"] = Record("PackedMipBitmap", "Levels of bytes.", **_IMAGE, **_LEVELS)
+
+# of texels, between which is filtered
+IMAGES = ("bitmap", "packed_bitmap", "spectral_bitmap", *MIPS)
+
+KINDS = (*(kind for kind in RECORDS if kind not in MIPS), "program", *MIPS)
+
+PROGRAM = KINDS.index("program")
+
+
+OPERANDS = ("top", "own", "factor", "real", "constant", "number")
+
+OPERATIONS = {"push": 0, "multiply": 8, "mix": 16}
+
+END = 32
+
+ROLES = ("reflectance", "emission", "index", "factor", "real")
 
 
 @dataclass(frozen=True)

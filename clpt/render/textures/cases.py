@@ -6,7 +6,7 @@ from typing import Literal
 
 from clpt.render.records import TextureFeatures
 from clpt.render.records.dispatch import Case, Function, active, function, indented
-from clpt.render.records.texture_rows import (
+from clpt.render.records.textures import (
     END,
     IMAGES,
     KINDS,
@@ -162,5 +162,5 @@ def _operand_text(kinds: dict[str, list[str]], depth: int) -> list[str]:
         f"#define PROGRAM_END {END}",
         *(f"#define TEXTURE_ROLE_{role.upper()} {i}" for i, role in enumerate(ROLES)),
         Function(signature, "spectrum_of(as_real(argument))", cases).text(),
-        '#include "textures/program.cl"',
+        '#include "textures/texture.cl#program"',
     ]

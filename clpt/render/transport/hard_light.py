@@ -99,7 +99,7 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
         chosen = Path(light_paths=0, guiding=True, guide_paths=given.guide_paths)
         reason = "directions are guided"
     chosen = replace(chosen, **shared(given, chosen))
-    index = replace(index, scene=replace(index.scene, integrator=chosen))
+    index = replace(index, integrator=chosen)
     return replace(index, candidates=_candidates(index, chosen) if former is None else ()), reason
 
 

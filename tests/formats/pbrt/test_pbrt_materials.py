@@ -9,9 +9,9 @@ from scipy import integrate
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.formats import load
-from clpt.formats.pbrt import coated_albedo
-from clpt.formats.pbrt.layered import body
+from clpt.formats.pbrt import scattering
 from clpt.formats.pbrt.materials import MAKERS, material
+from clpt.formats.pbrt.scattering import body
 from clpt.formats.pbrt.state import Definition
 from clpt.scene import materials
 from clpt.scene.materials import TwoSided
@@ -132,10 +132,10 @@ def layered(r, eta, thickness, bounces=200):
 @pytest.mark.parametrize("r", [0.05, 0.5, 0.95])
 def test_a_base_under_a_coat_that_absorbs(r):
     """Without absorption, the changed base leaves what the base left with it, twice passed."""
-    changed = coated_albedo.under_coat(1.5, 0.1)(r)
+    changed = scattering.under_coat(1.5, 0.1)(r)
     share = layered(1e-9, 1.5, 0.1) / layered(1e-9, 1.5, 0.0)  # what entering loses, as leaving
     assert layered(changed, 1.5, 0.0) == pytest.approx(share * layered(r, 1.5, 0.1), rel=2e-3)
-    assert coated_albedo.under_coat(1.5, 0.0)(r) == pytest.approx(r)
+    assert scattering.under_coat(1.5, 0.0)(r) == pytest.approx(r)
 
 
 def test_coated_diffuse():
@@ -155,7 +155,7 @@ def test_albedo_of_a_half_space(single):
     for _ in range(500):
         h = 1.0 / (np.sqrt(1.0 - single) + 0.5 * single * kernel @ h)
     wanted = 1.0 - 2.0 * np.sqrt(1.0 - single) * (weights * mu) @ h
-    assert coated_albedo.body_albedo(single, 1.0 - single, 0.0) == pytest.approx(wanted, abs=3e-3)
+    assert scattering.body_albedo(single, 1.0 - single, 0.0) == pytest.approx(wanted, abs=3e-3)
 
 
 def test_scattering_bodies():
@@ -203,8 +203,8 @@ def test_bodies_by_their_reflectance():
     a, s = body(params(**given, scale=("float", 2)), at).coefficients(spectral=False)
     a, s = a.to_rgb("unbounded"), s.to_rgb("unbounded")
     assert a + s == pytest.approx([0.25] * 3)
-    looks = coated_albedo.body_albedo(s, a, 0.3)
-    wanted = coated_albedo.from_body_reflectance(1.33)(np.array([0.9, 0.5, 0.1]))
+    looks = scattering.body_albedo(s, a, 0.3)
+    wanted = scattering.from_body_reflectance(1.33)(np.array([0.9, 0.5, 0.1]))
     assert looks == pytest.approx(wanted, abs=1e-6)
     assert isinstance(
         make("subsurface", at, roughness=("float", 0.3), **given), materials.RoughDielectric
@@ -243,8 +243,8 @@ def test_files_with_bodies(tmp_path, lamp, walks):
 
 
 def test_47_measured_media():
-    assert len(coated_albedo.MEDIA) == 47
-    assert coated_albedo.MEDIA["Pacific Ocean Surface Water"][1][0] == 0.031845
+    assert len(scattering.MEDIA) == 47
+    assert scattering.MEDIA["Pacific Ocean Surface Water"][1][0] == 0.031845
 
 
 def test_scale_of_a_leaf():

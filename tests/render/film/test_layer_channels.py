@@ -17,7 +17,7 @@ from clpt.render.film.cryptomatte import RANKS
 from clpt.render.film.layer_channels import SETS, channels_of
 from clpt.render.film.layers import white_paper
 from clpt.render.film.pictures import PictureForm, Still
-from clpt.render.records.layer_names import LayerNames
+from clpt.render.records.film import LayerNames
 from clpt.scene import Film
 from clpt.scene.layers import LAYERS
 from clpt.spectra import cie

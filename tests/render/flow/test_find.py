@@ -36,19 +36,19 @@ def scene(**changes: object) -> Scene:
 
 def test_the_integrator_is_decided_without_words() -> None:
     found = analyse(scene(), LoweringCache())
-    assert not isinstance(found.index.scene.integrator, Auto)
+    assert not isinstance(found.index.integrator, Auto)
     assert "is specular" in found.reason
     made = lower(scene())
-    assert type(made.integrator) is type(found.index.scene.integrator)
+    assert type(made.integrator) is type(found.index.integrator)
     assert made.reason == found.reason
 
 
 def test_what_was_decided_before_stays() -> None:
     found = analyse(scene(), LoweringCache(), Before(Path(light_paths=0), lit_ghosts=False))
-    assert found.index.scene.integrator.light_paths == 0
+    assert found.index.integrator.light_paths == 0
     assert found.reason == "as before the scene was edited"
     kept = analyse(scene(), LoweringCache(), Before(Vcm(), lit_ghosts=False))
-    assert isinstance(kept.index.scene.integrator, Vcm)
+    assert isinstance(kept.index.integrator, Vcm)
 
 
 def test_sources_are_those_of_the_rows_of_lights() -> None:

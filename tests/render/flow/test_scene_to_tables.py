@@ -14,7 +14,7 @@ from clpt.render.flow.scene_to_tables import TREE_FROM, lower
 from clpt.render.flow.settings import DEEPEST
 from clpt.render.geometry import find as geometry
 from clpt.render.materials.encode import gloss_word
-from clpt.render.records.parameter_words import MIXTURE, NORMAL_MAP_WORDS
+from clpt.render.records.materials import MIXTURE, NORMAL_MAP_WORDS
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 import clpt.transforms as tf
-from clpt.geometry.holes import largest_hole
+from clpt.geometry.winding import largest_hole
 from clpt.render.flow.scene_to_tables import lower
 from clpt.render.geometry.open_boundaries import HOLE
 from clpt.scene import Film, Scene, materials, media

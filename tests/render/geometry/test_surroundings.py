@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from clpt import transforms as tf
-from clpt.geometry.tessellate import tessellate
+from clpt.geometry.analytic import tessellate
 from clpt.geometry.triangles import triangulate
 from clpt.geometry.winding import winding_number
 from clpt.render.geometry.surroundings import media_around, warnings_of
