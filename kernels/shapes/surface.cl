@@ -1,7 +1,7 @@
 /* The point of a surface that a ray hit, with all that shading asks for. */
 #include "core/rounding.cl"
 #include "shapes/surface_flags.cl"
-#include "tracing/trace_hit.cl"
+#include "tracing/trace.cl"
 #include "shapes/surface_point.cl"
 #include "shapes/map_frame.cl"
 #include "generated/hit_space.cl"

@@ -1,7 +1,7 @@
 /* The ray that waits in the shadow slab of a path: to a light, or, from a light, to the camera. */
 #include "shapes/shape.cl"
 #include "generated/trace.cl"
-#include "tracing/passage.cl"
+#include "tracing/transmittance.cl"
 #include "generated/transmittance.cl"
 #define ShadowPassage Passage
 #define shadow_most(passes) passage_most(passes)

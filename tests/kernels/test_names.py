@@ -44,12 +44,10 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("spectra/density.cl", "spectra/visible.cl", "spectra/rgb_read.cl"),
     ("spectra/rgb*.cl", "spectra/spectral*.cl"),
     ("shapes/corner_rows*.cl",),
-    ("tracing/curve_others*.cl",),
-    ("tracing/instances_*.cl",),
-    ("tracing/shape_rows_m*.cl", "tracing/shape_rows_single.cl"),
-    ("tracing/shape_rows_s*.cl",),
-    ("tracing/trace_*.cl",),
-    ("tracing/transmittance*.cl",),
+    ("tracing/instances.cl#*",),
+    ("tracing/shape_rows.cl#*",),
+    ("tracing/trace.cl#*", "tracing/curves.cl#trace"),
+    ("tracing/transmittance.cl#*",),
 )
 DEFAULTS = ("FEW_LIGHTS", "FILM_GROUP", "FILM_WORDS")  # flags that files define where none is set
 COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)

@@ -182,17 +182,17 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *when(f.materials.normal_mapped, "generated/normal_map.cl"),
         *either(f.materials.normal_mapped, "materials/shading_frame.cl"),
     ),
-    "generated/transmittance.cl": lambda f, _: (f"tracing/transmittance{_passing(f)}.cl",),
+    "generated/transmittance.cl": lambda f, _: (f"tracing/transmittance.cl#{_passing(f)}",),
     "generated/shadow_ray.cl": lambda f, _: (
         when(f.shadow_media, "transport/shadow_ray_media.cl")
         or when(f.media.escapes, "transport/shadow_ray_escapes.cl")
         or ("transport/shadow_ray.cl",)
     ),
     "generated/trace.cl": lambda _, layout: (
-        f"tracing/trace_{'lanes' if layout == 'brute' else 'one'}.cl",
+        f"tracing/trace.cl#{'lanes' if layout == 'brute' else 'one'}",
     ),
     "generated/curve_others.cl": lambda f, _: either(
-        f.geometry.analytic != ("curves",), "tracing/curve_others.cl"
+        f.geometry.analytic != ("curves",), "tracing/curves.cl#others"
     ),
     "generated/shape_traversal.cl": lambda f, layout: (
         (f"bvh/shapes.cl#{bvh.shapes_layout(layout).removeprefix('shapes_')}",)
@@ -237,8 +237,8 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/instance_traversal.cl": lambda f, layout: (
         (
-            f"tracing/instances_{'few' if f.geometry.few_instances else layout}.cl",
-            "tracing/trace_instances.cl",
+            f"tracing/instances.cl#{'few' if f.geometry.few_instances else layout}",
+            "tracing/instances.cl#hits",
         )
         * f.geometry.instances
     ),
@@ -345,10 +345,10 @@ def _corners_move(features: Features) -> bool:
 
 
 def _passing(features: Features) -> str:
-    """Return the end of the name of the file that tells which light passes."""
+    """Return the step that tells which light passes."""
     if features.shadow_media:
-        return "_media"
-    return "" if features.materials.null_surfaces else "_opaque"
+        return "media"
+    return "surfaces" if features.materials.null_surfaces else "opaque"
 
 
 def _spectrum_read(features: Features) -> tuple[str, ...]:

@@ -76,8 +76,9 @@ def _stages(
     join_lanes = bounce.join_lanes(features, layout, lanes, interleaved)
     rays: Files = {}
     if interleaved and layout != "brute":
-        traced = "curves" if "curves" in features.geometry.analytic else "interleaved"
-        rays["generated/trace.cl"] = (f"tracing/trace_{traced}.cl",)
+        curves = "curves" in features.geometry.analytic
+        traced = "tracing/curves.cl#trace" if curves else "tracing/trace.cl#interleaved"
+        rays["generated/trace.cl"] = (traced,)
     joins = {**files, **(rays if features.geometry.analytic else {})}
     if begin == "flare":
         return {

@@ -7,7 +7,7 @@
  * Near s the curve is taken as straight and its radius as linear, whose zero is known: exact for straight pieces, else
  * the next guess, and a bisection where that leaves the bounds. (That local cones converge fast: Reshetov and Luebke
  * 2018, "Phantom Ray-Hair Intersector".) u is the azimuth over 2 pi, v runs along. Lengths in metres. */
-#include "tracing/analytic.cl"
+#include "core/rounding.cl"
 #define CURVE_STEPS 24
 #define CURVE_NEAR 2e-4f    /* of a piece: a step of less is the last; the error that is left is far smaller */
 #define CURVE_OVERLAP 2e-3f /* [rad] by which a piece is met beyond its end, so that no ray passes between two */
