@@ -1,7 +1,7 @@
 /* Lights whose triangles deform: `geometry` has a row of such a triangle for each key, side by side, and all of it is
- * linear from one to the next, as its vertices are (motion/vertex_keys.cl). */
+ * linear from one to the next, as its vertices are (motion/motion.cl). */
 #include "motion/motion.cl"
-#include "motion/vertex_keys.cl"
+#include "motion/motion.cl#vertex_keys"
 
 inline Triangle triangle_then(Scene scene, LightRow l, mask active)
 {

@@ -76,9 +76,8 @@ def _stages(
     join_lanes = bounce.join_lanes(features, layout, lanes, interleaved)
     rays: Files = {}
     if interleaved and layout != "brute":
-        curves = "curves" in features.geometry.analytic
-        traced = "tracing/curves.cl#trace" if curves else "tracing/trace.cl#interleaved"
-        rays["generated/trace.cl"] = (traced,)
+        file = "curves" if "curves" in features.geometry.analytic else "trace"
+        rays["generated/trace.cl"] = (f"tracing/{file}.cl#interleaved",)
     joins = {**files, **(rays if features.geometry.analytic else {})}
     if begin == "flare":
         return {
