@@ -121,10 +121,10 @@ class _Front(ModuleType):
 
 def _give_widgets() -> None:
     """Let renderers have widgets: they know nothing of who shows their pictures."""
-    from clpt.render.pictures import DevicePictures
+    from clpt.render.resumable import ResumableRenderer
     from clpt.view.notebook import widget
 
-    DevicePictures._make_widget = widget
+    ResumableRenderer._make_widget = widget
 
 
 def _give_pictures() -> None:

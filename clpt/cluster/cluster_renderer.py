@@ -10,7 +10,7 @@ from clpt.cluster.blocks import WorkerRecord
 from clpt.cluster.cluster_maker import ClusterMaker
 from clpt.cluster.farm import Farm
 from clpt.render.options import check_options, check_scene
-from clpt.render.pictures import DevicePictures
+from clpt.render.resumable import ResumableRenderer
 from clpt.scene import Scene
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 NO_WORKER_SECONDS = 300.0  # without any worker, until the render fails
 
 
-class ClusterRenderer(DevicePictures):
+class ClusterRenderer(ResumableRenderer):
     """Renders a scene on the workers of a cluster, with the methods of `Renderer`.
 
     client: a Dask client of any cluster whose workers have clpt installed. mixed: whether workers

@@ -10,7 +10,7 @@ from clpt import device as dev
 from clpt.cluster.devices_maker import DevicesMaker
 from clpt.errors import DeviceError
 from clpt.render.options import RenderOptions, check_options, check_scene
-from clpt.render.pictures import DevicePictures
+from clpt.render.resumable import ResumableRenderer
 from clpt.scene import Scene
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class DeviceShare:
     failure: str | None
 
 
-class MultiRenderer(DevicePictures):
+class MultiRenderer(ResumableRenderer):
     """Renders a scene on several devices; its picture so far is available between runs.
 
     devices: "all", "gpu", or names or indexes as `clpt.device.choose_all` takes them, and

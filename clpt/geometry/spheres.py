@@ -1,8 +1,8 @@
-"""Many spheres in one shape, on their way to the device: all at once, not one by one.
+"""Many spheres in a single shape, as arrays on their way to the device.
 
-One row of `shapes` stands for all of them, one row of `geometry` says how they are turned, and the
-table `spheres` has four words for each: centre and radius in the world. Where spheres move by
-themselves there are so many rows for each key, and a word behind the row of `geometry` says where.
+All of them share a row of `shapes` and a row of `geometry` with their rotation; the table `spheres`
+has four words for each: centre and radius in the world. Spheres with deformation have these words
+for each key, and a word behind the row of `geometry` is their offset.
 """
 
 from __future__ import annotations

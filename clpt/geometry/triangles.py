@@ -29,7 +29,7 @@ POINTS = {  # what a deformation moves
 SUMMED = 1 << 20  # triangles whose normals are summed at a time
 
 FAR = 2.0**61  # from where on the product of two edges may be beyond float32
-LEAST_CROSS = 2.0**-75  # up to which a square is zero in float32
+LEAST_CROSS = 2.0**-75  # squares up to this are zero in float32
 PER_KEY = 32  # bytes of a vertex at each time: place, normal, uv
 CHUNK = 1 << 16  # rows that are looked at at a time: what is made of them stays in the cache
 
@@ -164,7 +164,7 @@ def check_deformation(shape: Shape) -> None:
 
 
 def warnings_of(flat: Sequence[Flat]) -> list[str]:
-    """Return one warning about the triangles that were left out, or none."""
+    """Return a single warning about all triangles that were left out, if there are any."""
     if not flat:
         return []
     head = flat[0]
@@ -204,7 +204,7 @@ def per_face(name: str) -> bool:
 def attribute(shape: Shape, name: str) -> Points:
     """Return an attribute of a mesh, (n, 1 or 3) float32 per vertex, or per face of `triangulate`.
 
-    Raises SceneError for one that has another shape, or values that are not finite.
+    Raises SceneError for an array of another shape, or with values that are not finite.
     """
     by_face = per_face(name)
     if shape.kind in ONE_OF:
@@ -264,7 +264,7 @@ def _solid(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
 
 
 def _wide(vertices: NDArray[Any]) -> NDArray[Any]:
-    """Vertices of which no product is beyond their type: as float64 where they are far away."""
+    """Return vertices whose products do not overflow: as float64 if they are far away."""
     return vertices.astype(np.float64) if np.abs(vertices).max(initial=0.0) > FAR else vertices
 
 
@@ -292,7 +292,7 @@ def local(
 ) -> tuple[Points, Faces, Points | None, Points | None]:
     """Return vertices, faces, normals and uvs before the transform, as `triangulate` does.
 
-    alike: the shape at several times, at all of which the faces are the same.
+    alike: the shape at several times; its faces are the same at all times.
     """
     if isinstance(shape, shapes.Mesh):
         return _mesh(shape)

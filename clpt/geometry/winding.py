@@ -1,8 +1,8 @@
 """Insides of shapes: how often a shape winds around a point; boxes, areas and volumes.
 
-A closed boundary fills the whole sphere of directions around a point inside, 4 pi, and on balance
-nothing of it around a point outside. cached: keeps what a function made of what it was given, such
-as the triangles of a shape; None: nothing is kept.
+The solid angle of a closed boundary is 4 pi around a point inside, and 0 around a point outside.
+cached: keeps results of functions by their arguments, such as the triangles of a shape; None:
+nothing is kept.
 """
 
 from __future__ import annotations
@@ -129,20 +129,20 @@ def _fan(disk: Disk) -> Mesh:
     )
 
 
-NEAR = 1e-6  # of its extent: vertices of several meshes that are one
+NEAR = 1e-6  # of the extent: largest distance of vertices of several meshes that coincide
 
 
 def snapped(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return points (n, 3), those that nearly coincide at one place of a lattice."""
+    """Return points (n, 3) on a lattice, so that nearly coincident points are equal."""
     step = NEAR * float(np.ptp(points, axis=0).max(initial=0.0)) or 1.0
     return np.round(points / step) * step
 
 
 def largest_hole(vertices: NDArray[Any], faces: NDArray[Any]) -> float:
-    """Return the area of the largest hole in triangles, over theirs; 0 of what is closed.
+    """Return the area of the largest hole in triangles, over their area; 0 if they are closed.
 
-    vertices (n, 3), faces (m, 3). An edge that is gone along as often one way as the other bounds
-    no hole; the others are the rims, and those that touch are of one hole.
+    vertices (n, 3), faces (m, 3). An edge bounds no hole if as many triangles traverse it in both
+    directions; connected other edges are the rim of a hole.
     """
     points, corners = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
     edges, balance = _unbalanced(corners)
@@ -161,7 +161,7 @@ def largest_hole(vertices: NDArray[Any], faces: NDArray[Any]) -> float:
 
 
 def _first_of_place(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The first point of those at the same place, of each (n,); told apart by a hash."""
+    """Return for each point the first equal point, (n,), by a hash."""
     words = np.ascontiguousarray(points + 0.0).view(np.uint64)  # + 0: no two zeros
     name = np.zeros(len(points), np.uint64)
     for k in range(3):
@@ -173,7 +173,7 @@ def _first_of_place(points: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _unbalanced(corners: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Edges (k, 2) that triangles go along more often one way, and by how much."""
+    """Return edges (k, 2) that triangles traverse more often in a direction; the excess (k,)."""
     start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
     low, high = np.minimum(start, end), np.maximum(start, end)
     name = low * (int(corners.max(initial=0)) + 1) + high

@@ -30,8 +30,7 @@ from clpt.render.film.saved_film import (
     other_devices,
 )
 from clpt.render.film.state import join_ranges
-from clpt.render.makers.contents import Change, Contents, FilmOwner
-from clpt.render.makers.locking import Stop, healing, synchronized
+from clpt.render.makers.contents import Change, Contents, FilmOwner, Stop, healing, synchronized
 from clpt.render.makers.maker import Call, Discarded, Maker, Settle
 from clpt.render.makers.planning import Changes
 from clpt.render.options import check_changes, check_scene

@@ -162,7 +162,7 @@ def test_surroundings_that_clpt_brings_are_found_in_any_folder(tmp_path, monkeyp
         (["--camera", "10,100"], "the elevation is -90 to 90 degrees, not 100"),
         (["--camera", "10,20,0"], "the distance is 0.001 to 1e+06, not 0; 1 frames all"),
         (["--camera", "1,2,3,4"], "does not look like 45,20"),
-        (["--camera", "front"], "only .xml and glTF have cameras to choose from, no 'front'"),
+        (["--camera", "front"], "only .xml, glTF and USD have cameras to choose from, no 'front'"),
         (["--camera", "front", "-D", "camera=a"], "-D camera= says it already"),
         (["--crop", "1:2"], "does not look like 100:200,50:150"),
         (["--crop", "1.5:2,0:1"], "pixels are whole numbers"),

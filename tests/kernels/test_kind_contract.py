@@ -56,9 +56,8 @@ def test_lights_of_the_tests_own(tmp_path: Path) -> None:
     after = after.replace("*ON_SHAPES, Point,", "*ON_SHAPES, Point, Wire, Tube,", 1)
     file.write_text(f"{before}\n{strangers.PYTHON}\nON_SHAPES = {after}", "utf-8")
     for name in strangers.POINTS:
-        folder = tmp_path / "kernels/lights"
-        (folder / f"kinds/{name.lower()}.cl").write_text(strangers.sampling(name), "utf-8")
-        (folder / f"emission/{name.lower()}.cl").write_text(strangers.emitting(name), "utf-8")
+        text = strangers.sampling(name) + strangers.emitting(name)
+        (tmp_path / f"kernels/lights/kinds/{name.lower()}.cl").write_text(text, "utf-8")
     command = [sys.executable, "-m", "tests.kernels.kind_contract", *strangers.POINTS]
     paths = os.pathsep.join([str(tmp_path), str(ROOT)])
     environment = {**os.environ, "PYTHONPATH": paths}

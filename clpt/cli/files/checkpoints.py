@@ -13,7 +13,7 @@ from clpt.files import output_files
 from ...errors import MemoryBudgetError, SceneError
 from ...render.film import film_file
 from ...render.film.saved_film import SavedFilm, differences_text, ranges_text
-from ...render.pictures import DevicePictures
+from ...render.resumable import ResumableRenderer
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
 from ..printing.display import clock
@@ -110,7 +110,7 @@ def check(
 
 
 def go_on(
-    renderer: DevicePictures, saved: SavedFilm, path: Path, note: Callable[[str], None]
+    renderer: ResumableRenderer, saved: SavedFilm, path: Path, note: Callable[[str], None]
 ) -> None:
     """Let a renderer go on from a film, and say so. Raises SceneError, which says what differs."""
     known = len(renderer.warnings)
@@ -134,7 +134,7 @@ class Checkpoints:
 
     def __init__(
         self,
-        renderer: DevicePictures,
+        renderer: ResumableRenderer,
         path: Path,
         period: float | None,
         resumed: bool,

@@ -16,7 +16,6 @@ from ...errors import ClptError, SceneError
 from ...render.film import film_file, layer_channels
 from ...render.film.denoised_picture import DenoisedPicture
 from ...render.film.saved_film import SavedFilm
-from ...render.pictures import DevicePictures
 from ...render.resumable import ResumableRenderer
 from ...version import VERSION
 from ..options.grading import Grading
@@ -27,7 +26,9 @@ Film = ResumableRenderer | SavedFilm  # what can be saved
 Source = Film | DenoisedPicture  # what pictures are taken of
 
 
-def metadata(renderer: DevicePictures, scene: Path, seconds: float) -> dict[str, str | int | float]:
+def metadata(
+    renderer: ResumableRenderer, scene: Path, seconds: float
+) -> dict[str, str | int | float]:
     """Return the metadata of an .exr: how it was made. spp is the mean over all pixels.
 
     seconds: of this session; those of former ones are added.

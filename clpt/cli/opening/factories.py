@@ -8,9 +8,9 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from ... import device as dev
-from ...render.pictures import DevicePictures
 from ...render.progress import Progress
 from ...render.renderer import Renderer
+from ...render.resumable import ResumableRenderer
 from ...scene import Scene
 from ..options.scene_options import SceneOptions
 from ..options.workers import Workers
@@ -40,7 +40,7 @@ class RendererFactory:
     name = ""
     frame = math.inf
 
-    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> DevicePictures:
+    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> ResumableRenderer:
         """Return a new renderer of a scene, which takes samples from this number on."""
         raise NotImplementedError
 
@@ -64,14 +64,14 @@ class RendererFactory:
 class DeviceFactory(RendererFactory):
     """Makes renderers on devices of this machine; renderer: the last one that was made."""
 
-    renderer: DevicePictures
+    renderer: ResumableRenderer
 
     def __init__(self, devices: list[dev.Device], options: SceneOptions):
         self.devices = devices
         self.name = " and ".join(on.info.label for on in devices)
         self._made = options.made
 
-    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> DevicePictures:
+    def make(self, scene: Scene, shown: Display, first_sample: int = 0) -> ResumableRenderer:
         """Return a new renderer of a scene; note its warnings."""
         text = f"compiling for {device_names([on.info for on in self.devices])}"
         compiling = shown.compiling(text)
@@ -133,7 +133,7 @@ class ClusterFactory(RendererFactory):
         return -self.frame
 
 
-def new_renderer(scene: Scene, devices: list[dev.Device], **made: Any) -> DevicePictures:
+def new_renderer(scene: Scene, devices: list[dev.Device], **made: Any) -> ResumableRenderer:
     """Return a renderer on one device, or on several."""
     if len(devices) > 1:
         from ...cluster.multi_renderer import MultiRenderer

@@ -15,7 +15,7 @@ from ... import images
 from ...arrays import Floats32
 from ...geometry import analytic
 from ...geometry.lamps import plainly_lit
-from ...render.pictures import DevicePictures
+from ...render.resumable import ResumableRenderer
 from ...scene import Scene
 from ...scene.lights import Light, PoweredLamp
 from ...scene.shapes import Shape
@@ -30,18 +30,20 @@ WHITE = watts(RGBIlluminant(1.0, 1.0, 1.0))  # of an emission of 1 [nm]
 ADVICE = "docs/lighting.md has a list: Why is it black?"
 
 
-def exposure_found(renderer: DevicePictures) -> float:
+def exposure_found(renderer: ResumableRenderer) -> float:
     """Return the stops of `--exposure auto`."""
     return images.auto_exposure(_pixels(renderer)) - renderer.scene.film.display_exposure
 
 
-def display_exposure(renderer: DevicePictures) -> str:
+def display_exposure(renderer: ResumableRenderer) -> str:
     """Return what to say of the exposure that the scene's film has for screens, "" for none."""
     stops = renderer.scene.film.display_exposure
     return f"exposure {stops:+.1f} stops, of the scene: film.display_exposure" if stops else ""
 
 
-def remarks(renderer: DevicePictures, grading: Grading, targets: tuple[Path, ...]) -> Iterator[str]:
+def remarks(
+    renderer: ResumableRenderer, grading: Grading, targets: tuple[Path, ...]
+) -> Iterator[str]:
     """Yield sentences of a picture in which little is seen, with what mends it."""
     scene, pixels = renderer.scene, _pixels(renderer)
     display = scene.film.display_exposure
@@ -60,7 +62,7 @@ def remarks(renderer: DevicePictures, grading: Grading, targets: tuple[Path, ...
     yield from _outshone(scene)
 
 
-def _pixels(renderer: DevicePictures) -> Floats32:
+def _pixels(renderer: ResumableRenderer) -> Floats32:
     """The picture so far in linear Rec. 709, (h, w, c)."""
     colours = renderer.picture()
     return images.to_rec709(images.straight(colours), renderer.scene.film.output_space)

@@ -22,7 +22,7 @@ from clpt.render.flow.check import check
 from ... import images
 from ...device import share_compilers
 from ...errors import ClusterError, SceneError
-from ...render.pictures import DevicePictures
+from ...render.resumable import ResumableRenderer
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
 from ...version import VERSION
@@ -189,7 +189,7 @@ class _FrameLoop:
 
     def _work(self, factory: RendererFactory, reader: ThreadPoolExecutor) -> None:
         """Render frames with renderers of a factory, till none is left."""
-        renderer: DevicePictures | None = None
+        renderer: ResumableRenderer | None = None
         try:
             while (taken := self._take(reader)) is not None:
                 frame, scene = taken
@@ -229,8 +229,8 @@ class _FrameLoop:
         scene: Scene,
         digest: str,
         factory: RendererFactory,
-        renderer: DevicePictures | None,
-    ) -> DevicePictures | None:
+        renderer: ResumableRenderer | None,
+    ) -> ResumableRenderer | None:
         """Render a frame unless it is complete; return the renderer for the next one."""
         plan = self.plan
         if plan.is_complete(frame, digest):
@@ -273,8 +273,8 @@ class _FrameLoop:
 
 
 def _showing(
-    scene: Scene, factory: RendererFactory, renderer: DevicePictures | None, shown: Display
-) -> DevicePictures:
+    scene: Scene, factory: RendererFactory, renderer: ResumableRenderer | None, shown: Display
+) -> ResumableRenderer:
     """Return a renderer of a scene: the one that there is, if it can take the scene."""
     if renderer is not None:
         try:

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ...choices import MOST_SAMPLES
-from ...render.pictures import DevicePictures
 from ...render.progress import Progress
+from ...render.resumable import ResumableRenderer
 from ...render.wavefront.wavefront import Counts
 from ..opening.factories import DEVICE_SECONDS
 
@@ -32,7 +32,7 @@ class End:
 
 
 def render_samples(
-    renderer: DevicePictures,
+    renderer: ResumableRenderer,
     end: End,
     show: Callable[[Progress], None],
     after_pass: Callable[[], None] = lambda: None,
@@ -66,7 +66,7 @@ def render_samples(
 
 
 def _teller(
-    renderer: DevicePictures, end: End, show: Callable[[Progress], None], began: float
+    renderer: ResumableRenderer, end: End, show: Callable[[Progress], None], began: float
 ) -> Callable[[Progress], bool]:
     """Return what shows the progress since `began`, and tells whether the render goes on."""
     first = renderer.first_sample

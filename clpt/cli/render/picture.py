@@ -11,8 +11,8 @@ from pathlib import Path
 
 from ...errors import ClusterError
 from ...render.film.saved_film import SavedFilm
-from ...render.pictures import DevicePictures
 from ...render.progress import Progress
+from ...render.resumable import ResumableRenderer
 from ...scene import Scene
 from ..files import checkpoints, outputs
 from ..opening.factories import DeviceFactory, RendererFactory, cluster_factories, device_factories
@@ -82,7 +82,7 @@ class _Former:
             checkpoints.check(self.film, self.path, scene, first, end, gaps=gaps)
 
     def go_on(
-        self, renderer: DevicePictures, end: int | None, note: Callable[[str], None]
+        self, renderer: ResumableRenderer, end: int | None, note: Callable[[str], None]
     ) -> int | None:
         """Give the film to a renderer; return the end of its samples, see `Until.end`."""
         if self.film is None:
@@ -140,7 +140,7 @@ class _Picture:
     ready: when it began [s of time.perf_counter].
     """
 
-    def __init__(self, job: Job, renderer: DevicePictures, former: _Former, shown: Display):
+    def __init__(self, job: Job, renderer: ResumableRenderer, former: _Former, shown: Display):
         self._job, self._renderer, self._shown = job, renderer, shown
         self.ready = time.perf_counter()
         period, every, note = job.resuming.period, job.output.every, shown.note

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ...render.pictures import DevicePictures
+from ...render.resumable import ResumableRenderer
 
 
-def refusals(renderer: DevicePictures) -> list[str]:
+def refusals(renderer: ResumableRenderer) -> list[str]:
     """Return a sentence for each way in which samples of a render, or pixels, are wrong."""
     told = []
     if rejected := renderer.counts.rejected:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...render.pictures import DevicePictures
+from ...render.resumable import ResumableRenderer
 from ..process import terminal
 from .passes import End
 
@@ -13,7 +13,7 @@ TIMES = {  # of RenderStats.seconds
 }
 
 
-def header(name: str, renderer: DevicePictures, where: str) -> str:
+def header(name: str, renderer: ResumableRenderer, where: str) -> str:
     """Return the line that says what is rendered, how and where."""
     film, asked, chosen = renderer.scene.film, renderer.scene.integrator.kind, renderer.stats
     how = asked if asked == chosen.integrator else f"{asked} -> {chosen.integrator}"
@@ -21,7 +21,7 @@ def header(name: str, renderer: DevicePictures, where: str) -> str:
     return "  ".join((name, size, film.mode, how, where))
 
 
-def ending(renderer: DevicePictures, end: End, seconds: float) -> str:
+def ending(renderer: ResumableRenderer, end: End, seconds: float) -> str:
     """Return the line that says how far the render came, in so many seconds of all."""
     mean = renderer.counts.samples / renderer._wavefront.paths.pixels
     samples = f"{mean:.0f}" if mean >= 10 or mean == int(mean) else f"{mean:.2g}"
@@ -31,7 +31,7 @@ def ending(renderer: DevicePictures, end: End, seconds: float) -> str:
     return f"stopped at {samples}{of} spp, with the picture so far; {seconds:.1f} s in all"
 
 
-def before(renderer: DevicePictures, loading: float) -> None:
+def before(renderer: ResumableRenderer, loading: float) -> None:
     """Print what was made of the scene, and the time; loading: seconds for its file."""
     first, stats = renderer._wavefront, renderer.stats
     for on in renderer.devices:
@@ -69,7 +69,7 @@ def before(renderer: DevicePictures, loading: float) -> None:
         _line(what, f"{stats.seconds[name]:.2f} s")
 
 
-def after(renderer: DevicePictures) -> None:
+def after(renderer: ResumableRenderer) -> None:
     """Print the time of the first sample, what each device did, and each stage of the first."""
     from ...cluster.multi_renderer import MultiRenderer  # here: one device has no use for it
 

@@ -20,7 +20,7 @@ FLOAT = 5126
 
 
 def check(document: Document) -> None:
-    """Raise SceneError for what does not fit together, wherever it stands."""
+    """Raise SceneError for references and values that contradict each other."""
     for table, function in TABLES.items():
         for element in document.root.children(table):
             function(element)

@@ -158,7 +158,7 @@ def _old_metal(props: Properties, around: float) -> Parameters:
 
 
 def _around(props: Properties) -> float:
-    """Take Mitsuba 0.6's index around a metal, by which eta and k are divided."""
+    """Take Mitsuba 0.6's index around a metal; eta and k are relative to it."""
     child = props.named.get("ext_eta")
     if child is None:
         return AIR if props.context.old else 1.0
@@ -170,7 +170,7 @@ def _around(props: Properties) -> float:
 
 
 def _named_metal(child: Element, context: Context) -> tuple[Spectrum, Spectrum]:
-    """A metal by its name; a grey one where there are no free data."""
+    """Return a metal by its name; grey metal if no free data exist."""
     name = child.attribute("value")
     if name.removesuffix("_palik") not in WITHOUT_DATA:
         return spectra.metal(name)
@@ -258,7 +258,7 @@ def _rough_plastic(props: Properties) -> Parameters:
 
 
 def _polarized_plastic(props: Properties) -> Parameters:
-    """As Mitsuba's without polarisation, but for what its boundary reflects inwards."""
+    """As Mitsuba's without polarisation, except for the internal reflection of its boundary."""
     props.context.warn(props.element, "light has no polarisation here: taken as roughplastic")
     return {**_rough_plastic(props), "nonlinear": False}
 

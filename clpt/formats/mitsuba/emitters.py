@@ -164,7 +164,7 @@ def _projector(props: Properties) -> Parameters:
 
 
 def _aspect(image: object) -> float:
-    """Width over height of an image; 1 for what is none."""
+    """Return width over height of an image; 1 for any other value."""
     if not isinstance(image, Bitmap):
         return 1.0
     entries: Any = image.image

@@ -160,7 +160,7 @@ def _plain_name(name: str) -> str:
 
 
 def _weight(props: Properties) -> Element | None:
-    """The grid that is the weight of the medium's `blendphase`, if it is one."""
+    """Return the weight of the medium's `blendphase` if it is a grid; else None."""
     blend = _own_blend(props)
     return None if blend is None else grids.grid(Properties(blend, props.context), "weight")
 
@@ -340,7 +340,7 @@ def _dyed(props: Properties) -> media.Dyed:
 
 
 def _mixture(props: Properties) -> media.Mixture:
-    """Several media in one place, a plugin of our own."""
+    """Read several media in the same space, clpt's own plugin."""
     parts = [medium(item, props.context) for item in props.objects("medium")]
     name = props.element.attributes.get("id", "")
     return media.Mixture(parts=tuple(parts), to_world=props.placement(), name=name)

@@ -34,7 +34,7 @@ FILTERS = ("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos")
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
 HOLDERS = ("adaptive", "irrcache", "multichannel")  # integrators of Mitsuba 0.6 around another
 NO_LIGHT = ("ao", "field", "motion")  # integrators of Mitsuba 0.6 whose values are no light
-REPLAYED_DEPTH = 6  # default of what differentiates
+REPLAYED_DEPTH = 6  # default of integrators that differentiate
 DEFAULT_SAMPLER = "independent"
 LAYERS = {  # of the values that the integrator aov names
     "depth": "depth",
@@ -344,7 +344,7 @@ def _integrator(element: Element, context: Context) -> Integrator:
 
 
 def _inner(props: Properties) -> Integrator:
-    """Make the integrator that one of Mitsuba 0.6 holds: its picture, faster or in parts."""
+    """Make the integrator inside an integrator of Mitsuba 0.6 that speeds it up or divides it."""
     nested = props.object("integrator")
     if nested is None:
         raise props.element.error("needs a nested <integrator>")

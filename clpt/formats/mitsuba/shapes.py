@@ -34,8 +34,8 @@ def creased(mesh: Mesh, angle: float) -> Mesh:
     """Return a mesh without normals whose triangles share a vertex where they lie within an angle.
 
     angle: of the triangles' normals [degrees]. As src/librender/trimesh.cpp (rebuildTopology):
-    around each place the first triangle without a group begins one, which takes all triangles
-    within the angle to it.
+    at each position the first triangle without a group begins a group of all triangles within the
+    angle to it.
     """
     faces = np.asarray(mesh.faces, np.int64)
     corners = faces.reshape(-1)
@@ -103,7 +103,7 @@ def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
 
 
 def _single(element: Element, context: Context) -> list[Shape]:
-    """Make the shape of an element; none of an unknown kind where missing ones are grey."""
+    """Make the shape of an element; None for an unknown kind if missing kinds are grey."""
     if element.type == "instance":
         return [_instance(element, context)]
     if element.type not in PLUGINS:
@@ -171,7 +171,7 @@ def _instance(element: Element, context: Context) -> Shape:
 
 
 def _group(element: Element, context: Context) -> Group:
-    """Return the group that an element describes, one for all its instances."""
+    """Return the group that an element describes, shared by all its instances."""
 
     def make(element: Element) -> Group:
         props = Properties(element, context)

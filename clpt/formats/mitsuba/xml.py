@@ -32,7 +32,7 @@ OLD_VERSION = re.compile(r"\s*[01]\.\d")
 
 @dataclass(eq=False)
 class Element(Located):
-    """One XML element: tag, attributes, children, and its location; of a dictionary an array."""
+    """An XML element: tag, attributes, children, and its location; of a dictionary an array."""
 
     tag: str
     attributes: dict[str, str]
@@ -76,7 +76,7 @@ class Element(Located):
 class Document:
     """An expanded scene file: its root, and the folders of file names: the scene's, its <path>s.
 
-    camera: a number or id by which one of several sensors is chosen; variables: values by name;
+    camera: number or id of the chosen sensor; variables: values by name;
     renamed: plugins of old files, each with its old and its new name.
     """
 
@@ -92,9 +92,9 @@ class Document:
         return OLD_VERSION.match(self.root.attributes.get("version", "")) is not None
 
     def find_file(self, element: Element, name: str) -> Path:
-        """Resolve a file name that `element` gives: <path>s come first, the last one before all.
+        """Resolve a file name that `element` gives: <path>s come first, the last <path> before all.
 
-        Raises SceneError where there is no such file.
+        Raises SceneError if there is no such file.
         """
         return _find(element, name, self.folders)
 
@@ -144,7 +144,7 @@ def _first(
 
 
 def _read(path: Path) -> Element:
-    """Parse one file into raw elements."""
+    """Parse a file into raw elements."""
     top = Element("", {}, path, 0)
     stack = [top]
     parser = expat.ParserCreate()
@@ -230,7 +230,7 @@ class _Expander:
         self.longest = max(self.longest, len(name))
 
     def add_folder(self, element: Element) -> None:
-        """Add a folder that lies beside the file, or else in one of the folders so far."""
+        """Add a folder that lies beside the file, or else in an earlier folder."""
         places = [element.file.parent, *self.folders[::-1]]
         name = element.attribute("value")
         self.folders.append(_first(element, name, places, "folder", Path.is_dir))

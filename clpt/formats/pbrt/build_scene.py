@@ -62,12 +62,12 @@ def shapes(contents: Contents, progress: Progress | None) -> list[Shape]:
 
 
 def _of(definitions: Sequence[Definition], result: dict[int, Shape | None]) -> Iterator[Shape]:
-    """Yield the shapes of definitions, but for those that are empty."""
+    """Yield the shapes of definitions that are not empty."""
     return (shape for each in definitions if (shape := result[id(each)]) is not None)
 
 
 def _make_all(definitions: list[Definition], progress: Progress | None) -> list[Shape | None]:
-    """Make the shapes of definitions: geometry in threads, materials one after the other."""
+    """Make the shapes of definitions: geometry in threads, materials in order."""
     result: list[Shape | None] = []
     workers = min(8, os.cpu_count() or 1)
     with ThreadPoolExecutor(workers) as pool:
@@ -187,7 +187,7 @@ def make_material(kind: str, params: Parameters, state: State, name: str) -> Mat
 
 
 def _emission(state: State, form: Geometry) -> Light | None:
-    """Return the light of the state: one for all shapes, but one a shape where it has a power."""
+    """Return the light of the state: all shapes share it, unless it has a power."""
     definition = state.area_light
     if definition is None:
         return None
@@ -246,7 +246,7 @@ def _warn_of_unused(params: Parameters, state: State) -> None:
 
 
 def _has_texture(item: object) -> bool:
-    """Whether a material or light, or one inside it, has a texture."""
+    """Return whether a material or light, or a part of it, has a texture."""
     if isinstance(item, Texture):
         return True
     if not isinstance(item, Kind):

@@ -57,7 +57,7 @@ def _moving(camera: cameras.Camera, state: State) -> cameras.Camera:
 
 
 def exposure_time(params: Parameters, old: bool) -> float:
-    """Take the time [s] for which the shutter is open; 1 in old files, which do not count it."""
+    """Take the time [s] of the open shutter; 1 in old files, which ignore it."""
     opens, closes = _shutter(params)
     time = closes - opens
     if old:
@@ -289,7 +289,7 @@ def _filter(definition: Definition | None, old: bool) -> Filter:
 
 
 def _radius(params: Parameters, state: State, default: float) -> float:
-    """Take the radii [pixels], which are one here."""
+    """Take the radius [pixels]; clpt has a single radius for both axes."""
     x, y = (params.above_zero(name, default) for name in ("xradius", "yradius"))
     if x != y:
         state.warn(params, f"one radius of {math.sqrt(x * y):.3g} pixels replaces two")
@@ -375,9 +375,9 @@ OLD_OTHERS = ("directsamples", "causticphotons", "indirectphotons", "nused", "fi
 
 
 def integrator(definition: Definition | None, film: Film) -> Integrator:
-    """Make what stands for pbrt's integrator; its depth counts one less.
+    """Make the counterpart of pbrt's integrator; pbrt's depth is 1 less.
 
-    film: whose pixels share pbrt's photons.
+    film: its pixels share pbrt's photons.
     """
     if definition is None:
         return integrators.Path(max_depth=6, free_panes=False)

@@ -164,7 +164,7 @@ def _mix(params: Parameters, state: State) -> Material:
 
 
 def _one_sided(result: Material) -> Material:
-    """The material with the fronts alone of what is given to both sides."""
+    """Return the material with the front sides of its two-sided parts."""
     if isinstance(result, materials.TwoSided):
         return _one_sided(result.front)
     inner: dict[str, Any] = {

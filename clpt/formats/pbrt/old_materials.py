@@ -50,7 +50,7 @@ def is_known(kind: str) -> bool:
 
 
 def has_mirrors(contents: Contents) -> bool:
-    """Return whether some material sends light on in one direction."""
+    """Return whether some material has a specular (delta) lobe."""
     definitions = [item for versions in contents.shared.materials.values() for item in versions]
     parts = [contents.shapes, *contents.objects.values()]
     used = [item.state.material for part in parts for item in part]
@@ -245,7 +245,7 @@ def _none(params: Parameters, state: State) -> Material:
 
 
 def _sum(lobes: Sequence[Lobe], params: Parameters, state: State) -> Material:
-    """Return the sum of lobes, each given by its factor and how it is made of one."""
+    """Return the sum of lobes, each a factor and a function that makes its material of a factor."""
     shining = [(value, make) for value, make in lobes if not _is_dark(value)]
     if not shining:
         return materials.Diffuse(reflectance=0.0)

@@ -134,7 +134,7 @@ class _Reader(TransformDirectives):
         self._end("Attribute")
 
     def transform_begin(self) -> None:
-        """As an AttributeBegin in version 4; in older ones it keeps transforms alone."""
+        """As an AttributeBegin in version 4; in older versions it keeps only transforms."""
         self._begin("Transform" if self.contents.shared.old else "Attribute")
 
     def transform_end(self) -> None:
@@ -227,7 +227,7 @@ class _Reader(TransformDirectives):
         return Definition(kind, params, state)
 
     def _last(self, values: list[Parameter]) -> list[Parameter]:
-        """Return the last of parameters of one name, as pbrt does (src/pbrt/paramdict.cpp)."""
+        """Return the last of parameters of a name, as pbrt does (src/pbrt/paramdict.cpp)."""
         last: dict[str, Parameter] = {}
         for parameter in values:
             if parameter.name in last:

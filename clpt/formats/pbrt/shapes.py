@@ -40,11 +40,11 @@ DEEPEST = 10  # levels of subdivision
 
 @dataclass(eq=False)
 class Geometry:
-    """A kind of ours, its parameters but for material and light, and warnings.
+    """A kind of clpt, its parameters but for material and light, and warnings.
 
     pieces: for each triangle of a mesh the number of the shape, and so of the light, that pbrt
-    makes of it: a triangle, or a patch; None: all are one. split: lights that pbrt makes of each
-    piece of a curve.
+    makes of it: a triangle, or a patch; None: a single number. split: lights that pbrt makes of
+    each piece of a curve.
     """
 
     kind: type[Shape]
@@ -67,9 +67,9 @@ class Geometry:
         return np.bincount(self.pieces, triangles) / self.split
 
     def shares(self) -> NDArray[np.float32] | None:
-        """Return each triangle's brightness over that of a mean area; None where all are alike.
+        """Return each triangle's brightness over a mean area's; None if all are alike.
 
-        Each of pbrt's lights has the whole power, so that small ones are the brighter.
+        Each of pbrt's lights has the whole power, so that small lights are brighter.
         """
         areas = self.areas()
         if self.pieces is None or np.ptp(areas) <= ALIKE * areas.max():

@@ -85,7 +85,7 @@ class Files(Located):
         return {"file": self.lexer.path, "line": self.lexer.line, "where": self.name}
 
     def warn(self, text: str) -> None:
-        """Warn of what the picture will lack, with this location."""
+        """Warn of something that the picture will lack, with this location."""
         location = f"{self.lexer.path.name}:{self.lexer.line}: {self.name}"
         self.contents.shared.warnings.append(f"{location}: {text}")
 
@@ -174,7 +174,7 @@ class State:
         return versions[max(at - 1, 0)]
 
     def motion(self) -> Keys | None:
-        """Return the keys of what the transforms move, None: it is still. Raises SceneError."""
+        """Return the keys of moving transforms, None if they are still. Raises SceneError."""
         if self.end is None or np.array_equal(self.end, self.ctm):
             return None
         return Keys(self.shared.times, np.stack([self.ctm, self.end]))
@@ -184,7 +184,7 @@ class State:
         return copy(self)
 
     def warn(self, source: Parameters | Parameter, text: str) -> None:
-        """Warn of what the picture will lack, with the file and line."""
+        """Warn of something that the picture will lack, with the file and line."""
         where = source.location()["where"]
         self.shared.warnings.append(f"{source.file.name}:{source.line}: {where}: {text}")
 
@@ -195,7 +195,7 @@ class State:
         self.warn(params, f"{error.message}; grey stands for it, or it is left out")
 
     def tell(self, text: str) -> None:
-        """Warn of what a file beside the scene has that is left out, once."""
+        """Warn once of a part of a file beside the scene that is left out."""
         if text not in self.shared.warnings:
             self.shared.warnings.append(text)
 

@@ -107,7 +107,7 @@ def textured(
     if values is None:
         return default
     if values.type != "texture":
-        used = role if isinstance(role, Spectral) else TEXTURE  # a number is one in any
+        used = role if isinstance(role, Spectral) else TEXTURE  # a number is the same in all
         with values.locating():
             return value_of(values, used, state)
     definition = state.texture(form, values.text(), values)

@@ -19,7 +19,7 @@ BLOSC_HEADER = 16
 
 
 def inflated(packed: bytes | memoryview, most: int) -> bytes:
-    """Return what zlib has packed, one byte more than `most` where it is more."""
+    """Return at most `most` + 1 bytes that zlib has packed."""
     try:
         return zlib.decompressobj().decompress(packed, most + 1)
     except zlib.error as error:
@@ -41,10 +41,10 @@ def blosc_unpacker() -> Callable[[bytes | memoryview, int], bytes]:
         if size > most or held > len(packed):
             raise SceneError("is damaged: a packed part is larger than the grid")
         try:
-            made: bytes = blosc.decompress(bytes(packed))
+            unpacked_bytes: bytes = blosc.decompress(bytes(packed))
         except Exception as error:  # the package has a class of its own
             raise SceneError(f"is damaged: {error}") from None
-        return made
+        return unpacked_bytes
 
     return unpacked
 
@@ -55,7 +55,7 @@ MOST_AXIS = 1 << 16
 
 
 class Tile(NamedTuple):
-    """A cube of one value."""
+    """A cube of a constant value."""
 
     low: NDArray[np.int64]
     side: int
@@ -63,9 +63,9 @@ class Tile(NamedTuple):
 
 
 def chosen(names: list[str], grid: str) -> int:
-    """Return which grid of a file is read: the named one; "" is "density", else the first.
+    """Return the number of the named grid of a file; "" is "density", else the first.
 
-    Raises SceneError where there is none.
+    Raises SceneError if there is no such grid.
     """
     if not names:
         raise SceneError("has no grid")
@@ -95,11 +95,11 @@ def volume(
     leaves: NDArray[np.float32],
     to_world: NDArray[np.float64],
 ) -> Volume:
-    """Return the values of a box, with a layer of what is outside around it.
+    """Return the values of a box, with a layer of the outside value around it.
 
     low, high: (3,) the lowest and the highest index of the box; origins: (n, 3) the lowest index of
     each leaf; leaves: (n, 512) their values, z fastest; to_world: 4x4, from an index to the world.
-    Raises SceneError for a box that is empty or too large, and for a matrix without an inverse.
+    Raises SceneError for an empty or too large box, and for a matrix without an inverse.
     """
     check_box(low, high)
     budget.take(4 * math.prod(map(int, high - low + 3)), "its values")

@@ -111,7 +111,7 @@ def channels_of(layers: Mapping[str, Image], names: str = "clpt") -> dict[str, I
 
 def _beside(source: Pictures, names: str) -> dict[str, Image]:
     channels: dict[str, Image] = {}
-    for name, picture in source.beside.items():
+    for name, picture in source.extra_pictures.items():
         prefix = VIEW_LAYER + BESIDE[name] if names == "blender" else name
         if picture.ndim == 2:
             channels[f"{prefix}.X" if names == "blender" else prefix] = picture

@@ -31,8 +31,8 @@ THICKNESS_STEP = 4.0  # [nm] of the table, where a texture varies the thickness
 MOST_ROWS = 1024
 
 Sources = Mapping[str, frozenset[str]]
-_WAVES = '#include "materials/layers_waves.cl"\n#include "materials/boundary_film.cl"\n'
-_TABLE = '#include "materials/layers_table.cl"\n#include "materials/boundary_table.cl"\n'
+_WAVES = '#include "materials/boundary.cl#film_layers"\n#include "materials/boundary.cl#film"\n'
+_TABLE = '#include "materials/boundary.cl#table_layers"\n#include "materials/boundary.cl#table"\n'
 
 _ZERO = spectra.Constant(0.0)
 
@@ -46,7 +46,7 @@ def boundary_text(cls: type[Kind], mode: str, sources: Sources, layer: Sources) 
     if not coated:
         return ""
     if not any("layers" in sources.get(name, ()) for name in coated):
-        return '#include "materials/boundary_bare.cl"\n'
+        return '#include "materials/boundary.cl#bare"\n'
     if mode == "rgb":
         profile = value_text("film_profile", params(Layer)["profile"], layer["profile"])
         return f"{profile}#define FILM_COSINES {FILM_COSINES}\n{_TABLE}"

@@ -1,4 +1,4 @@
-"""Textures that combine others as programs in postfix order, see kernels/textures/program.cl.
+"""Textures that combine others as programs in postfix order, see kernels/textures/texture.cl.
 
 A program's row in `textures` is the position of "program" in the table of texture kinds, then
 instructions of two words: operand, operation and perhaps END, and the operand's argument.
