@@ -5,7 +5,6 @@
 #include "shapes/surface.cl#flags"
 #include "tracing/trace.cl"
 #include "shapes/surface_point.cl"
-#include "shapes/surface_point.cl"
 #include "generated/hit_space.cl"
 #include "generated/surface_steps.cl"
 
