@@ -13,6 +13,7 @@ from clpt.render.flow.check import check
 
 from ... import device as dev
 from ...device import share_compilers
+from ...formats import prepare
 from ...scene import Scene
 from ..options.applied import changed
 from ..options.scene_options import SceneOptions
@@ -66,6 +67,7 @@ def open_scene(
     resources: get the processes that compile beside this one; accept: see `read_scene`.
     """
     began = time.perf_counter()
+    prepare(file)
     alone = ThreadPoolExecutor(max_workers=1)
     with prompt(dev.kill_compilers), reusing(), alone as beside:
         chosen = beside.submit(choose_devices, options.machine)

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from pxr import Tf, Usd, UsdUtils
+from pxr import Gf, Tf, Usd, UsdUtils, Vt  # noqa: F401  all are loaded at one time
 
 from clpt.errors import SceneError, nearest
 from clpt.files import input_files
