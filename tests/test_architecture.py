@@ -67,7 +67,7 @@ SHARED = {
     "transport/photons",
 }  # fmt: skip
 KINDS = {
-    "cameras/kinds", "lights/emission", "lights/kinds", "materials/kinds", "media/kinds",
+    "cameras/kinds", "lights/kinds", "materials/kinds", "media/kinds",
     "samplers/kinds", "shapes/kinds", "textures/kinds",
 }  # fmt: skip
 # kernels/<folder>: the folders that its files may include; generated text stands between them.

@@ -205,7 +205,7 @@ class Probe:
         if "layers" not in device_params(self.cls):
             return ["", ""]
         if not count:
-            return ['#include "materials/boundary_bare.cl"', "    m.layers = layers_none();"]
+            return ['#include "materials/boundary.cl#bare"', "    m.layers = layers_none();"]
         if self.mode == "spectral":
             lambdas = ", ".join(f"(real)({v}f)" for v in LAMBDAS)
             return [
@@ -214,14 +214,14 @@ class Probe:
                 "inline Layer layer_at(Layers l, integer i)\n{\n    i *= 4;\n"
                 "    Layer r = {spectrum_of(gather(l.at, i)), spectrum_of(gather(l.at, i + 1)),\n"
                 "               gather(l.at, i + 2), gather(l.at, i + 3)};\n    return r;\n}\n"
-                '#include "materials/boundary_film.cl"',
+                '#include "materials/boundary.cl#film"',
                 f"    Layers layers = {{in + {rows} * n, {count}, {{{lambdas}}}}};\n"
                 "    m.layers = layers;",
             ]
         return [
             "typedef struct { global const float *spectra; } Tables;\n"
             "typedef struct { Tables scene; integer count, table, rows; real profile; } Layers;\n"
-            f'#define FILM_COSINES {FILM_COSINES}\n#include "materials/boundary_table.cl"',
+            f'#define FILM_COSINES {FILM_COSINES}\n#include "materials/boundary.cl#table"',
             f"    Layers layers = {{{{in + {rows} * n}}, {count}, 0, 1, 1.0f}};\n"
             "    m.layers = layers;",
         ]

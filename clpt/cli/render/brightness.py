@@ -19,6 +19,7 @@ from ...render.resumable import ResumableRenderer
 from ...scene import Scene
 from ...scene.lights import Light, PoweredLamp
 from ...scene.shapes import Shape
+from ...scene.texture_values import mean
 from ...spectra import RGBIlluminant, Spectrum, watts
 from ..options.grading import Grading, for_screens
 
@@ -90,7 +91,7 @@ def _outshone(scene: Scene) -> Iterator[str]:
 def _watts(lamp: Light, look: Look) -> float:
     """The emission of a lamp from 360 to 830 nm, such as its intensity [W/sr]."""
     values = [
-        watts(value) if isinstance(value, Spectrum) else WHITE * light_power.brightness(value, look)
+        watts(value) if isinstance(value, Spectrum) else WHITE * mean(value, look)
         for value in emissions_of(lamp).values()
     ]
     return float(np.mean(values)) if values else 0.0

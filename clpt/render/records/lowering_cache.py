@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from clpt.arrays import on_device
+from clpt.scene.pixels import image_file
 
 Made = TypeVar("Made")
 _BY_VALUE = (str, bytes, int, float, bool, type(None), type)
@@ -58,14 +58,15 @@ def _mark(given: object) -> Any:
 
 
 def version(image: object) -> Any:
-    """Return what an image is known by: of a file its name, its time and its size."""
-    if not isinstance(image, (str, Path)):
+    """Return a key of an image: a file's path, time and size; other images themselves."""
+    file = image_file(image)
+    if file is None:
         return image
     try:
-        found = os.stat(image)
-    except OSError:  # whoever reads it tells what is wrong
-        return str(image)
-    return f"{image}\0{found.st_mtime_ns}\0{found.st_size}"
+        status = os.stat(file)
+    except OSError:  # reading raises the error
+        return file
+    return f"{file}\0{status.st_mtime_ns}\0{status.st_size}"
 
 
 def content(*arrays: np.ndarray) -> bytes:
