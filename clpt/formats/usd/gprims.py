@@ -147,7 +147,7 @@ def _instancer(
         own = matrices[there & (indices == number)]
         if not root or not len(own):
             continue
-        above: Matrix = np.linalg.inv(document.placement(root.GetParent()))
+        above = transforms.inverse(document.placement(root.GetParent()))
         key = "content", str(root.GetPath()), str(inherited.GetPath()) if inherited else ""
         make = partial(content, document, root, above, inherited, depth + 1)
         inner = document.once(key, make)
