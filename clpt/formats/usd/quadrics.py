@@ -16,6 +16,7 @@ from clpt.formats.usd import primvars
 from clpt.formats.usd.document import Document
 from clpt.formats.usd.materials import surface
 from clpt.formats.usd.primvars import Topology
+from clpt.scene.params import fields_of
 from clpt.scene.shapes import Mesh, Shape, Sphere
 
 AROUND, ALONG = 64, 24  # pieces around, and of half a circle
@@ -55,7 +56,8 @@ def under(shape: Shape, matrix: Matrix) -> Shape:
     sizes = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     if sizes[0] <= sizes[2] * (1.0 + EVEN):
         return shape
-    parts = {field.name: getattr(shape, field.name) for field in dataclasses.fields(Shape)}
+    common = [field.name for field in dataclasses.fields(Shape)]
+    parts = {name: value for name, value in fields_of(shape).items() if name in common}
     return Mesh(**parts, **_revolved([_arc(shape.radius, 0.0, 0.0, math.pi)], "Z"))
 
 
