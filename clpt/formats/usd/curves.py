@@ -44,13 +44,7 @@ def curves(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
     wrap = str(document.value(prim, "wrap", "nonperiodic"))
     widths, at_ends = _widths(document, prim, counts)
     strands = np.concatenate([points, 0.5 * widths[:, None]], axis=1)
-    starts = np.cumsum(counts) - counts
-    parts: dict[int, Floats] = {}
-    for count in np.unique(counts).tolist():
-        own = np.flatnonzero(counts == count)
-        pieces = _pieces(strands[starts[own][:, None] + np.arange(count)], basis, wrap)
-        parts |= {} if pieces is None else dict(zip(own.tolist(), pieces, strict=True))
-    kept = [parts[number] for number in sorted(parts)]
+    kept = _all_pieces(strands, counts, basis, wrap)
     if len(kept) < len(counts):
         document.warn(f"{len(counts) - len(kept)} curves have too few points", prim.GetPath())
     if not kept:
@@ -67,6 +61,17 @@ def curves(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
             name=prim.GetName(), material=look.material, emission=look.emission,
         )
     ]  # fmt: skip
+
+
+def _all_pieces(strands: Floats, counts: Integers, basis: str, wrap: str) -> list[Floats]:
+    """Return each strand as lines or Bezier cubics, (n, 4); none for those that are too short."""
+    starts = np.cumsum(counts) - counts
+    parts: dict[int, Floats] = {}
+    for count in np.unique(counts).tolist():
+        own = np.flatnonzero(counts == count)
+        pieces = _pieces(strands[starts[own][:, None] + np.arange(count)], basis, wrap)
+        parts |= {} if pieces is None else dict(zip(own.tolist(), pieces, strict=True))
+    return [parts[number] for number in sorted(parts)]
 
 
 def _pieces(strands: Floats, basis: str, wrap: str) -> Floats | None:
