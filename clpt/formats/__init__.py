@@ -6,7 +6,7 @@ import difflib
 import importlib
 import itertools
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -16,6 +16,7 @@ from clpt.errors import LONGEST_WARNING, SceneError, nearest, one_line
 from clpt.files import budget as budgets
 from clpt.files.budget import Budget
 from clpt.formats import own_scenes, reading
+from clpt.formats.reading import Progress
 
 if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
     from clpt.scene import Scene
@@ -57,7 +58,7 @@ def load(
     /,
     *,
     kinds: Iterable[type[Material]] = (),
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
     missing_textures: Missing = "error",
     budget: Budget | None = None,
     **variables: Any,
@@ -100,7 +101,7 @@ def prepare(path: str | Path, /) -> None:
 def _load(
     path: Path,
     kinds: Iterable[type[Material]],
-    progress: Callable[[float, str], None] | None,
+    progress: Progress | None,
     missing_textures: Missing,
     variables: dict[str, Any],
 ) -> Scene:
