@@ -9,9 +9,8 @@ import click
 
 from ..choices import QUANTITIES
 from ..formats import locate
-from .options.scene_path import ScenePath
-from .options.scene_variables import scene_variables
-from .options.values import Choice
+from .options.loading import loading_options
+from .options.values import Choice, ScenePath
 from .process import terminal
 
 
@@ -42,7 +41,7 @@ from .process import terminal
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="A .csv file, in place of the terminal."
 )
-@scene_variables
+@loading_options
 def measure(
     scene: Path,
     points: Path,

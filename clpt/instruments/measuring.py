@@ -71,7 +71,6 @@ def measure(
     samples: int = 4096,
     error: float | None = None,
     bands: int = 47,
-    lift: float = LIFT,
     device: dev.Device | str | int | None = None,
     **options: Unpack[RenderOptions],
 ) -> Measurement:
@@ -79,10 +78,9 @@ def measure(
 
     quantity: a name in `QUANTITIES`. at: points (..., 3) [m]. directions: the points' normals, or
     those in which rays go from them; (..., 3), or one for all. samples: paths of each entry, at
-    most. error: stop as soon as every standard error is at most this share of its value. bands: of
-    spectral quantities. lift: of receivers above their points [m]; walls must be farther away.
-    device, options: see `clpt.Renderer`. The scene's camera is not used; its film gives the range
-    of wavelengths.
+    most. error: stop when each standard error is at most this share of its value. bands: of
+    spectral quantities. device, options: see `clpt.Renderer`. The scene's camera is not used; its
+    film has the range of wavelengths.
 
     Raises UnknownKindError for a quantity, SceneError for points that cannot be used, and as
     `clpt.Renderer` does.
@@ -92,23 +90,30 @@ def measure(
         raise UnknownKindError("quantity", quantity, QUANTITIES)
     if error is not None and not error > 0.0:
         raise SceneError(f"must be above 0, not {error!r}", where="error")
-    kind, points = QUANTITIES[quantity], _rows(at, "at")
+    points = _rows(at, "at")
     toward = np.broadcast_to(_rows(directions, "directions"), points.shape)
-    count, turns = math.prod(points.shape[:-1]), len(AXES) if kind.everywhere else 1
-    instrument = photometer(
-        scene, kind, points.reshape(-1, 3), toward.reshape(-1, 3), bands=bands, lift=lift
-    )
-    most = max(1, math.ceil(samples / (REPLICAS * turns)))
+    rows = points.reshape(-1, 3), toward.reshape(-1, 3)
+    instrument = photometer(scene, QUANTITIES[quantity], *rows, bands=bands)
     with Renderer(instrument, device, **options) as renderer:
-        step = most if error is None else min(most, FIRST_SAMPLES)
-        while True:
-            renderer.run(step)
-            pixels = _pixels(renderer.image(), turns, count)
-            measured = _measured(quantity, pixels, instrument.film, points.shape[:-1])
-            measured = dataclasses.replace(measured, samples=renderer.samples * REPLICAS * turns)
-            step = min(renderer.samples, most - renderer.samples)
-            if step <= 0 or (error is not None and measured.relative_error <= error):
-                return measured
+        return _read(renderer, quantity, points.shape[:-1], samples, error)
+
+
+def _read(
+    renderer: Renderer, quantity: str, shape: tuple[int, ...], samples: int, error: float | None
+) -> Measurement:
+    """Add samples until the errors are small enough, and return what an instrument measures."""
+    count = math.prod(shape)
+    turns = len(AXES) if QUANTITIES[quantity].everywhere else 1
+    most = max(1, math.ceil(samples / (REPLICAS * turns)))
+    step = most if error is None else min(most, FIRST_SAMPLES)
+    while True:
+        renderer.run(step)
+        pixels = _pixels(renderer.image(), turns, count)
+        measured = _measured(quantity, pixels, renderer.scene.film, shape)
+        measured = dataclasses.replace(measured, samples=renderer.samples * REPLICAS * turns)
+        step = min(renderer.samples, most - renderer.samples)
+        if step <= 0 or (error is not None and measured.relative_error <= error):
+            return measured
 
 
 def _pixels(image: Image, turns: int, count: int) -> Floats:
@@ -143,7 +148,8 @@ def photometer(
 ) -> Scene:
     """Return the scene with a camera that measures: `measure` renders it, and so can others.
 
-    points (n, 3) [m]; directions (n, 3); bands, lift: see `measure`. Pixel i, row by row, is of
+    points (n, 3) [m]; directions (n, 3); bands: see `measure`; lift: of receivers above their
+    points [m]: walls must be farther away. Pixel i, row by row, is of
     entry i modulo n; of a quantity without a normal, of orientation i // n modulo 6 of it.
 
     Raises SceneError for directions of length 0.
@@ -156,22 +162,24 @@ def photometer(
     if quantity.at == "rays":
         camera = Rays(origins=points, directions=directions)
     else:
-        everywhere = quantity.everywhere
         camera, receivers = (
-            _balls(points, lift, scene.seed) if everywhere else _discs(points, directions, lift)
+            _balls(points, lift, scene.seed)
+            if quantity.everywhere
+            else _discs(points, directions, lift)
         )
         added = [receivers]
     count = REPLICAS * len(points) * (len(AXES) if quantity.everywhere else 1)
     width = min(len(camera.origins), LONGEST_ROW)
-    film = quantity.film(
-        dataclasses.replace(
-            scene.film, width=width, height=math.ceil(count / width), crop=None,
-            filter=Box(radius=0.25),
-        ),
-        bands,
-    )  # fmt: skip
+    height = math.ceil(count / width)
+    film = dataclasses.replace(
+        scene.film, width=width, height=height, crop=None, filter=Box(radius=0.25)
+    )
     return dataclasses.replace(
-        scene, camera=camera, film=film, shapes=[*scene.shapes, *added], noise=None
+        scene,
+        camera=camera,
+        film=quantity.film(film, bands),
+        shapes=[*scene.shapes, *added],
+        noise=None,
     )
 
 

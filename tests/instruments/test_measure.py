@@ -190,10 +190,44 @@ def test_pixels_are_entries_again_and_again():
     for mode in ("rgb", "spectral"):
         lit = dataclasses.replace(
             scene(square(), depth=1),
-            camera=cameras.Rays(
-                origins=np.zeros((5, 3)), directions=[[0, 1, 0]], weights=levels
-            ),
+            camera=cameras.Rays(origins=np.zeros((5, 3)), directions=[[0, 1, 0]], weights=levels),
             film=Film(size=(5, 3), mode=mode, filter=Box(radius=0.25), bands=0),
         )
         image = clpt.render(lit, spp=4)[..., 1]
         np.testing.assert_allclose(image / image[0, 0], np.tile(levels, (3, 1)), rtol=0.04)
+
+
+def test_the_command_writes_a_table(tmp_path):
+    from click.testing import CliRunner
+
+    from clpt.cli.measure import measure as command
+
+    clpt.save(scene(square()), tmp_path / "lamp.json")
+    points = tmp_path / "points.csv"
+    points.write_text("# a desk\nx, y, z, nx, ny, nz\n0, 0, 0, 0, 1, 0\n0, 0, 0, 0, -1, 0\n")
+    output = tmp_path / "lux.csv"
+    arguments = [tmp_path / "lamp.json", "--at", points, "--samples", 256, "-o", output]
+    told = CliRunner().invoke(command, [str(word) for word in arguments])
+    assert told.exit_code == 0, told.output
+    titles, lit, dark = output.read_text().splitlines()
+    assert titles == "x,y,z,illuminance [lx],standard error of illuminance [lx]"
+    expected = 4.0 * below_corner(0.5, 0.5) * UNIT_LUMINANCE
+    assert float(lit.split(",")[3]) == pytest.approx(expected, rel=0.02)
+    assert float(dark.split(",")[3]) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1, 2\n", "line 1: 2 numbers, not 3 or 6"),
+        ("x,y,z\n1,2,3\n1,2,3,4,5,6\n", "line 3: 6 numbers, not 3"),
+        ("1,2,three\n", "line 1"),
+        ("# nothing\n", "no points"),
+    ],
+)
+def test_tables_that_cannot_be_read(tmp_path, text, words):
+    from clpt.instruments.tables import read_points
+
+    (tmp_path / "points.csv").write_text(text)
+    with pytest.raises(SceneError, match=words):
+        read_points(tmp_path / "points.csv")

@@ -1,5 +1,5 @@
-/* A list of rays: origin, unit direction and weight, 7 words each. Pixel i of the film, row by row, is entry i modulo the
- * count. */
+/* A list of rays: origin, unit direction and weight, 7 words each. Pixel i of the film, row by row, is entry i modulo
+ * the count. */
 CameraRay rays_ray(Scene scene, global const RaysCamera *camera, vec2 film, vec2 lens, Wavelengths lambdas,
                    Spectrum *weight)
 {
