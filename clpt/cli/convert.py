@@ -12,7 +12,7 @@ from ..errors import SceneError
 from ..formats import FORMATS, locate, save
 from .info import read_scene
 from .options.grading import GradingOptions, grading_options
-from .options.loading_options import loading_options
+from .options.loading import loading_options
 from .options.records import with_records
 from .options.scene_options import Loading
 from .options.values import Choice
@@ -51,9 +51,10 @@ def convert(
     if file.name.lower().endswith(tuple(FORMATS)):
         _convert_scene(file, target, loading)
         return
-    from .files.conversions import write_converted
+    from .files.image_tools import write_converted
 
-    write_converted(source, target, layer, graded.grading, terminal.say)
+    for line in write_converted(source, target, layer, graded.grading):
+        terminal.say(line)
 
 
 def _convert_scene(file: Path, target: Path, loading: Loading) -> None:

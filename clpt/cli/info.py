@@ -10,9 +10,9 @@ import click
 
 from ..errors import SceneError
 from ..formats import errors_of, locate
-from .options.loading_options import loading_options
+from .options.loading import loading_options
 from .options.scene_options import Loading
-from .options.scene_path import ScenePath
+from .options.values import ScenePath
 from .process import terminal
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
 
     contents: dict[str, Any]
     if is_film(scene):
-        from .files.film_contents import film_summary
+        from .files.image_contents import film_summary
 
         contents = film_summary(scene)
     elif scene.suffix.lower() in READERS:
@@ -71,7 +71,7 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
         return
     from rich.table import Table
 
-    from .printing.console import output_console, shown
+    from .console import output_console, shown
 
     table = Table(show_header=False, title=shown(scene), title_justify="left")
     for name, value in contents.items():

@@ -14,7 +14,7 @@ from clpt import lenses, spectra, transforms
 from clpt.arrays import fits_single
 from clpt.errors import SceneError
 from clpt.lenses import Prescription
-from clpt.lenses.focusing import MARGIN, FocusedLens, focused_lens
+from clpt.lenses.tracing import MARGIN, FocusedLens, focused_lens
 from clpt.scene import roles
 from clpt.scene.media import Medium
 from clpt.scene.motion import Keys, Shutter
