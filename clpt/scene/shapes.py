@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
 from clpt.scene import trimeshes
-from clpt.scene.lights import ON_SHAPES, Light
+from clpt.scene.lights import ON_SHAPES, PoweredLamp
 from clpt.scene.materials import Diffuse, Material
 from clpt.scene.media import Medium
 from clpt.scene.motion import Deformation, Keys
@@ -33,17 +33,28 @@ class Shape(Kind):
     is_open: ClassVar[bool] = False  # no shape of this kind encloses a volume by itself
     # of a kind without such parameters
     attributes = NO_ATTRIBUTES
+    vertices = cast(Any, None)
+    faces = cast(Any, None)
+    radii = cast(Any, None)
     normals = cast(Any, None)
     tangents = cast(Any, None)
     deformation = cast("Deformation | None", None)
+    displacement = cast("Bitmap | None", None)
+    group = cast("Group | None", None)
+    points_name: ClassVar[str] = ""  # the parameter with the points that a deformation moves
 
     @property
     def members(self) -> tuple[Shape, ...]:
-        """The shape, or those that an instance places."""
+        """The shape, or the shapes that an instance places."""
         return (self,)
 
+    @property
+    def shared_parts(self) -> dict[str, Any]:
+        """The parts that other shapes may share, by their parameters."""
+        return {"material": self.material}
+
     material: Material = host(Diffuse(), "of the surface", form="material")
-    emission: Light | None = host(None, "an `area` light, or None", form="area_light")
+    emission: PoweredLamp | None = host(None, "an `area` light, or None", form="area_light")
     interior: Medium | None = host(None, "medium behind its front, or None", form="medium")
     exterior: Medium | None = host(None, "medium before its front, or None", form="medium")
     priority: int = host(0, "where bodies overlap, that of the highest fills the place")
@@ -76,6 +87,8 @@ def check_faces(faces: NDArray[Any], vertices: int, where: str) -> None:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mesh(Shape):
     """Triangles, counter-clockwise seen from the front."""
+
+    points_name = "vertices"
 
     vertices: Any = host(None, "(n, 3) float32", "m", form="rows3")
     faces: Any = host(None, "(m, 3) uint32", form="triangles")
@@ -166,6 +179,8 @@ class Spheres(Shape):
     A `mesh_attribute` texture reads the attributes: the first row is the first sphere's.
     """
 
+    points_name = "centers"
+
     centers: Any = host(
         None, "(n, 3) float32 before `to_world`; (n, 4): with the radii", "m", form="rows3"
     )
@@ -224,6 +239,7 @@ class Curves(Shape):
     """
 
     is_open = True
+    points_name = "points"
 
     points: Any = host(None, "(n, 4) of all strands: x y z and the radius", "m", form="rows4")
     lengths: Any = host(
@@ -271,6 +287,10 @@ class Group:
     shapes: tuple[Shape, ...] = ()
     name: str = ""
 
+    @property
+    def shared_parts(self) -> dict[str, Any]:
+        return {"shapes": self.shapes}
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "shapes", tuple(self.shapes))
         for i, shape in enumerate(self.shapes):
@@ -287,12 +307,16 @@ class Instance(Shape):
     group: Group = host(None, "what is placed: a name in the scene's `groups`", form="group")
     # The surfaces are those of the group's shapes.
     material: Material = field(default=cast(Material, None), init=False, repr=False)
-    emission: Light | None = field(default=None, init=False, repr=False)
+    emission: PoweredLamp | None = field(default=None, init=False, repr=False)
     flip_normals: bool = field(default=False, init=False, repr=False)
 
     @property
     def members(self) -> tuple[Shape, ...]:
         return self.group.shapes
+
+    @property
+    def shared_parts(self) -> dict[str, Any]:
+        return {"group": self.group}
 
     def check(self) -> None:
         """Raise SceneError unless `group` is a group."""
