@@ -6,7 +6,8 @@ import difflib
 import importlib
 import itertools
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -15,6 +16,7 @@ from clpt.errors import LONGEST_WARNING, SceneError, nearest, one_line
 from clpt.files import budget as budgets
 from clpt.files.budget import Budget
 from clpt.formats import own_scenes, reading
+from clpt.formats.reading import Progress
 
 if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
     from clpt.scene import Scene
@@ -56,7 +58,7 @@ def load(
     /,
     *,
     kinds: Iterable[type[Material]] = (),
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
     missing_textures: Missing = "error",
     budget: Budget | None = None,
     **variables: Any,
@@ -84,10 +86,22 @@ def load(
         raise SceneError("reading it takes more memory than there is", file=path) from None
 
 
+def prepare(path: str | Path, /) -> None:
+    """Import the library that reads a file's format, before other threads use native code.
+
+    OpenUSD takes Python's lock while the linker loads it. A thread that holds that lock, and asks
+    the linker for a symbol as OpenCL's drivers do, would wait for ever. A library that is missing
+    is an error of `load`.
+    """
+    if FORMATS.get(Path(path).suffix.lower()) == "usd":
+        with suppress(ImportError):
+            importlib.import_module("clpt.formats.usd.scenes")
+
+
 def _load(
     path: Path,
     kinds: Iterable[type[Material]],
-    progress: Callable[[float, str], None] | None,
+    progress: Progress | None,
     missing_textures: Missing,
     variables: dict[str, Any],
 ) -> Scene:

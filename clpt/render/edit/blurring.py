@@ -75,8 +75,8 @@ class _Way:
 
     def deformed(self, old: Shape, new: Shape) -> Shape:
         """Return a shape with keys of its points, if they differ from the former points."""
-        name = new.points_name
-        if not name or name != old.points_name or new.deformation is not None:
+        name = new.deformed_field
+        if not name or name != old.deformed_field or new.deformation is not None:
             return new
         was, now = fields_of(old), fields_of(new)
         if was[name] is now[name] and was.get("radii") is now.get("radii"):

@@ -74,7 +74,7 @@ def edit_scene(
         edit.change(edit.shape(key, "transforms"), "to_world", new)
     for key, points in (vertices or {}).items():
         shape = edit.shape(key, "vertices")
-        field = shape.points_name
+        field = shape.deformed_field
         if field not in ("vertices", "centers"):
             raise SceneError(f"a {shape.kind} has none", where=f"vertices[{key!r}]")
         new = fresh_view(points) if on_device(points) else np.asarray(points).view()

@@ -24,7 +24,8 @@ from clpt import images, spectra
 from clpt.arrays import Words
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.images import Stored, arrays
+from clpt.images import Stored
+from clpt.images.stored import checked
 from clpt.render.records.lowering_cache import LoweringCache, version
 from clpt.render.records.tables import TableStore
 from clpt.render.records.textures import KINDS, MIPS
@@ -33,7 +34,7 @@ from clpt.scene.pixels import channel, image_file
 from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role
 from clpt.scene.textures import Bitmap
 
-NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectral_read.cl
+NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectral.cl
 LARGEST = 2**31 - 1  # words in `images` that an index reaches
 THREADS = 8
 UNKNOWN, NEW, PACKED = range(3)
@@ -228,7 +229,7 @@ class Images:
         """Return the words of an image: level by level, row by row from the top."""
         texture, stored = image.texture, image.pixels.stored.meant(image.texture.raw)
         packs = _packs(image.form, image, self.spectral)
-        values = arrays.checked(stored.values, "bitmap.image")
+        values = checked(stored.values, "bitmap.image")
         curved = stored.encoded and not texture.raw
         if image.halvings:
             values = _halved(values, curved, image.halvings)
