@@ -10,7 +10,7 @@ inline natural pixel_key(global const Settings *settings, integer pixel_index)
     return as_natural((y + (settings->crop_y + margin)) * width + x + (settings->crop_x + margin));
 }
 
-inline Sampler pixel_sampler(global const Settings *settings, natural pixel_key, integer sample)
+inline Sampler pixel_sampler(global const Settings *settings, natural key, integer sample)
 {
-    return sampler_start(settings->seed, pixel_key, as_natural(sample));
+    return sampler_start(settings->seed, key, as_natural(sample));
 }

@@ -19,7 +19,7 @@ inline natural pixel_key(global const Settings *settings, integer pixel_index)
     return spread_bits(column) | (spread_bits(row) << 1u);
 }
 
-inline Sampler pixel_sampler(global const Settings *settings, natural pixel_key, integer sample)
+inline Sampler pixel_sampler(global const Settings *settings, natural key, integer sample)
 {
-    return zsobol_start(settings->seed, (uint)settings->sample_bits, pixel_key, as_natural(sample));
+    return zsobol_start(settings->seed, (uint)settings->sample_bits, key, as_natural(sample));
 }
