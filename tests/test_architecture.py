@@ -58,7 +58,8 @@ FLOORS = (
 )  # fmt: skip
 # clpt/cli/<room>: the same; commands stand on top of all.
 FLOORS_OF_COMMANDS = (
-    {"process"}, {"printing", "options"}, {"opening"}, {"files"}, {"plots"}, {"render", "view"},
+    {"process"}, {"display", "console", "options"}, {"opening"}, {"files"}, {"plots"},
+    {"render", "view"},
 )  # fmt: skip
 # What kinds share, by what a reader looks for.
 SHARED = {

@@ -11,7 +11,7 @@ import pyopencl as cl
 
 from ..choices import Quality
 from ..records import TREE_BITS, TREE_SIZES
-from . import tree, wide
+from . import tree
 from .building import Building
 
 REINSERT_LIMIT = 10_000  # triangles; below, the program takes longer to load than it saves
@@ -112,10 +112,10 @@ def wide8(building: Building, mesh: Mesh) -> Packed:
     built = _binary_tree(building, mesh, _BLOCK, at_once=_BLOCK)
     if mesh.quality == "high" and mesh.count >= REINSERT_LIMIT:
         built = tree.reinserted(building, built)
-    chosen = wide.collapse(building, built)
-    figures = wide.figures(building, chosen)
+    chosen = tree.collapse(building, built)
+    figures = tree.figures(building, chosen)
     nodes, blocks = building.allocate(256 * figures.nodes), building.allocate(352 * figures.leaves)
-    wide.write_nodes(building, chosen, nodes)
+    tree.write_nodes(building, chosen, nodes)
     source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
     leaves = {"nodes": built.nodes, "items": built.items, "leaf_roots": chosen.leaf_roots}
     building.run_each(
@@ -158,15 +158,15 @@ def wide8_shapes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
 
 def _wide_over_boxes(
     building: Building, count: int, boxes: cl.Buffer, spare: bool = False
-) -> tuple[wide.Collapse, wide.Figures, dict[str, cl.Buffer]]:
+) -> tuple[tree.Collapse, tree.Figures, dict[str, cl.Buffer]]:
     """Return a wide tree and its buffers; spare: leave room for later trees over the boxes."""
     items, parts = tree.items_of_boxes(building, count, boxes)
-    chosen = wide.collapse(building, tree.over(building, count, items, parts, 1))
-    figures = wide.figures(building, chosen)
+    chosen = tree.collapse(building, tree.over(building, count, items, parts, 1))
+    figures = tree.figures(building, chosen)
     room = figures.nodes + figures.nodes // 4 + 8 if spare else figures.nodes
     nodes, indices = building.allocate(256 * room), building.allocate(4 * count)
-    wide.write_nodes(building, chosen, nodes)
-    wide.write_indices(building, chosen, indices)
+    tree.write_nodes(building, chosen, nodes)
+    tree.write_indices(building, chosen, indices)
     return chosen, figures, {"nodes": nodes, "indices": indices}
 
 
@@ -195,8 +195,8 @@ def _compact_nodes(
     building: Building, built: tree.Tree, leaves: cl.Buffer, tags: cl.Buffer | None
 ) -> tuple[cl.Buffer, Part, dict[str, float]]:
     """Fill in leaves, and return compressed nodes without boxes, for `refit_nodes`."""
-    chosen = wide.collapse(building, built)
-    figures = wide.figures(building, chosen)
+    chosen = tree.collapse(building, built)
+    figures = tree.figures(building, chosen)
     nodes = building.allocate(_round_up(80 * figures.nodes))
     common = {"places": building.allocate(8 * figures.nodes), "compact": nodes, "tags": tags}
     common |= {"nodes": built.nodes, "items": built.items, "leaves": leaves}

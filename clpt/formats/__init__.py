@@ -6,7 +6,7 @@ import difflib
 import importlib
 import itertools
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -15,6 +15,7 @@ from clpt.errors import LONGEST_WARNING, SceneError, nearest, one_line
 from clpt.files import budget as budgets
 from clpt.files.budget import Budget
 from clpt.formats import own_scenes, reading
+from clpt.formats.reading import Progress
 
 if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
     from clpt.scene import Scene
@@ -56,7 +57,7 @@ def load(
     /,
     *,
     kinds: Iterable[type[Material]] = (),
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
     missing_textures: Missing = "error",
     budget: Budget | None = None,
     **variables: Any,
@@ -87,7 +88,7 @@ def load(
 def _load(
     path: Path,
     kinds: Iterable[type[Material]],
-    progress: Callable[[float, str], None] | None,
+    progress: Progress | None,
     missing_textures: Missing,
     variables: dict[str, Any],
 ) -> Scene:

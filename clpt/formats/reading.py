@@ -48,6 +48,7 @@ class Located(ABC):
 
 
 T = TypeVar("T")
+Progress = Callable[[float, str], None]  # called with the share that is read, and a text
 MOST = 200  # errors that are kept
 _found: ContextVar[list[SceneError] | None] = ContextVar("blockers", default=None)
 

@@ -22,7 +22,7 @@ from clpt.geometry.analytic import keeps_its_kind, tessellate
 from clpt.geometry.shapes import where
 from clpt.geometry.tubes import Tubes, as_tubes
 from clpt.records import INSTANCE
-from clpt.scene.shapes import Curves, Cylinder, Group, Instance, Mesh, Shape, Sphere
+from clpt.scene.shapes import Curves, Cylinder, Group, Mesh, Shape, Sphere
 
 CELLS = 16  # columns along a side, see `outline`
 FEW = 16  # up to this number of instances curves are copied, as tubes would take more memory
@@ -101,7 +101,7 @@ def distinct(shapes_: Iterable[Shape]) -> Iterator[Shape]:
     """Yield every shape that a scene has, those of its groups once and where the group has them."""
     seen: set[int] = set()
     for shape in shapes_:
-        if not isinstance(shape, Instance):
+        if shape.group is None:
             yield shape
         elif id(shape.group) not in seen:
             seen.add(id(shape.group))
@@ -122,8 +122,8 @@ def sort(
     groups: dict[int, tuple[Group, list[int]]] = {}
     for number, member in enumerate(shapes):
         as_met = _met_as(member)
-        if isinstance(as_met, Instance):
-            groups.setdefault(id(as_met.group), (as_met.group, []))[1].append(number)
+        if (group := as_met.group) is not None:
+            groups.setdefault(id(group), (group, []))[1].append(number)
         elif number in moving and as_met.kind not in shape_records.ANALYTIC:
             prototypes.append(_alone(as_met, number))
         else:
@@ -328,7 +328,7 @@ def _of_mesh(shape: Mesh, times: Sequence[float]) -> NDArray[np.int64]:
 
 def _of_tubes(shape: Curves, times: Sequence[float]) -> NDArray[np.int64]:
     keyed = times if shape.deformation is not None else ()
-    alike = [triangles.at_time(shape, time) for time in keyed]
+    alike = [shape.at_time(time) for time in keyed]
     vertices, faces, _, _ = triangles.local(alike[0] if alike else shape, alike)
     strand = tubes.strands(alike[0] if alike else shape, where(shape), alike, len(vertices))
     return np.asarray(strand[faces[:, 0]][triangles.kept(shape, times)])

@@ -16,7 +16,7 @@ from clpt.arrays import Boxes
 from clpt.errors import SceneError
 from clpt.geometry import shapes, triangles
 from clpt.scene import Scene
-from clpt.scene.cameras import Camera, Matrix, Orthographic
+from clpt.scene.cameras import Camera
 from clpt.scene.lights import Light
 from clpt.scene.motion import Keys, Shutter, arc, decomposed, rotation, slerp
 from clpt.scene.shapes import Cylinder, Group, Instance, Shape, Sphere
@@ -124,7 +124,7 @@ def at_rest(scene: Scene) -> Scene:
     for name, parts in lists:
         if any(part.motion is not None for part in parts):
             changes[name] = [_rest(part, shutter) for part in parts]
-    camera = _rest(scene.camera, shutter)
+    camera = _camera_at_rest(scene.camera, shutter)
     if camera is not scene.camera:
         changes["camera"] = camera
     return replace(scene, **changes) if changes else scene
@@ -148,12 +148,12 @@ def _undeformed(shapes_: Sequence[Shape], shutter: Shutter) -> list[Shape]:
     for shape in shapes_:
         if not _deforms(shape):
             still.append(shape)
-        elif isinstance(shape, Instance):
-            group = shape.group
+        elif (group := shape.group) is not None:
             if id(group) not in groups:
                 inner = tuple(_opening(member, shutter) for member in group.shapes)
                 groups[id(group)] = replace(group, shapes=inner)
-            still.append(replace(shape, group=groups[id(group)]))
+            placing: dict[str, Any] = {"group": groups[id(group)]}
+            still.append(replace(shape, **placing))
         else:
             still.append(_opening(shape, shutter))
     return still
@@ -174,7 +174,7 @@ def _opening(shape: Any, shutter: Shutter) -> Any:
         message = "spheres that emit light cannot deform: leave one of the two out"
         raise SceneError(message, where=f"{shapes.where(shape)}.deformation")
     changes = {} if still else {"deformation": deformation}
-    return replace(triangles.at_time(shape, shutter.open), **changes)
+    return replace(shape.at_time(shutter.open), **changes)
 
 
 def _check(movable: Any, where: str) -> None:
@@ -183,15 +183,10 @@ def _check(movable: Any, where: str) -> None:
 
 
 def _rest(movable: Any, shutter: Shutter) -> Any:
-    """A shape, light or camera without keys, if it does not move while the shutter is open."""
+    """Return a shape or light without keys, if it does not move while the shutter is open."""
     if movable.motion is None or _moves(movable.motion, shutter):
         return movable
     matrix = movable.motion.at(shutter.open)
-    angular = isinstance(movable, Camera) and not isinstance(movable, (Matrix, Orthographic))
-    if angular and not _keeps_lengths(matrix):  # which its `to_world` must
-        return replace(movable, motion=Keys((0.0, 1.0), (matrix, matrix)))
-    if isinstance(movable, Matrix):
-        return replace(movable, motion=None, view=movable.view @ transforms.inverse(matrix))
     if isinstance(movable, ROUND) and not is_even(movable.motion):
         still = replace(movable, motion=None)  # which an instance may stretch
         return Instance(group=Group((still,), movable.kind), to_world=matrix, name=movable.name)
@@ -203,6 +198,16 @@ def _rest(movable: Any, shutter: Shutter) -> Any:
     if hasattr(movable, "direction"):
         changes["direction"] = tuple(transforms.transform_vectors(matrix, movable.direction))
     return replace(movable, **changes)
+
+
+def _camera_at_rest(camera: Camera, shutter: Shutter) -> Camera:
+    """Return a camera without keys, if it does not move while the shutter is open."""
+    if camera.motion is None or _moves(camera.motion, shutter):
+        return camera
+    matrix = camera.motion.at(shutter.open)
+    if camera.is_rigid and not _keeps_lengths(matrix):
+        return replace(camera, motion=Keys((0.0, 1.0), (matrix, matrix)))
+    return replace(camera.moved(matrix), motion=None)
 
 
 def _keeps_lengths(matrix: NDArray[np.float64]) -> bool:

@@ -16,7 +16,6 @@ from clpt.errors import SceneError
 from clpt.files import budget
 from clpt.geometry.shapes import where
 from clpt.scene import subdivision
-from clpt.scene.pixels import pixels
 from clpt.scene.roles import REAL
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap
@@ -180,7 +179,7 @@ def _smooth(points: Floats, faces: Integers) -> Floats:
 
 def heights(image: Bitmap, uvs: Floats) -> Floats:
     """Return what an image says at uvs (n, 2), as textures/kinds/bitmap.cl reads numbers: (n,)."""
-    values = pixels(image, REAL)[..., 0].astype(np.float64)
+    values = image.pixels(REAL)[..., 0].astype(np.float64)
     to_uv = np.asarray(image.to_uv, np.float64)
     x, y = ((np.c_[uvs, np.ones(len(uvs))] @ to_uv.T)[:, :2] * [1.0, -1.0] + [0.0, 1.0]).T
     x, y = x * values.shape[1], y * values.shape[0]

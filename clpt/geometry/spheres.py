@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import Balls, Words, on_host, single
 from clpt.errors import SceneError
-from clpt.geometry import analytic, shapes, triangles
+from clpt.geometry import analytic, shapes
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape, Spheres
 
@@ -55,7 +55,7 @@ def keyed(shape: Spheres, times: Sequence[float]) -> Balls:
     at_all = []
     for time in times:
         try:
-            at_all.append(balls(triangles.at_time(shape, time)))
+            at_all.append(balls(shape.at_time(time)))
         except SceneError as error:
             where = f"{shapes.where(shape)}.deformation"
             raise SceneError(f"at {time:g} s: {error.message}", where=where) from None

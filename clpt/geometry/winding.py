@@ -19,12 +19,13 @@ from clpt.geometry.analytic import keeps_its_kind, tessellate
 from clpt.geometry.triangles import counted, triangulate
 from clpt.scene.shapes import Cylinder, Disk, Mesh, Shape, Sphere, Spheres
 
+Cache = Callable[..., Any]  # calls a function, or returns its earlier result
 Triangles = tuple[NDArray[np.float32], NDArray[np.uint32]]
 AROUND = 96  # corners of a disk's polygon
 CHUNK = 1 << 18  # triangles that are summed at a time
 
 
-def box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any], NDArray[Any]]:
+def box(shape: Shape, cached: Cache | None) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the lowest and the highest corner of a shape's box."""
     if isinstance(shape, Sphere) and keeps_its_kind(shape):
         return analytic.bounds(shape)
@@ -37,7 +38,7 @@ def box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any], 
     return vertices.min(axis=0), vertices.max(axis=0)
 
 
-def winding(shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | None) -> float:
+def winding(shape: Shape, p: NDArray[np.float64], cached: Cache | None) -> float:
     """Return how often a shape winds around a point.
 
     It is 1 inside of a shape that is closed and faces outward.
@@ -53,7 +54,7 @@ def winding(shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | N
 
 
 def areas(
-    shape: Shape, cached: Callable[..., Any] | None, to_world: NDArray[np.float64] | None = None
+    shape: Shape, cached: Cache | None, to_world: NDArray[np.float64] | None = None
 ) -> NDArray[np.float64]:
     """Return the sum of a shape's areas along their normals, and of the areas alone (4,) [m^2].
 
@@ -70,7 +71,7 @@ def areas(
     return np.array([*n.sum(axis=0), np.linalg.norm(n, axis=1).sum()])
 
 
-def volume(shape: Shape, cached: Callable[..., Any] | None) -> float:
+def volume(shape: Shape, cached: Cache | None) -> float:
     """Return the volume of a shape [m^3], below 0 if it faces inward."""
     if isinstance(shape, Spheres):
         return (-1.0 if shape.flip_normals else 1.0) * 4.2 * float((balls(shape)[1] ** 3).sum())
@@ -102,7 +103,7 @@ def balls(shape: Spheres) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return rows[:, :3], np.abs(rows[:, 3])
 
 
-def triangles_of(shape: Shape, cached: Callable[..., Any] | None = None) -> Triangles:
+def triangles_of(shape: Shape, cached: Cache | None = None) -> Triangles:
     """Return the triangles of a shape in the world, or those that stand for it."""
     if isinstance(shape, Disk):
         shape = _fan(shape)

@@ -18,7 +18,7 @@ from clpt.arrays import Image
 from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.denoise import needs
 from clpt.errors import LONGEST_WARNING, ClptError, DeviceError, SceneError, one_line
-from clpt.images.colour.view import View
+from clpt.images.colour import View
 from clpt.render.edit.plan import Plan
 from clpt.render.edit.scene_edit import MaterialKey, ShapeKey
 from clpt.render.film.denoised_picture import DenoisedPicture

@@ -15,7 +15,7 @@ from pyopencl.array import Array
 from clpt import device as dev
 from clpt import images
 from clpt.errors import MemoryBudgetError, SceneError
-from clpt.images.colour.view import View
+from clpt.images.colour import View
 from clpt.render.film import film_file
 from clpt.render.film.resolve import Resolve, Screen
 from clpt.render.film.saved_film import Origin, SavedFilm, Session
@@ -238,7 +238,7 @@ class ResumableRenderer(FilmRenderer):
         into: the caller's Array or Buffer, or 2D Image of 8-bit or float RGBA, as OpenGL shares
         them; None makes an Array. dtype: uint8 (the default, the bytes of a .png) or float32.
         exposure [stops] over the film's `display_exposure`; tone: none, reinhard, aces, agx or
-        neutral, see clpt.images.colour.tones; srgb: whether the sRGB transfer is applied, by
+        neutral, see clpt.images.colour; srgb: whether the sRGB transfer is applied, by
         default to uint8 only; colours become Rec. 709. view: of OpenColorIO, in the place of tone
         and
         transfer: a table of it, right to 1/512 for 98 of 100 colours. flip: the first row is the

@@ -19,7 +19,7 @@ from clpt.scene.insides import absorbed, dispersed
 from clpt.scene.lights import Area
 from clpt.scene.materials import Diffuse, GltfSurface, Material
 from clpt.scene.media import Homogeneous
-from clpt.scene.params import Texture
+from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product, turned
 from clpt.scene.values import Textured, TexturedNumber
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +16,7 @@ from clpt.formats.mitsuba.principled import (
     principled,
     principled_thin,
 )
-from clpt.formats.mitsuba.properties import Context, Properties, numbers, unknown
+from clpt.formats.mitsuba.properties import Context, PluginReader, Properties, numbers, unknown
 from clpt.formats.mitsuba.spectra import (
     coefficient,
     factor,
@@ -263,7 +262,7 @@ def _polarized_plastic(props: Properties) -> Parameters:
     return {**_rough_plastic(props), "nonlinear": False}
 
 
-def _polarizing(share: float) -> Callable[[Properties], Parameters]:
+def _polarizing(share: float) -> PluginReader[Parameters]:
     """Return the reader of a plate that lets a share of unpolarised light straight through."""
 
     def read(props: Properties) -> Parameters:
@@ -443,7 +442,7 @@ def _nested(props: Properties, low: int, high: int) -> list[Material]:
     return [bsdf(element, props.context) for element in inner]
 
 
-PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = {
+PLUGINS: dict[str, tuple[type[Material], PluginReader[Parameters]]] = {
     "diffuse": (materials.Diffuse, _diffuse),
     "phong": (materials.Phong, _phong),
     "roughdiffuse": (materials.OrenNayar, _rough_diffuse),

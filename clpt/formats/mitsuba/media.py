@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba import grids, spectra
 from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.principled import dye, fluorescent
-from clpt.formats.mitsuba.properties import Context, Properties, numbers, unknown
+from clpt.formats.mitsuba.properties import Context, PluginReader, Properties, numbers, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.formats.pbrt.scattering import MEDIA as MEASURED
 from clpt.scene import media, phases
@@ -374,7 +373,7 @@ def _more(props: Properties) -> dict[str, Any]:
     return matches
 
 
-MEDIA: dict[str, Callable[[Properties], Medium]] = {
+MEDIA: dict[str, PluginReader[Medium]] = {
     "homogeneous": _homogeneous,
     "heterogeneous": _heterogeneous,
     "soot": _soot,
@@ -382,7 +381,7 @@ MEDIA: dict[str, Callable[[Properties], Medium]] = {
     "dyed": _dyed,
     "mixture": _mixture,
 }
-PHASES: dict[str, Callable[[Properties], Phase]] = {
+PHASES: dict[str, PluginReader[Phase]] = {
     "mixturephase": _mixed_phase,
     "isotropic": lambda props: phases.Isotropic(),
     "hg": lambda props: phases.HenyeyGreenstein(g=props.number("g", 0.8)),

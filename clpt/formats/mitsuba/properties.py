@@ -38,6 +38,7 @@ FLAT_SIZE = 1e-5  # thickness over size of a shape that is flattened
 SEPARATOR = re.compile(r"[\s,]+")
 LARGEST_INTEGER = 2**31 - 1
 T = TypeVar("T")
+PluginReader = Callable[["Properties"], T]  # reads the parameters of a plugin
 
 
 class Context:

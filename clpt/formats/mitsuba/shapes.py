@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -19,7 +19,7 @@ from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import area
 from clpt.formats.mitsuba.media import body, side
-from clpt.formats.mitsuba.properties import Context, NoArea, Properties, unknown
+from clpt.formats.mitsuba.properties import Context, NoArea, PluginReader, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.formats.reading import attempt
 from clpt.geometry.polygons import smooth_normals
@@ -347,7 +347,7 @@ def _sdf_grid(props: Properties) -> Parameters:
     return {"values": values, "to_world": props.placement(thin=True), "pieces": SDF_PIECES}
 
 
-PLUGINS: dict[str, tuple[type[Shape], Callable[[Properties], Parameters]]] = {
+PLUGINS: dict[str, tuple[type[Shape], PluginReader[Parameters]]] = {
     "obj": (shapes.Mesh, _obj),
     "ply": (shapes.Mesh, _ply),
     "serialized": (shapes.Mesh, _serialized),

@@ -6,7 +6,6 @@ Mitsuba's bitmaps have v = 0 in their top row, ours in the bottom row; `to_uv` f
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +15,7 @@ from clpt import images, spectra
 from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba.properties import (
     Context,
+    PluginReader,
     Properties,
     number,
     numbers,
@@ -309,7 +309,7 @@ def _raw_constant(props: Properties) -> Any:
     return RGBUnbounded(*triple(child, "value", 0.0).tolist())
 
 
-PLUGINS: dict[str, Callable[[Properties], Any]] = {
+PLUGINS: dict[str, PluginReader[Any]] = {
     **PLAIN,
     "d65": _d65,
     "srgb": _srgb,
@@ -444,7 +444,7 @@ def _grid(props: Properties) -> Mix:
     )
 
 
-TEXTURES: dict[str, Callable[[Properties], Any]] = {
+TEXTURES: dict[str, PluginReader[Any]] = {
     "scale": _scale,
     "gridtexture": _grid,
     "bitmap": _bitmap,

@@ -7,7 +7,7 @@ the loader sees objects and values only. Document types are refused, and with th
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -122,17 +122,15 @@ def parse(path: Path, variables: Mapping[str, object]) -> Document:
 
 def _find(element: Element, name: str, folders: list[Path]) -> Path:
     places = [*folders[:0:-1], element.file.parent, folders[0]]
-    return _first(element, name, places, "file", Path.is_file)
+    return _first(element, name, places, "file")
 
 
-def _first(
-    element: Element, name: str, places: list[Path], label: str, is_one: Callable[[Path], bool]
-) -> Path:
+def _first(element: Element, name: str, places: list[Path], label: str) -> Path:
     """Return the first of the places joined with a name that is a file, or a folder."""
     for place in places:
         candidate = place / name
         try:
-            matches = is_one(candidate)
+            matches = candidate.is_file() if label == "file" else candidate.is_dir()
         except (OSError, ValueError):
             break
         if matches and label == "file":
@@ -233,7 +231,7 @@ class _Expander:
         """Add a folder that lies beside the file, or else in an earlier folder."""
         places = [element.file.parent, *self.folders[::-1]]
         name = element.attribute("value")
-        self.folders.append(_first(element, name, places, "folder", Path.is_dir))
+        self.folders.append(_first(element, name, places, "folder"))
 
     def include(self, element: Element, depth: int) -> list[Element]:
         if depth > MAX_INCLUDES:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextvars
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -24,7 +24,7 @@ from clpt.formats.pbrt.scattering import body
 from clpt.formats.pbrt.shapes import Geometry, displaced, geometry, with_uvs
 from clpt.formats.pbrt.state import Contents, Definition, State
 from clpt.formats.pbrt.textures import textured
-from clpt.formats.reading import attempt
+from clpt.formats.reading import Progress, attempt
 from clpt.scene.lights import Area, Light
 from clpt.scene.materials import Diffuse, Mask, Material, Null, TwoSided
 from clpt.scene.media import Medium
@@ -33,7 +33,6 @@ from clpt.scene.roles import REAL
 from clpt.scene.shapes import Curves, Group, Instance, Shape
 from clpt.scene.textures import MeshAttribute, Product, Texture
 
-Progress = Callable[[float, str], None]
 SHARES = "face_power"  # the attribute of a mesh whose parts shine unequally
 GREY: Material = TwoSided(front=Diffuse(reflectance=0.5))
 
@@ -228,7 +227,7 @@ def lights(contents: Contents) -> list[Light]:
 def check_unused_materials(contents: Contents) -> None:
     """Make the named materials that no shape has, for their errors and warnings."""
     for name, versions in contents.shared.materials.items():
-        for definition in versions:
+        for _, definition in versions:
             definition.state.material_of(name, definition)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +13,7 @@ from clpt.choices import MOST_LIGHT_PATHS
 from clpt.errors import UnknownKindError
 from clpt.formats.pbrt.media import medium
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.state import Definition, State
+from clpt.formats.pbrt.state import Definition, Maker, State
 from clpt.scene import cameras, integrators
 from clpt.scene.integrators import Film, Filter, Integrator, Sampler
 from clpt.scene.motion import Keys, Shutter
@@ -173,7 +172,7 @@ def _realistic(params: Parameters, state: State, film: Film, diagonal: float) ->
     )
 
 
-CAMERAS: dict[str, Callable[[Parameters, State, Film], cameras.Camera]] = {
+CAMERAS = {
     "perspective": _perspective,
     "orthographic": _orthographic,
     "spherical": _spherical,
@@ -322,7 +321,7 @@ def _sinc(params: Parameters, state: State) -> Filter:
     return integrators.Lanczos(radius=radius, lobes=params.above_zero("tau", 3.0))
 
 
-FILTERS: dict[str, Callable[[Parameters, State], Filter]] = {
+FILTERS: dict[str, Maker[Filter]] = {
     "box": _box,
     "gaussian": _gaussian,
     "mitchell": _mitchell,

@@ -7,7 +7,6 @@ space, so that any transform, also a mirroring, is right.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.pbrt import octahedral
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import spectrum
-from clpt.formats.pbrt.state import State
+from clpt.formats.pbrt.state import Maker, State
 from clpt.formats.reading import GREY
 from clpt.scene import lights
 from clpt.scene.lights import Light
@@ -301,7 +300,7 @@ def _square(file: str, state: State) -> Any:
     return image
 
 
-MAKERS: dict[str, Callable[[Parameters, State], Light]] = {
+MAKERS: dict[str, Maker[Light]] = {
     "point": _point,
     "spot": _spot,
     "distant": _distant,

@@ -8,7 +8,6 @@ to the other side.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -20,7 +19,7 @@ from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.meshes import mesh, ply
 from clpt.formats.pbrt import curves, surfaces
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.state import Definition, State
+from clpt.formats.pbrt.state import Definition, Maker, State
 from clpt.formats.pbrt.textures import textured
 from clpt.scene import shapes, subdivision
 from clpt.scene.roles import REAL
@@ -366,7 +365,7 @@ def _heightfield(params: Parameters, state: State) -> Geometry | None:
     return _with_pieces(_mesh(points, faces, None, np.stack([u, v], axis=1)))
 
 
-SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
+SHAPES: dict[str, Maker[Geometry | None]] = {
     "bilinearmesh": _patches,
     "curve": _curve,
     "cylinder": _cylinder,
@@ -376,7 +375,7 @@ SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
     "sphere": _sphere,
     "trianglemesh": _triangles,
 }
-OLD_SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
+OLD_SHAPES: dict[str, Maker[Geometry | None]] = {
     "cone": _cone,
     "heightfield": _heightfield,
     "hyperboloid": _hyperboloid,

@@ -360,7 +360,7 @@ def _mapping(params: Parameters, state: State, before: Any = IDENTITY_UV) -> dic
     return {"to_uv": before @ to_uv, "mapping": mapping, "to_texture": to_texture}
 
 
-MAKERS: dict[str, Callable[[str, Parameters, State], Any]] = {
+MAKERS = {
     "constant": _constant,
     "scale": _scale,
     "mix": _mix,

@@ -16,7 +16,7 @@ from clpt.formats.usd.textures import Uses
 from clpt.scene import gltf_material
 from clpt.scene.lights import Area
 from clpt.scene.materials import Blend, GltfSurface, Material, ThinDielectric, TwoSided
-from clpt.scene.params import Texture
+from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.scene.values import Textured
 

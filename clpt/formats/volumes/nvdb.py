@@ -141,7 +141,9 @@ def _unpacked(data: bytes, entry: _Entry) -> bytes:
     else:
         budget.check(2 * entry.size, f"the grid {entry.name!r}")
         zipped = CODECS[entry.codec] == "ZIP"
-        unpack = sparse.inflated if zipped else sparse.blosc_unpacker()
+        if not zipped:
+            sparse.check_blosc()
+        unpack = sparse.inflated if zipped else sparse.blosc_unpacked
         chunks: list[bytes] = []
         at = entry.begin
         while at < entry.end and len(chunks) < 64:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import struct
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,26 +27,26 @@ def inflated(packed: bytes | memoryview, most: int) -> bytes:
         raise SceneError(f"is damaged: {error}") from None
 
 
-def blosc_unpacker() -> Callable[[bytes | memoryview, int], bytes]:
-    """Return what unpacks Blosc's bytes into at most so many. Raises SceneError without it."""
-    try:
-        import blosc
-    except ImportError:
+def check_blosc() -> None:
+    """Raise SceneError unless the package `blosc` is installed."""
+    if importlib.util.find_spec("blosc") is None:
         message = "is packed by Blosc: pip install 'clpt[volumes]', or convert it with ZIP"
-        raise SceneError(message) from None
+        raise SceneError(message)
 
-    def unpacked(packed: bytes | memoryview, most: int) -> bytes:
-        if len(packed) < BLOSC_HEADER:
-            raise SceneError("is damaged: a packed part has no head")
-        size, _, held = struct.unpack_from("<3I", packed, 4)
-        if size > most or held > len(packed):
-            raise SceneError("is damaged: a packed part is larger than the grid")
-        try:
-            unpacked_bytes: bytes = blosc.decompress(bytes(packed))
-        except Exception as error:  # the package has a class of its own
-            raise SceneError(f"is damaged: {error}") from None
-        return unpacked_bytes
 
+def blosc_unpacked(packed: bytes | memoryview, most: int) -> bytes:
+    """Return at most `most` bytes that Blosc has packed; the package `blosc` must be there."""
+    import blosc
+
+    if len(packed) < BLOSC_HEADER:
+        raise SceneError("is damaged: a packed part has no head")
+    size, _, held = struct.unpack_from("<3I", packed, 4)
+    if size > most or held > len(packed):
+        raise SceneError("is damaged: a packed part is larger than the grid")
+    try:
+        unpacked: bytes = blosc.decompress(bytes(packed))
+    except Exception as error:  # the package has a class of its own
+        raise SceneError(f"is damaged: {error}") from None
     return unpacked
 
 

@@ -177,7 +177,9 @@ class _Tree:
     def __init__(self, stream: _Bytes, packed: int, form: str, half: bool):
         self._stream, self._packed, self._form = stream, packed, form
         self._held = np.dtype("<f2" if half else f"<{form}")
-        self._unpack = sparse.blosc_unpacker() if packed & BLOSC else sparse.inflated
+        if packed & BLOSC:
+            sparse.check_blosc()
+        self._unpack = sparse.blosc_unpacked if packed & BLOSC else sparse.inflated
         self.tiles: list[sparse.Tile] = []
         self._active: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []  # boxes of tiles
         origins: list[NDArray[np.int64]] = []

@@ -11,7 +11,7 @@ from clpt import images
 from clpt.arrays import Image
 from clpt.choices import Exposure
 from clpt.images import exr_files, spectral_exr
-from clpt.images.colour.view import View
+from clpt.images.colour import View
 from clpt.render.film import cryptomatte
 from clpt.render.film.layers import GROUP, matte_names
 from clpt.render.film.pictures import PictureForm, Pictures
