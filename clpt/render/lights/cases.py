@@ -144,7 +144,8 @@ def point_text(features: Features, kind: str, uv: str, test: str) -> tuple[str, 
     """
     if "texture" not in emission_sources(features):
         return ()
-    seen, before = f"texture_point({uv}, {NOWHERE})", ()
+    seen = f"texture_point({uv}, {NOWHERE})"
+    before: tuple[str, ...] = ()
     if kind in ("triangle", "sphere"):
         row = f"sel_i(m, row, shape.light), {uv}" if test else f"row, {uv}"
         seen = f"area_{kind}_point(scene, shape, {row})"
@@ -195,10 +196,10 @@ def _areas_text(features: Features) -> list[str]:
         row = row_text(features, kind, test := kind_test(kind, surfaces))
         densities.append(Case(test, f"{kind}_pdf({row}, view.p, view.wi, view.t, view.n)"))
     head = "Scene scene, integer row, LightRow l, LightView view, vec2 u, TexturePoint *point"
-    point = Function(f"ShapeSample area_point({head})", "shape_sample_nothing()", points)
+    points_of = Function(f"ShapeSample area_point({head})", "shape_sample_nothing()", points)
     pdf = Function("real area_pdf(Scene scene, LightRow l, LightView view)", "0.0f", densities)
     areas = included(either(surfaces, "lights/sampling.cl#areas"))
-    return [*([point.text()] * bool(surfaces)), pdf.text(), *areas]
+    return [*([points_of.text()] * bool(surfaces)), pdf.text(), *areas]
 
 
 def _infinite_text(features: Features) -> list[str]:
