@@ -95,9 +95,9 @@ inline LightSample light_moved(LightView v, LightSample s) { return s; }
 inline ShapeSample area_moved(LightView v, ShapeSample q) { return q; }
 
 /* Step deforming: lights whose triangles deform. `geometry` has a row of such a triangle for each key, side by side.
- * Between keys rows are linear, as vertices are (motion/vertex_keys.cl). */
+ * Between keys rows are linear, as vertices are (motion/motion.cl). */
 #include "motion/motion.cl"
-#include "motion/vertex_keys.cl"
+#include "motion/motion.cl#vertex_keys"
 
 inline Triangle triangle_then(Scene scene, LightRow l, mask active)
 {
