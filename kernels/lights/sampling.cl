@@ -1,5 +1,5 @@
-/* Next-event estimation over all kinds of lights of a scene. clpt/render/lights/cases.py generates, for the kinds off all
- * shapes, `lamp_sample`, for lights on shapes `area_point`, a point as seen from a LightView with what textures see
+/* Next-event estimation for all kinds of lights in a scene. clpt/render/lights/cases.py generates, for the kinds off
+ * all shapes, `lamp_sample`, for lights on shapes `area_point`, a point as seen from a LightView with what textures see
  * there, and `area_pdf` [1/sr], and for infinite lights `infinite_case`. */
 
 /* Step. */

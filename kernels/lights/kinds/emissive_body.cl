@@ -117,5 +117,6 @@ LightSample emissive_body_sample(EmissiveBody l, Scene scene, vec3 p, vec2 u, Wa
 inline real body_light_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 d)
 {
     LightRow l = light_at(scene, row);
-    return emissive_body_pdf(emissive_body_row(scene.light_params, l.params), p, d) * light_pmf(scene, row, l, p, receiver);
+    real pdf = emissive_body_pdf(emissive_body_row(scene.light_params, l.params), p, d);
+    return pdf * light_pmf(scene, row, l, p, receiver);
 }

@@ -30,5 +30,6 @@ LightSample emissive_brick_sample(EmissiveBrick l, Scene scene, vec3 p, vec2 u, 
 inline real brick_light_pdf(Scene scene, integer row, vec3 p, Receiver receiver, real t)
 {
     LightRow l = light_at(scene, row);
-    return emissive_brick_pdf(emissive_brick_row(scene.light_params, l.params), t) * light_pmf(scene, row, l, p, receiver);
+    real pdf = emissive_brick_pdf(emissive_brick_row(scene.light_params, l.params), t);
+    return pdf * light_pmf(scene, row, l, p, receiver);
 }
