@@ -99,7 +99,7 @@ inline LightRay aim_power(LightRay r, mask turned, Spectrum intensity, real p)
     return r;
 }
 
-/* What aiming changes in the density of a ray along d: at a light the direction's [1/sr], n being the normal on a shape;
+/* What aiming changes in the density of a ray along d: at a light the direction's [1/sr], n the normal on a shape;
  * from infinity the density of the origin across it [1/m^2]; 0 where nothing aims. start_case is generated. */
 inline real light_start_pdf(Scene scene, integer row, LightRow l, vec3 n, vec3 d)
 {

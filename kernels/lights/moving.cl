@@ -28,7 +28,7 @@ inline vec3 motion_back_unit(Motion m, vec3 v)
 /* A normal: by the transpose, the inverse of `motion_normal` where angles are kept. */
 inline vec3 motion_front_back(Motion m, vec3 n) { return motion_back_unit(m, n); }
 
-/* A point that a light shines on, in the space where the light was lowered: p, the receiver's hemisphere, and direction,
+/* A point that a light shines on, in the space where the light was lowered: p, the hemisphere, and direction,
  * distance and normal of a point of the light. */
 typedef struct {
     vec3 p, wi, n, hemisphere;
