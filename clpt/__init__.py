@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from clpt.formats.mitsuba.dicts import ScalarTransform4f
     from clpt.images import read as read_image
     from clpt.images import write as write_image
-    from clpt.images.colour.view import View
+    from clpt.images.colour import View
     from clpt.images.spectral_exr import SpectralImage
     from clpt.images.spectral_exr import read as read_spectral
     from clpt.images.spectral_exr import write as write_spectral
@@ -56,7 +56,7 @@ logging.getLogger("clpt").addHandler(_Cleaning())  # quiet until the program ask
 _HOMES = {  # the module of each name, and what it is called there
     "Budget": ("files.budget", "Budget"),
     "MultiRenderer": ("cluster.multi_renderer", "MultiRenderer"),
-    "View": ("images.colour.view", "View"),
+    "View": ("images.colour", "View"),
     "ClptError": ("errors", "ClptError"),
     "ClusterError": ("errors", "ClusterError"),
     "DeviceError": ("errors", "DeviceError"),
@@ -121,10 +121,10 @@ class _Front(ModuleType):
 
 def _give_widgets() -> None:
     """Let renderers have widgets: they know nothing of who shows their pictures."""
-    from clpt.render.pictures import DevicePictures
+    from clpt.render.resumable import ResumableRenderer
     from clpt.view.notebook import widget
 
-    DevicePictures._make_widget = widget
+    ResumableRenderer._make_widget = widget
 
 
 def _give_pictures() -> None:

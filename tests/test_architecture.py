@@ -58,7 +58,8 @@ FLOORS = (
 )  # fmt: skip
 # clpt/cli/<room>: the same; commands stand on top of all.
 FLOORS_OF_COMMANDS = (
-    {"process"}, {"printing", "options"}, {"opening"}, {"files"}, {"plots"}, {"render", "view"},
+    {"process"}, {"display", "console", "options"}, {"opening"}, {"files"}, {"plots"},
+    {"render", "view"},
 )  # fmt: skip
 # What kinds share, by what a reader looks for.
 SHARED = {
@@ -67,7 +68,7 @@ SHARED = {
     "transport/photons",
 }  # fmt: skip
 KINDS = {
-    "cameras/kinds", "lights/emission", "lights/kinds", "materials/kinds", "media/kinds",
+    "cameras/kinds", "lights/kinds", "materials/kinds", "media/kinds",
     "samplers/kinds", "shapes/kinds", "textures/kinds",
 }  # fmt: skip
 # kernels/<folder>: the folders that its files may include; generated text stands between them.

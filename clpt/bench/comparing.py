@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from clpt.bench.figures import SECONDS, Figure
+from clpt.bench.figures import Figure
 from clpt.errors import SceneError
 
 Row = Mapping[str, Any]
@@ -59,6 +59,6 @@ def against(figures: Iterable[Figure], records: Iterable[Row], device: str) -> l
 
 def _ratio(figure: Figure, then: Row) -> Ratio:
     now, before = figure.value, float(then["value"])
-    ratio = before / now if figure.unit == SECONDS else now / before
+    ratio = before / now if figure.less_is_better else now / before
     noise = math.hypot(figure.spread, float(then.get("spread", 0.0)))
     return Ratio(figure, then, ratio, noise)

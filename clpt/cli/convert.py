@@ -26,6 +26,7 @@ def convert(source: Path, target: Path, layer: str | None, graded: GradingOption
     """
     grading = graded.grading
     locate(source)
-    from .files.conversions import write_converted
+    from .files.image_tools import write_converted
 
-    write_converted(source, target, layer, grading, terminal.say)
+    for line in write_converted(source, target, layer, grading):
+        terminal.say(line)

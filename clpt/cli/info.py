@@ -10,8 +10,8 @@ import click
 
 from ..errors import SceneError
 from ..formats import errors_of, load, locate
-from .options.loading_options import loading_options
-from .options.scene_path import ScenePath
+from .options.loading import loading_options
+from .options.values import ScenePath
 from .process import terminal
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
 
     contents: dict[str, Any]
     if is_film(scene):
-        from .files.film_contents import film_summary
+        from .files.image_contents import film_summary
 
         contents = film_summary(scene)
     elif scene.suffix.lower() in READERS:
@@ -70,7 +70,7 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
         return
     from rich.table import Table
 
-    from .printing.console import output_console, shown
+    from .console import output_console, shown
 
     table = Table(show_header=False, title=shown(scene), title_justify="left")
     for name, value in contents.items():

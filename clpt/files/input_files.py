@@ -22,6 +22,7 @@ REACH = {
     "pbrt": ANYWHERE,
     "gltf": BELOW,
     "materialx": ANYWHERE,
+    "usd": ANYWHERE,
     "mesh": ANYWHERE,  # .obj, with its .mtl, and .ply
 }
 POINTER = b"version https://git-lfs.github.com/spec/"  # git-lfs docs/spec.md

@@ -48,6 +48,7 @@ class Located(ABC):
 
 
 T = TypeVar("T")
+Progress = Callable[[float, str], None]  # called with the share that is read, and a text
 MOST = 200  # errors that are kept
 _found: ContextVar[list[SceneError] | None] = ContextVar("blockers", default=None)
 
@@ -73,7 +74,7 @@ def note(error: SceneError) -> bool:
 
 @contextmanager
 def collecting() -> Iterator[list[SceneError]]:
-    """Collect the errors of what is read inside; the list grows as they are met."""
+    """Collect the errors of readers that run inside; the list grows with each error."""
     errors: list[SceneError] = []
     token = _found.set(errors)
     try:
@@ -88,7 +89,7 @@ GREY.flags.writeable = EVEN.flags.writeable = False
 
 
 def grey_for(name: object) -> str:
-    """Return the warning of an image for which GREY or EVEN stands."""
+    """Return the warning of an image that GREY or EVEN replaces."""
     return f"there is no file {str(name)!r}; grey stands for it"
 
 
@@ -106,7 +107,7 @@ WHAT = "unpacking it"
 def read_bytes(path: Path) -> bytes:
     """Read a file, unpacked if it is gzip's.
 
-    Raises SceneError for what is broken, or takes too much memory.
+    Raises SceneError for a file that is broken, or takes too much memory.
     """
     with input_files.opened(path) as file:
         if file.read(2) != b"\x1f\x8b":

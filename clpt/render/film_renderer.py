@@ -18,7 +18,7 @@ from clpt.arrays import Image
 from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.denoise import needs
 from clpt.errors import LONGEST_WARNING, ClptError, DeviceError, SceneError, one_line
-from clpt.images.colour.view import View
+from clpt.images.colour import View
 from clpt.render.edit.plan import Plan
 from clpt.render.edit.scene_edit import MaterialKey, ShapeKey
 from clpt.render.film.denoised_picture import DenoisedPicture
@@ -30,8 +30,7 @@ from clpt.render.film.saved_film import (
     other_devices,
 )
 from clpt.render.film.state import join_ranges
-from clpt.render.makers.contents import Change, Contents, FilmOwner
-from clpt.render.makers.locking import Stop, healing, synchronized
+from clpt.render.makers.contents import Change, Contents, FilmOwner, Stop, healing, synchronized
 from clpt.render.makers.maker import Call, Discarded, Maker, Settle
 from clpt.render.makers.planning import Changes
 from clpt.render.options import check_changes, check_scene

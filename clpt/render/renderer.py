@@ -11,13 +11,13 @@ import pyopencl as cl
 
 from clpt import device as dev
 from clpt.render.film_renderer import next_range
+from clpt.render.makers.contents import synchronized
 from clpt.render.makers.device_film import DeviceFilm, open_device
 from clpt.render.makers.device_maker import DeviceMaker
-from clpt.render.makers.locking import synchronized
 from clpt.render.makers.maker import Call
 from clpt.render.options import RenderOptions, check_options, check_scene
-from clpt.render.pictures import DevicePictures
 from clpt.render.progress import Progress
+from clpt.render.resumable import ResumableRenderer
 from clpt.scene import Scene
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
-class Renderer(DevicePictures):
+class Renderer(ResumableRenderer):
     """Renders a scene; its picture so far is available at any time.
 
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.

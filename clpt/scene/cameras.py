@@ -14,7 +14,7 @@ from clpt import lenses, spectra, transforms
 from clpt.arrays import fits_single
 from clpt.errors import SceneError
 from clpt.lenses import Prescription
-from clpt.lenses.focusing import MARGIN, FocusedLens, focused_lens
+from clpt.lenses.tracing import MARGIN, FocusedLens, focused_lens
 from clpt.scene import roles
 from clpt.scene.media import Medium
 from clpt.scene.motion import Keys, Shutter
@@ -72,6 +72,7 @@ class Camera(Kind):
 
     connects: ClassVar[bool] = False  # whether light paths can be joined to the camera
     has_axis: ClassVar[bool] = False  # whether the layers z and motion have a meaning
+    is_rigid: ClassVar[bool] = True  # whether `to_world` must keep lengths
 
     shorthands: ClassVar[tuple[Shorthand, ...]] = (LOOK_AT,)
     if TYPE_CHECKING:  # arguments only: they stand for `to_world`
@@ -401,6 +402,7 @@ class Lens(Camera):
 class Orthographic(Camera):
     """Parallel rays along +z; the film spans [-1, 1] in x, scaled by `to_world`."""
 
+    is_rigid: ClassVar[bool] = False
     has_axis: ClassVar[bool] = True
 
     near: float = real(1e-2, "nearest distance seen", "m", low=0.0)
@@ -450,6 +452,8 @@ class Matrix(Camera):
     Rays come from the inverse of projection @ view; clip space z from -1 (near) to 1 (far).
     `to_world` is not used.
     """
+
+    is_rigid: ClassVar[bool] = False
 
     shorthands = ()
 

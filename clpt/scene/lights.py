@@ -24,9 +24,9 @@ from clpt.scene.params import (
     real,
     reflectance,
 )
-from clpt.scene.pixels import pixels
 from clpt.scene.roles import EMISSION, REFLECTANCE
-from clpt.scene.textures import Bitmap, Texture
+from clpt.scene.texture_values import is_texture
+from clpt.scene.textures import Bitmap
 from clpt.scene.values import ImageLike, Matrix4, SpectrumLike, Textured, Vector3
 from clpt.spectra import Blackbody, RGBIlluminant, Spectrum, lumens, scaled, watts
 
@@ -71,6 +71,11 @@ class Light(Kind):
         None, "moves it after its place, or None; an area light moves with its shape", form="keys"
     )
     group: str = host("", "lights of one name share a layer of `light_groups`")
+
+    @property
+    def record(self) -> str:
+        """The name of its record, and of its functions, in kernels."""
+        return self.kind
 
     def bounds(self) -> LightBounds | None:
         """Return the box around all points that emit, and the cone of their rays, before `motion`.
@@ -275,6 +280,10 @@ class Spot(PoweredLamp):
         1.0, "what its light passes through; a texture fills the square around a cone below 90"
     )
 
+    @property
+    def record(self) -> str:
+        return "image_spot" if is_texture(self.image) else self.kind
+
     def extent(self, area: float) -> float:
         """Return the solid angle of its cone, each direction counted as strong as it is [sr]."""
         cutoff = math.radians(self.cutoff)
@@ -299,7 +308,7 @@ class Spot(PoweredLamp):
 
     def check(self) -> None:
         super().check()
-        if isinstance(self.image, Texture) and self.cutoff >= 90.0:
+        if is_texture(self.image) and self.cutoff >= 90.0:
             raise SceneError("an image needs a cutoff below 90 degrees", where="spot.cutoff")
 
 
@@ -321,7 +330,7 @@ class Projector(Lamp):
         """Width of the image over its height."""
         if self.aspect > 0.0 or not isinstance(self.image, Bitmap):
             return self.aspect or 1.0
-        height, width = pixels(self.image, REFLECTANCE).shape[:2]
+        height, width = self.image.pixels(REFLECTANCE).shape[:2]
         return width / height
 
     def bounds(self) -> LightBounds:
@@ -348,6 +357,11 @@ class Goniometric(PoweredLamp):
     candela: float | None = _to_the_eye("luminous intensity where the image is 1", "cd")
     image: Textured = reflectance(1.0, "factor by direction; a bitmap may go beyond 1")
     to_world: Matrix4 = host(np.eye(4), "placement, (4, 4), without a shear")
+
+    @property
+    def polar_image(self) -> Textured:
+        """The image with its first and last rows held at the poles."""
+        return self.image.clamped_at_poles() if is_texture(self.image) else self.image
 
     def extent(self, area: float) -> float:
         """Return the solid angle of all directions, before the image takes its share [sr]."""

@@ -17,7 +17,6 @@ from clpt.scene.energy import check_reradiation
 from clpt.scene.params import (
     Kind,
     Shorthand,
-    Texture,
     choice,
     coefficient,
     factor,
@@ -35,6 +34,7 @@ from clpt.scene.params import (
 )
 from clpt.scene.roles import ORDERS, Param
 from clpt.scene.scatterer import Scatterer
+from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap
 from clpt.scene.values import IndexLike, SpectrumLike, Textured, TexturedNumber
 from clpt.spectra import Constant, Reradiation, Spectrum

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +21,7 @@ from clpt.scene.params import Kind, choice, host
 from clpt.scene.textures import Bitmap
 from clpt.scene.values import Matrix4, OnDevice, Vector3
 
+ShapeKind = TypeVar("ShapeKind", bound="Shape")
 SMOOTH = "smooth"  # normals of a mesh: the means of the triangles around a vertex, by their areas
 NO_ATTRIBUTES: Mapping[str, Any] = MappingProxyType({})
 BASES = ("linear", "bspline", "bezier")
@@ -31,7 +33,10 @@ class Shape(Kind):
 
     is_tree = False  # it holds trees side by side
     is_open: ClassVar[bool] = False  # no shape of this kind encloses a volume by itself
+    deformed_field: ClassVar[str] = ""  # the parameter that a deformation replaces by its points
+    flattens: ClassVar[bool] = False  # its triangles may have no area, as of a tube of radius 0
     # of a kind without such parameters
+    group = cast("Group | None", None)
     attributes = NO_ATTRIBUTES
     normals = cast(Any, None)
     tangents = cast(Any, None)
@@ -41,6 +46,15 @@ class Shape(Kind):
     def members(self) -> tuple[Shape, ...]:
         """The shape, or those that an instance places."""
         return (self,)
+
+    def at_time(self: ShapeKind, time: float) -> ShapeKind:
+        """Return the shape with the points of its deformation at a time [s], without deformation.
+
+        Its `deformation` must not be None.
+        """
+        points, _ = cast(Deformation, self.deformation).at(time)
+        changes: dict[str, Any] = {self.deformed_field: points, "deformation": None}
+        return dataclasses.replace(self, **changes)
 
     material: Material = host(Diffuse(), "of the surface", form="material")
     emission: Light | None = host(None, "an `area` light, or None", form="area_light")
@@ -77,6 +91,8 @@ def check_faces(faces: NDArray[Any], vertices: int, where: str) -> None:
 class Mesh(Shape):
     """Triangles, counter-clockwise seen from the front."""
 
+    deformed_field = "vertices"
+
     vertices: Any = host(None, "(n, 3) float32", "m", form="rows3")
     faces: Any = host(None, "(m, 3) uint32", form="triangles")
     normals: Any = host(
@@ -105,6 +121,13 @@ class Mesh(Shape):
     )
     displacement_scale: float = host(1.0, "factor on them", "m")
     displacement_edge: float = host(0.05, "longest edge of what is displaced, in the world", "m")
+
+    def at_time(self, time: float) -> Mesh:
+        """Return the mesh with the vertices and normals of its deformation at a time [s]."""
+        _, normals = cast(Deformation, self.deformation).at(time)
+        still = super().at_time(time)
+        normals = self.normals if normals is None else normals
+        return dataclasses.replace(still, normals=normals, tangents=None)
 
     def check(self) -> None:
         """Raise SceneError for faces of vertices that are not there, as far as the host knows."""
@@ -166,6 +189,8 @@ class Spheres(Shape):
     A `mesh_attribute` texture reads the attributes: the first row is the first sphere's.
     """
 
+    deformed_field = "centers"
+
     centers: Any = host(
         None, "(n, 3) float32 before `to_world`; (n, 4): with the radii", "m", form="rows3"
     )
@@ -224,6 +249,8 @@ class Curves(Shape):
     """
 
     is_open = True
+    deformed_field = "points"
+    flattens = True
 
     points: Any = host(None, "(n, 4) of all strands: x y z and the radius", "m", form="rows4")
     lengths: Any = host(
@@ -251,6 +278,8 @@ class SdfGrid(Shape):
     `pieces`; by a quarter of that with twice the pieces.
     uv are 0 everywhere: a texture is constant over it.
     """
+
+    flattens = True
 
     values: ArrayLike = host(
         _ball(), "(nx, ny, nz) float32, below 0 inside; default: a ball", form="grid"

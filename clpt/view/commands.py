@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from clpt.errors import ClptError
-from clpt.images.colour.tones import TONES
+from clpt.images.colour import TONES
 from clpt.scalars import is_flag, is_number, is_whole
 from clpt.spectra import illuminants
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from clpt import images
 from clpt.arrays import Bytes, Image
 from clpt.denoise import oidn
-from clpt.images.colour.false_colours import SCALE, false_colours
+from clpt.images.colour import SCALE, false_colours
 from clpt.render.film.layers import viewable
 from clpt.scene.layers import LAYERS
 

@@ -14,7 +14,7 @@ from clpt import spectra
 from clpt.errors import SceneError
 from clpt.formats.native import forms
 from clpt.formats.native.cursor import Cursor
-from clpt.images.colour.tones import TONES
+from clpt.images.colour import TONES
 from clpt.render.edit.scene_edit import Successors, edit_scene
 from clpt.scene import Scene
 from clpt.scene.materials import LEAVES, Material, parts

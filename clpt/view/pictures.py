@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
-from clpt.images.colour.view import View
+from clpt.images.colour import View
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.pictures import Pictures
 from clpt.render.renderer import Renderer
@@ -41,7 +41,7 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
 class Display:
     """Settings by which a page shows the picture; the render does not know of them.
 
-    exposure [stops] over that of the film; tone: a curve of clpt.images.colour.tones, or that of
+    exposure [stops] over that of the film; tone: a curve of clpt.images.colour, or that of
     `view`, of OpenColorIO.
     """
 

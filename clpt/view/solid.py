@@ -19,7 +19,6 @@ from clpt.scene import Film, Scene
 from clpt.scene.integrators import Path
 from clpt.scene.materials import Diffuse, Material, Null
 from clpt.scene.params import Kind, fields_of, params
-from clpt.scene.pixels import pixels
 from clpt.scene.roles import REFLECTANCE
 from clpt.scene.shapes import Mesh, Shape
 from clpt.scene.textures import Bitmap
@@ -98,7 +97,7 @@ def _mean(value: object) -> Floats:
     if isinstance(value, Spectrum):
         return np.asarray(value.to_rgb("reflectance"), np.float64)
     if isinstance(value, Bitmap):
-        mean = pixels(value, REFLECTANCE, side=SIDE).mean(axis=(0, 1), dtype=np.float64)
+        mean = value.pixels(REFLECTANCE, side=SIDE).mean(axis=(0, 1), dtype=np.float64)
         return np.broadcast_to(mean, 3)
     inner = [] if not isinstance(value, Kind) else [
         one for one in fields_of(value).values() if isinstance(one, (Spectrum, Kind))

@@ -1,19 +1,19 @@
-/* LightRow.emission_mode: 0 from the front evenly, 1 along the normal only (particle_tracer), 2 from both sides; plus 4
- * where no ray sees it. */
+/* LightRow.emission_mode: 0 diffuse from the front, 1 along the normal alone (particle_tracer), 2 from both sides; plus
+ * 4 for a light that no ray sees. */
 inline ShapeSample area_turned(ShapeSample q, mask both)
 {
     q.n = sel3(both & (dot3(q.n, q.wi) > 0.0f), neg3(q.n), q.n);
     return q;
 }
 
-/* A sample of a light that no ray sees counts in full, as of a delta light: its density is negated. */
+/* A sample of a light that no ray sees has weight 1, like a sample of a delta light: its density is negated. */
 inline LightSample area_unseen(LightSample s, mask unseen)
 {
     s.pdf = sel(unseen, -s.pdf, s.pdf);
     return s;
 }
 
-/* The sample ends a rounding off the surface, else the surface would shade it. p: the point [m]. */
+/* The sample ends before the surface by more than rounding, else the surface would occlude it. p: the point [m]. */
 inline LightSample area_sample(ShapeSample q, vec3 p, Spectrum radiance)
 {
     real cosine = -dot3(q.n, q.wi);
@@ -26,8 +26,7 @@ inline LightSample area_sample(ShapeSample q, vec3 p, Spectrum radiance)
     return s;
 }
 
-/* What textures see at uv of the sphere that row `row` of `lights` stands for, but for the point of the
- * world. */
+/* The texture point at uv of the sphere of a row of `lights`, without the point in the world. */
 inline TexturePoint area_sphere_point(Scene scene, ShapeRow shape, integer row, vec2 uv)
 {
     TexturePoint t = texture_point(uv, v3(0.0f, 0.0f, 0.0f));
@@ -40,8 +39,8 @@ inline TexturePoint area_sphere_point(Scene scene, ShapeRow shape, integer row, 
     return t;
 }
 
-/* What textures see at barycentrics b of the triangle that row `row` of `lights` stands for, but for the
- * point of the world: the mesh's uv, or the barycentrics themselves where it has none. */
+/* The texture point at barycentrics b of the triangle of a row of `lights`, without the point in the world. uv are the
+ * mesh's, or the barycentrics in a mesh without uv. */
 inline TexturePoint area_triangle_point(Scene scene, ShapeRow shape, integer row, vec2 b)
 {
     integer face = shape.prim + row - shape.light, corner = 3 * face;

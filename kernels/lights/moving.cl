@@ -1,5 +1,7 @@
-/* Lights that move. A point is taken to where the light was lowered, the light is sampled there, and the sample is
- * brought back. Such a motion keeps angles, so that densities per solid angle stay. */
+/* Lights that move. A point is transformed to the space where the light was lowered, the light is sampled there, and
+ * the sample is transformed back. Such a motion keeps angles, so densities per solid angle stay. */
+
+/* Step. */
 #include "motion/motion.cl"
 
 inline Motion motion_of_light(Scene scene, integer row, LightRow l)
@@ -23,7 +25,7 @@ inline vec3 motion_back_unit(Motion m, vec3 v)
 #endif
 }
 
-/* A normal: by the transpose, which is the way back of `motion_normal` where angles are kept. */
+/* A normal: by the transpose, the inverse of `motion_normal` where angles are kept. */
 inline vec3 motion_front_back(Motion m, vec3 n) { return motion_back_unit(m, n); }
 
 inline LightSample light_moved(Motion m, LightSample s)
@@ -43,5 +45,62 @@ inline ShapeSample area_moved(Motion m, ShapeSample q)
     q.t *= longer;
     q.size *= longer;
 #endif
+    return q;
+}
+
+/* Step deforming: lights whose triangles deform. `geometry` has a row of such a triangle for each key, side by side.
+ * Between keys rows are linear, as vertices are (motion/vertex_keys.cl). */
+#include "motion/motion.cl"
+#include "motion/vertex_keys.cl"
+
+inline Triangle triangle_then(Scene scene, LightRow l, mask active)
+{
+    integer row = sel_i(active & (l.shape >= 0), l.shape, (integer)(0)) * SHAPE_ROW_WORDS;
+    ShapeRow shape = shape_row_row(scene.shapes, row);
+    mask deforms = active & ((shape.flags & SHAPE_DEFORMS) != 0);
+    integer at = sel_i(active, l.params, (integer)(0));
+    Triangle s = triangle_row(scene.geometry, at);
+    if (any(deforms)) {
+        VertexKeys k = vertex_keys(scene, sel_i(deforms, shape.number, (integer)(0)), scene.time);
+        integer first = at + sel_i(deforms, k.key * TRIANGLE_ROW_WORDS, (integer)(0));
+        Triangle a = triangle_row(scene.geometry, first);
+        Triangle b = triangle_row(scene.geometry, first + sel_i(deforms, k.next * TRIANGLE_ROW_WORDS, (integer)(0)));
+        real share = sel(deforms, k.share, (real)(0.0f));
+        s.v0 = madd3(a.v0, 1.0f - share, scale3(b.v0, share));
+        s.e1 = madd3(a.e1, 1.0f - share, scale3(b.e1, share));
+        s.e2 = madd3(a.e2, 1.0f - share, scale3(b.e2, share));
+    }
+    return s;
+}
+
+/* Step emission: rays from lights that move: rays from the light as it was lowered are transformed to the time. */
+#include "motion/motion.cl"
+
+inline LightRay light_ray_moved(Motion m, LightRay r)
+{
+    r.o = motion_point(m, r.o);
+    r.d = motion_vector(m, r.d); /* lamps are not scaled */
+    r.n = motion_vector(m, r.n);
+    return r;
+}
+
+/* The factor of an area, where angles are kept. */
+inline real motion_area(Motion m, vec3 n)
+{
+#if MOTION_SCALES
+    return 1.0f / sqr(motion_length_back(m, n));
+#else
+    return 1.0f;
+#endif
+}
+
+inline SurfacePoint surface_point_moved(Motion m, SurfacePoint q)
+{
+    q.p = motion_point(m, q.p);
+    q.n = motion_normal(m, q.n);
+#if MOTION_SCALES
+    q.n = scale3(q.n, 1.0f / sqrt(max_r(dot3(q.n, q.n), (real)(1e-35f))));
+#endif
+    q.area *= motion_area(m, q.n);
     return q;
 }

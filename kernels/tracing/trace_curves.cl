@@ -5,7 +5,7 @@
 #include "tracing/trace.cl"
 #include "generated/layout.cl"
 #include "generated/trace_args.cl"
-#include "bvh/fetch.cl"
+#include "bvh/hints.cl"
 #include "generated/shape/curves.cl"
 #include "tracing/curve_beside.cl"
 #include "tracing/shape_rows_many.cl"

@@ -1,7 +1,7 @@
 /* Interleaved tracing of a work-item's rays through the 8-wide tree, for trees of triangles larger than a processor's
- * caches. Coherent rays are traced sequentially: see bvh/query_interleaved.cl. */
+ * caches. Coherent rays are traced sequentially: see bvh/query.cl. */
 #include "tracing/trace.cl"
-#include "bvh/wide8_interleaved.cl"
+#include "bvh/wide8.cl#interleaved"
 #include "generated/trace_args.cl"
 #include "tracing/trace_each.cl"
 

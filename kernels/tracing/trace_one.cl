@@ -7,6 +7,13 @@
 #include "generated/shape_traversal.cl"
 #include "generated/instance_traversal.cl"
 
+/* The nearest shape before *t, which becomes its distance, or any with `first_only`; BVH_MISS without a hit. */
+inline uint trace_shapes(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real *t, int first_only)
+{
+    float3 from = (float3)(o.x, o.y, o.z), along = (float3)(d.x, d.y, d.z);
+    return shapes_trace(shape_nodes, shape_indices, scene, from, along, 0.0f, t, first_only);
+}
+
 inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far, mask active)
 {
 #if ONLY_INSTANCES
@@ -19,7 +26,7 @@ inline TraceHit trace_closest(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real far,
     instances_closest(nodes, leaves, instance_nodes, scene, o, d, t, &h);
 #endif
 #if USES_ANALYTIC
-    uint shape = shapes_closest(shape_nodes, shape_indices, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, &h.t);
+    uint shape = trace_shapes(TRACE_PASSED, scene, o, d, &h.t, 0);
     if (shape != BVH_MISS) {
         int prim = as_int(shape), row = shape_row_of(scene, prim);
         ShapeHit s = shape_hit(scene, prim, row, o, d, 0.0f, FAR);
@@ -38,7 +45,7 @@ inline mask trace_occluded(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, mask
     if (instances_occluded(nodes, leaves, instance_nodes, scene, o, d, t)) return 1;
 #endif
 #if USES_ANALYTIC
-    return shapes_occluded(shape_nodes, shape_indices, scene, o.x, o.y, o.z, d.x, d.y, d.z, 0.0f, t);
+    return trace_shapes(TRACE_PASSED, scene, o, d, &t, 1) != BVH_MISS;
 #else
     return 0;
 #endif

@@ -662,11 +662,10 @@ def test_uv_on_a_mesh():
 
 
 def test_brightness_of_a_texture_is_its_mean():
-    from clpt.render.lights.power import brightness
     from clpt.render.spectra.look import Look
 
     board = Checkerboard(color0=(1.0, 1.0, 1.0), color1=(0.0, 0.5, 1.0))
-    assert brightness(board, Look(False, 360.0, 830.0)) == pytest.approx(0.75)
+    assert board.mean(Look(False, 360.0, 830.0)) == pytest.approx(0.75)
 
 
 @pytest.mark.parametrize(

@@ -14,9 +14,9 @@ from clpt.scene import gltf_material, insides
 from clpt.scene.lights import Area
 from clpt.scene.materials import BumpMap, Diffuse, GltfSurface, Mask, Material, Openpbr
 from clpt.scene.media import Homogeneous
-from clpt.scene.params import Texture, defaults, params
+from clpt.scene.params import defaults, params
 from clpt.scene.phases import HenyeyGreenstein, Isotropic
-from clpt.scene.textures import Bitmap, Product
+from clpt.scene.textures import Bitmap, Product, Texture
 from clpt.spectra import RGBUnbounded
 
 GREY = (0.18, 0.18, 0.18)

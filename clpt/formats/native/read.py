@@ -1,4 +1,4 @@
-"""scene.json, one-to-one with the dataclasses of clpt.scene: a kind reads what it declares."""
+"""Reader of scene.json, a mirror of clpt.scene: the parameters that a kind declares are read."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ MATERIALX = "materialx"  # the type of a material that stands in a document
 
 
 class _Reader:
-    """Reads one file; keeps materials and groups by name, so that shapes share them."""
+    """Reads a file; keeps materials and groups by name, so that shapes share them."""
 
     def __init__(self, root: Cursor, outside: Iterable[type[materials.Material]], missing: Missing):
         self.root, self.missing = root, missing
@@ -64,7 +64,7 @@ class _Reader:
             if cls.kind in {**kinds("material"), **self.outside}:
                 raise SceneError(f"there are two kinds of materials {cls.kind!r}; rename yours")
             self.outside[cls.kind] = cls
-        # None while one is being read: it refers to itself then
+        # None while an entry is being read: it then refers to itself
         self.materials: dict[str, materials.Material | None] = {}
         self.media: dict[str, media.Medium | None] = {}
         self.volumes: dict[str, Volume] = {}
@@ -108,7 +108,7 @@ class _Reader:
             return Scene(**parts, warnings=self.warnings, extra={"format": "native"})
 
     def kind(self, cursor: Cursor, category: str) -> Any:
-        """Read an object of one of a category's kinds."""
+        """Read an object of any kind of a category."""
         table = kinds(category)
         if category == "material":
             table |= self.outside
@@ -133,7 +133,7 @@ class _Reader:
             return cls(**values)
 
     def image(self, cursor: Cursor) -> Any:
-        """Return the path of an image; grey where there is none and missing ones are grey."""
+        """Return the path of an image; grey if it is missing and missing images are grey."""
         try:
             return find_file(cursor)
         except SceneError:
@@ -183,15 +183,15 @@ class _Reader:
         cls = kinds("light")[kind_name(cursor, "light", kinds("light"))]
         if cls in shape_files.FILES and "file" in cursor.value:
             shape_files.check_only_in_file(cursor, cls)
-            made, file = self.object_of(cursor, cls, ("type", "file")), cursor.at("file")
+            light, file = self.object_of(cursor, cls, ("type", "file")), cursor.at("file")
             path, known = find_file(file), shape_files.FILES[cls]
             with file.locating():
                 values = known.read(path) if known.read else {}
                 if self.version == 1:
-                    return dataclasses.replace(made, **{**values, "candela": None})
+                    return dataclasses.replace(light, **{**values, "candela": None})
                 if self.version is None and CANDELA not in self.warnings:
                     self.warnings.append(CANDELA)
-                return known.join(made, values)
+                return known.join(light, values)
         return self.kind(cursor, "light")
 
     def area_light(self, cursor: Cursor) -> Any:
@@ -203,7 +203,7 @@ class _Reader:
         return self.kind(cursor, "light")
 
     def material(self, cursor: Cursor) -> Any:
-        """Read a material, or find the one of that name; null is none."""
+        """Read a material, or find it by its name; null is None."""
         if cursor.value is None:
             return None
         if not isinstance(cursor.value, dict):
@@ -240,7 +240,7 @@ class _Reader:
         return self._named(self.materials, "materials", "material", name, referrer)
 
     def medium(self, cursor: Cursor) -> Any:
-        """Read a medium, or find the one of that name; null is none."""
+        """Read a medium, or find it by its name; null is None."""
         if cursor.value is None:
             return None
         if isinstance(cursor.value, dict):
@@ -258,10 +258,10 @@ class _Reader:
         if name not in known:
             cursor = self._entry(table, f"{family} name", name, referrer)
             known[name] = None
-            made = self.kind(cursor, family)
-            known[name] = made if "name" in cursor.value else dataclasses.replace(made, name=name)
-            if id(made) in self.surfaces:
-                self.surfaces[id(known[name])] = self.surfaces[id(made)]
+            kind = self.kind(cursor, family)
+            known[name] = kind if "name" in cursor.value else dataclasses.replace(kind, name=name)
+            if id(kind) in self.surfaces:
+                self.surfaces[id(known[name])] = self.surfaces[id(kind)]
         if known[name] is None:
             raise referrer.error(f"the {family} {name!r} refers to itself")
         return known[name]
@@ -285,12 +285,12 @@ class _Reader:
             raise referrer.error(f"the group {name!r} contains itself")
         return group
 
-    def _entry(self, table: str, what: str, name: str, referrer: Cursor) -> Cursor:
+    def _entry(self, table: str, noun: str, name: str, referrer: Cursor) -> Cursor:
         """Return the entry of a table of the scene. Raises UnknownKindError."""
         entries = self.root.value.get(table, {})
         known = entries if isinstance(entries, dict) else ()
         if name not in known:
-            raise UnknownKindError(what, name, known, **referrer.location())
+            raise UnknownKindError(noun, name, known, **referrer.location())
         return self.root.at(table).at(name)
 
     def shape(self, cursor: Cursor) -> list[shapes.Shape]:

@@ -1,6 +1,6 @@
 """Spectra in scene.json, read and written.
 
-A number is constant; [r, g, b] is a colour, linear, and "#rrggbb" is one in sRGB; as emission each
+A number is constant; [r, g, b] is a linear colour, "#rrggbb" a colour in sRGB; as emission each
 means that multiple of D65. A name is a glass as an index, and an illuminant as emission; an object
 has a `type` from SPECTRA and its fields, or `values` [[nm, value], ...], or a `file`.
 """

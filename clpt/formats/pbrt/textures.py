@@ -107,7 +107,7 @@ def textured(
     if values is None:
         return default
     if values.type != "texture":
-        used = role if isinstance(role, Spectral) else TEXTURE  # a number is one in any
+        used = role if isinstance(role, Spectral) else TEXTURE  # a number is the same in all
         with values.locating():
             return value_of(values, used, state)
     definition = state.texture(form, values.text(), values)
@@ -360,7 +360,7 @@ def _mapping(params: Parameters, state: State, before: Any = IDENTITY_UV) -> dic
     return {"to_uv": before @ to_uv, "mapping": mapping, "to_texture": to_texture}
 
 
-MAKERS: dict[str, Callable[[str, Parameters, State], Any]] = {
+MAKERS = {
     "constant": _constant,
     "scale": _scale,
     "mix": _mix,

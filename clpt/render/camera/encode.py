@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats
 from clpt.lenses import COATINGS, Prescription
-from clpt.lenses.coatings import DESIGN, reflectance
-from clpt.lenses.focusing import FocusedLens
 from clpt.lenses.glasses import LINE_D
-from clpt.lenses.pupils import ZONES
-from clpt.lenses.tracing import sag
+from clpt.lenses.prescription import DESIGN, reflectance
+from clpt.lenses.tracing import ZONES, FocusedLens, sag
 from clpt.render.records.camera import GHOST_CELLS, LENS_SURFACE, RECORDS
 from clpt.scene.cameras import Camera, Lens
 from clpt.scene.indices import check_index

@@ -11,7 +11,7 @@ from clpt import images
 from clpt.arrays import Image
 from clpt.choices import Exposure
 from clpt.images import exr_files, spectral_exr
-from clpt.images.colour.view import View
+from clpt.images.colour import View
 from clpt.render.film import cryptomatte
 from clpt.render.film.layers import GROUP, matte_names
 from clpt.render.film.pictures import PictureForm, Pictures
@@ -111,7 +111,7 @@ def channels_of(layers: Mapping[str, Image], names: str = "clpt") -> dict[str, I
 
 def _beside(source: Pictures, names: str) -> dict[str, Image]:
     channels: dict[str, Image] = {}
-    for name, picture in source.beside.items():
+    for name, picture in source.extra_pictures.items():
         prefix = VIEW_LAYER + BESIDE[name] if names == "blender" else name
         if picture.ndim == 2:
             channels[f"{prefix}.X" if names == "blender" else prefix] = picture

@@ -15,8 +15,7 @@ from clpt import device
 from clpt.device import DeviceArray
 from clpt.errors import DeviceError
 from clpt.images import srgb8_steps
-from clpt.images.colour.tones import TONES, check_tone
-from clpt.images.colour.view import View
+from clpt.images.colour import TONES, View, check_tone
 from clpt.spectra.spaces import between
 
 TONE_NUMBERS = {name: number for number, name in enumerate(TONES)}  # kernels/film/tone.cl

@@ -14,12 +14,12 @@ from clpt.render.lights.check import check_light
 from clpt.render.materials.check import check_material
 from clpt.render.media.bodies import check_bodies
 from clpt.render.records.lowering_cache import LoweringCache
-from clpt.render.textures.check import check_textures
 from clpt.render.transport.check import check_light_paths, check_lit_media
 from clpt.scene import Scene, check_parts, checked_seed
 from clpt.scene.integrators import Film, ParticleTracer
 from clpt.scene.lights import with_emission
 from clpt.scene.shapes import Instance, Shape
+from clpt.scene.textures import check_textures
 
 
 def check(scene: Scene) -> None:

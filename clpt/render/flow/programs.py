@@ -40,9 +40,9 @@ _ALONE: device.Virtual = {
     **bvh.ALONE,
     "core/spectrum_at_once.cl": ("core/spectrum_in_turn.cl",),
     "core/texels_between.cl": ("core/texels_in_turn.cl",),
-    "materials/thin_film.cl": ("materials/thin_film_in_turn.cl",),
+    "materials/film_stack.cl#at_once": ("materials/film_stack.cl#in_turn",),
 }
-_FEW: device.Virtual = {"bvh/no_vectorize.cl": ("core/few_registers.cl",)}
+_FEW: device.Virtual = {"bvh/hints.cl": ("bvh/hints.cl#few_registers",)}
 
 
 def sources(
@@ -122,7 +122,7 @@ def _shading(
         if part is not None:
             own["generated/common.cl"] = common.calls_text(common.shared(features, lanes))
         if cls.is_phase:
-            own["generated/shading_frame.cl"] = ("media/phase_frame.cl",)
+            own["generated/shading_frame.cl"] = ("media/phase.cl#frame",)
         kind = {**vertices.defines(features, vertex), "QUEUED": int(queued)}
         if part is not None and bounce.has_both(features):
             own["generated/integrator.cl"] = BOTH

@@ -82,7 +82,7 @@ def scene_text(unused: Container[str] = (), features: Features | None = None) ->
             *members,
             "    global const Settings *settings;",
             "    real time; /* of the path that is traced or shaded [s]; 0 where nothing moves */",
-            "    uint kind; /* of material, in a vertex of several: materials/material_apart.cl */",
+            "    uint kind; /* of material, in a vertex of several: materials/bsdf.cl */",
             "} Scene;",
             *rows,
             f"#define SHAPE_ROW_WORDS {SHAPE.words}",

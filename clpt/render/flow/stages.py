@@ -200,7 +200,7 @@ def _pane_text(features: Features, cls: type[Scatterer]) -> list[str]:
     """The struct and the loader of thin glass."""
     sources = features.materials.sources_of(cls.kind)
     return [
-        '#include "materials/thin_slab.cl"\n',
+        '#include "materials/fresnel.cl#thin_slab"\n',
         parameters.struct_text(cls, sources),
         parameters.load_text(cls, sources, "materials"),
     ]

@@ -94,7 +94,7 @@ def virtual_files(features: Features, vertex: Vertex) -> dict[str, str | tuple[s
     """Return the files that stand for those of a single kind."""
     return {
         "generated/bsdf.cl": _calls_text(features, vertex),
-        "generated/pair.cl": ("materials/pair_apart.cl",),
+        "generated/pair.cl": ("materials/bsdf.cl#pair_apart",),
     }
 
 
@@ -159,4 +159,4 @@ def _calls_text(features: Features, vertex: Vertex) -> str:
         head = "integer bsdf_interior(Scene scene, integer row)"
         rows.append(function(head, "switch (scene.kind) {", *inside, "}", "return 0;"))
         rows.append("#define BSDF_INTERIOR(row) bsdf_interior(scene, row)")
-    return "\n".join([*rows, '#include "materials/material_apart.cl"', ""])
+    return "\n".join([*rows, '#include "materials/bsdf.cl#apart"', ""])

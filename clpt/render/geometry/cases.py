@@ -123,7 +123,8 @@ def _includes(features: Features) -> str:
     if not _keyed(features):
         return files
     first = f"#define SPHERES_FIRST {ROWS['sphere'].words}\n"
-    return f'{files}{first}#include "generated/motion.cl"\n#include "shapes/spheres_keyed.cl"\n'
+    included = ("generated/motion.cl", "shapes/analytic.cl#keyed_spheres")
+    return files + first + "".join(f'#include "{name}"\n' for name in included)
 
 
 def _keyed(features: Features) -> bool:

@@ -75,16 +75,16 @@ def dispatch_text(features: Features, densities: str = "") -> str:
     infinite_gather(scene, p, receiver, d, pdf, lambdas): what they add to a path that left
     """
     present, others, surfaces = kinds_of(features), others_of(features), surfaces_of(features)
-    includes = ["shapes/surface_flags.cl", "shapes/shape.cl", "lights/light.cl", "core/mis.cl"]
+    includes = ["shapes/surface.cl#flags", "shapes/shape.cl", "lights/light.cl", "core/mis.cl"]
     includes += [f"lights/receiver.cl{'' if features.lights.gloss else TWIN}"]
-    includes += ["lights/light_choice.cl"]
+    includes += ["lights/light.cl#choice"]
     includes += ["generated/textures.cl", "generated/medium.cl"] if features.lights.volumes else []
     includes += [f"generated/light/{kind}.cl" for kind in others]
     includes += [f"generated/shape/{kind}.cl" for kind in surfaces]
-    includes += ["lights/volume_lights.cl"] if features.lights.volumes else []
+    includes += ["lights/light.cl#volumes"] if features.lights.volumes else []
     includes += ["lights/area.cl"] if surfaces else []
     includes += ["lights/moving.cl"] if features.motion.lights else []
-    includes += ["lights/deforming.cl"] if features.motion.emitters else []
+    includes += ["lights/moving.cl#deforming"] if features.motion.emitters else []
     words = shape_records.RECORDS["triangle"].words
     parts = [f"#define TRIANGLE_ROW_WORDS {words}"] * features.motion.emitters
     parts += [f"#define LIGHT_{kind.upper()} {KINDS.index(kind)}" for kind in present]

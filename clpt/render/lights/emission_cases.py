@@ -66,7 +66,7 @@ def densities_text(features: Features) -> str:
     light_found_pdf(scene, row, p, receiver, wi, t, n): the density with which next-event
     estimation at p finds that point of the light [1/sr]; n: the normal there. Of a delta light it
     is the chance of its row. Where the tree asks for gloss it is without that chance, which is
-    known later, see kernels/transport/mis_ratio_chosen.cl.
+    known later, see kernels/transport/mis_ratio.cl.
     light_path_pdf(scene, row, p, wi, t, n): light_emit_pdf of light that is aimed, too.
     """
     present, moving = kinds_of(features), features.motion.lights
@@ -105,9 +105,12 @@ def _includes(features: Features) -> list[str]:
     """Lines that include what the kinds of lights emit."""
     present = kinds_of(features)
     needed = {*present, *(BASES[kind] for kind in present if kind in BASES)}
-    files = [k for k in KINDS if k in needed and (k in PLACED or k in shape_records.RECORDS)]
-    files += ["moving"] * features.motion.lights
-    return ['#include "lights/emission.cl"', *(f'#include "lights/emission/{k}.cl"' for k in files)]
+    rows = ['#include "lights/emission.cl"']
+    for kind in KINDS:
+        if kind in needed and (kind in PLACED or kind in shape_records.RECORDS):
+            folder = "lights" if kind in PLACED else "shapes"
+            rows.append(f'#include "{folder}/kinds/{kind}.cl#emission"')
+    return rows + ['#include "lights/moving.cl#emission"'] * features.motion.lights
 
 
 def _emit_pdf(features: Features, kind: str) -> str:

@@ -23,7 +23,6 @@ from clpt.render.lights.bodies import BodyLight
 from clpt.render.lights.bricks import BrickLights
 from clpt.render.lights.encode_lamps import blank_row, lower_lamp
 from clpt.render.lights.find import Source, Sources, is_whole
-from clpt.render.lights.power import brightness
 from clpt.render.materials.encoder import Encoder
 from clpt.render.records.lights import ALONG, BOTH, FRONT, KINDS, UNSEEN
 from clpt.render.records.lowering_cache import content
@@ -31,6 +30,7 @@ from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
 from clpt.scene.lights import Light, PoweredLamp
 from clpt.scene.params import fields_of
+from clpt.scene.texture_values import mean
 
 PLACED_LIGHT_WEIGHT = 6  # rows of a light at a separate place, to decide on a light tree
 INFINITE_SHARE = 0.5  # of the choices, beside other lights
@@ -227,7 +227,7 @@ def light_level(
         arrives = float((lights.power / (4.0 * np.pi * square)).sum())
     look = Look.of(index.film)
     media = [medium.light for medium in index.emitting if medium.light is not None]
-    glow = [brightness(light, look) * radius for light in media]
+    glow = [look.brightness(light) * radius for light in media]
     ambient = index.integrator.ambient
-    around = 0.0 if ambient is None else brightness(ambient, look)
+    around = 0.0 if ambient is None else mean(ambient, look)
     return max(lights.radiance, arrives, around, *glow)

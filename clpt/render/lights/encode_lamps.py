@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -11,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import fits_single
 from clpt.errors import SceneError
-from clpt.render.lights.check import placement, record_of, three, unit, unsheared
+from clpt.render.lights.check import placement, three, unit, unsheared
 from clpt.render.lights.find import emissions_of
 from clpt.render.lights.images import lower_image
 from clpt.render.lights.sky import lower_sky
@@ -21,9 +20,8 @@ from clpt.render.records.lights import RECORDS
 from clpt.scene import lights, roles
 from clpt.scene.lights import Light
 from clpt.scene.params import fields_of, params
-from clpt.scene.pixels import pixels, spectral_image
-from clpt.scene.roles import REFLECTANCE, Param, Role
-from clpt.scene.textures import Bitmap, Texture
+from clpt.scene.roles import Param, Role
+from clpt.scene.texture_values import is_texture
 
 
 def blank_row() -> NDArray[np.uint32]:
@@ -48,7 +46,7 @@ class Lowered(NamedTuple):
 
 def lower_lamp(lamp: Light, encoder: Encoder) -> Lowered:
     """Put a light into the tables. Raises SceneError for a light without position or direction."""
-    kind, radiance = record_of(lamp), 0
+    kind, radiance = lamp.record, 0
     if isinstance(lamp, (lights.Envmap, lights.CubeMap)):
         members = lower_image(lamp, encoder)
         kind = "spectral_envmap" if "bands" in members else kind
@@ -126,7 +124,7 @@ def _projected_members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
         return {**axes, **_image(lamp.image, encoder)}
     if isinstance(lamp, lights.Goniometric):
         place = _place(lamp.to_world, "goniometric.to_world")
-        return {**place, **_image(with_poles(lamp.image), encoder)}
+        return {**place, **_image(lamp.polar_image, encoder)}
     assert isinstance(lamp, lights.Spot)
     half = float(np.tan(np.radians(lamp.cutoff)))
     return {
@@ -138,29 +136,9 @@ def _projected_members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
     }
 
 
-def with_poles(image: object) -> object:
-    """Return an image around a point that ends at the poles, with all its parts.
-
-    Without `wrap_v` a bitmap would continue at the opposite pole. A bitmap that `to_uv` moves along
-    v or repeats stays as it is.
-    """
-    if isinstance(image, Bitmap):
-        corners = np.asarray(image.to_uv)[1] @ np.array([[0, 0, 1, 1], [0, 1, 0, 1], [1, 1, 1, 1]])
-        inside = bool((np.abs(corners - 0.5) <= 0.5 + 1e-6).all())
-        return dataclasses.replace(image, wrap_v="clamp") if inside and not image.wrap_v else image
-    if not isinstance(image, Texture):
-        return image
-    parts = {name: value for name, value in fields_of(image).items() if isinstance(value, Texture)}
-    return dataclasses.replace(image, **{name: with_poles(part) for name, part in parts.items()})
-
-
 def _image(image: object, encoder: Encoder) -> dict[str, ArrayLike]:
     """Return the members of an image, whose values are scaled to at most 1."""
-    scale = 1.0
-    if isinstance(image, Bitmap) and spectral_image(image, REFLECTANCE) is None:
-        values = pixels(image, REFLECTANCE)
-        scale = max(float(values.max()), 0.0) or 1.0
-        image = dataclasses.replace(image, image=values / np.float32(scale), raw=True)
+    scale, image = image.normalized() if is_texture(image) else (1.0, image)
     return {
         "scale": scale,
         "factor": encoder.store.append("light_params", encoder.factor_words(image)),

@@ -32,7 +32,8 @@ from clpt.scene.media import Medium
 from clpt.scene.params import fields_of, params
 from clpt.scene.roles import EMISSION
 from clpt.scene.shapes import Shape
-from clpt.scene.textures import MeshAttribute, textures_in
+from clpt.scene.texture_values import mean
+from clpt.scene.textures import attributes_in
 
 Around: TypeAlias = Callable[[int | Emitter, light_bounds.Bounds], light_bounds.Bounds] | None
 
@@ -153,7 +154,7 @@ def _of_lamp(lamp: Light, scene_radius: float, look: Look) -> Source:
         strength = sky_light.content(lamp, look).strength
     else:
         values = emissions_of(lamp).values()
-        strength = float(np.mean([light_power.brightness(value, look) for value in values]))
+        strength = float(np.mean([mean(value, look) for value in values]))
     power = light_power.power(lamp, strength, scene_radius, look)
     counts = light_power.importance(lamp, strength, power)
     return Source(np.array([power]), light_bounds.of_lamp(lamp), np.array([counts]))
@@ -172,11 +173,11 @@ def _of_emitter(emitter: Emitter, look: Look) -> Source:
     value = fields_of(emission)[emission.emission_name]
     strength = emission.extent(1.0)  # power of a square metre whose emission is 1
     if is_whole(shape):
-        bright = light_power.brightness(value, look)
+        bright = mean(value, look)
         power = np.array([strength * analytic.area(shape) * bright])
         return Source(power, light_bounds.of_shape(shape, both), power, bright)
     if shape.kind in shape_records.ONE_OF and emitter.vertices is not None:
-        bright = light_power.brightness(value, look)
+        bright = mean(value, look)
         areas = 4.0 * np.pi * emitter.vertices[:, 3].astype(np.float64) ** 2
         power = strength * bright * areas
         return Source(power, light_bounds.of_balls(emitter.vertices), power, bright)
@@ -197,8 +198,8 @@ def _of_emitter(emitter: Emitter, look: Look) -> Source:
 
 def _face_attributes(shape: Shape, value: object) -> dict[str, NDArray[np.float32]]:
     """Return the attributes that an emission reads at a shape's triangles, by their names."""
-    names = {texture.name for texture in textures_in(value) if isinstance(texture, MeshAttribute)}
-    return {name: triangles.attribute(shape, name) for name in names if triangles.per_face(name)}
+    names = filter(triangles.per_face, attributes_in(value))
+    return {name: triangles.attribute(shape, name) for name in names}
 
 
 def _triangle_areas(vertices: Points, faces: Faces, keys: int) -> NDArray[np.float64]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 from functools import lru_cache, partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +26,7 @@ from clpt.render.records.lowering_cache import version
 from clpt.render.spectra.look import Look
 from clpt.render.textures.texels import bands, texels
 from clpt.scene.lights import CubeMap, Envmap
+from clpt.scene.pixels import image_file
 from clpt.scene.roles import EMISSION
 from clpt.spectra import Tabulated, luminance
 
@@ -177,9 +177,9 @@ def _loaded(image: object, where: str, notes: list[str]) -> Floats32:
     """
     if spectral_exr.find(image, emissive=True, where=where) is not None:
         raise SceneError("spectral images can be an envmap only", where=where)
-    if isinstance(image, (str, Path)):
-        stored = images.read_stored(image)
-        notes += [f"{image}: {note}" for note in stored.notes_of(raw=False)]
+    if (file := image_file(image)) is not None:
+        stored = images.read_stored(file)
+        notes += [f"{file}: {note}" for note in stored.notes_of(raw=False)]
         stored = images.from_array(stored.decoded(), where)
     else:
         stored = images.from_array(image, where)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats
-from clpt.device import kept_arrays
+from clpt.device import buffers
 from clpt.images.spectral_exr import SpectralImage
 from clpt.render.lights import block_grids
 from clpt.render.lights import images as image_lights
@@ -69,7 +69,7 @@ def kept(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Floats,
     """Return the arrays of `dome.unscaled`, from the cache folder if possible."""
     code = *Path(dome.__file__).parent.glob("*.py"), Path(air.__file__)
     tables = (data.ROOT / name for name in ("sky.csv", "air.csv"))
-    around, disc = kept_arrays.kept(dome.unscaled, numbers, ground, files=(*code, *tables))
+    around, disc = buffers.kept(dome.unscaled, numbers, ground, files=(*code, *tables))
     return around, disc
 
 

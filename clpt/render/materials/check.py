@@ -5,11 +5,12 @@ from __future__ import annotations
 import dataclasses
 
 from clpt.errors import SceneError
-from clpt.render.textures.check import check_textures
 from clpt.scene.indices import check_indices
 from clpt.scene.integrators import Film
 from clpt.scene.materials import Blend, BumpMap, Layer, Mask, Material, NormalMap, TwoSided, parts
-from clpt.scene.params import Texture, fields_of
+from clpt.scene.params import fields_of
+from clpt.scene.texture_values import is_texture
+from clpt.scene.textures import check_textures
 
 Maps = tuple[tuple[type[Material], bool], ...]
 
@@ -74,10 +75,10 @@ def _check_layers(material: Material, layers: tuple[Layer, ...]) -> None:
     """Raise SceneError for layers that need the mode spectral."""
     instead = 'or render in the mode "spectral"'
     for name in ("eta", "k"):
-        if isinstance(fields_of(material).get(name), Texture):
+        if is_texture(fields_of(material).get(name)):
             message = f"{material.kind}.{name} cannot be a texture below layers in RGB mode; "
             raise SceneError(f"{message}give a spectrum, {instead}")
-    textures = {id(layer.profile) for layer in layers if isinstance(layer.profile, Texture)}
+    textures = {id(layer.profile) for layer in layers if layer.has_textures}
     if len(textures) > 1:
         message = f"one texture can vary the layers of {material.kind} in RGB mode, not several; "
         raise SceneError(f"{message}give them the same one, {instead}")

@@ -20,11 +20,10 @@ from clpt.render.records.materials import MIXTURE, NORMAL_MAP_WORDS
 from clpt.render.scene_index import any_of
 from clpt.scene import materials as mt
 from clpt.scene import roles
-from clpt.scene.params import Kind, device_params, fields_of
+from clpt.scene.params import fields_of
 from clpt.scene.phases import Blend, Phase
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
-from clpt.scene.textures import Texture
 from clpt.spectra import RGB, RGBUnbounded, Spectrum
 
 _NULL, _BLACK = mt.Null(), mt.Diffuse(reflectance=0.0)
@@ -134,10 +133,10 @@ class MaterialWords:
         row = self._encoder.row(material, "materials", before)
         if row >= 1 << 24:
             raise SceneError("the scene has more than 16 million words of material parameters")
-        self.uvs |= _has_textures(material)
+        self.uvs |= material.has_textures
         self.tangents |= material.uses_tangents
         if isinstance(material, mt.Material):
-            self.uvs |= any(map(_has_textures, material.layers))
+            self.uvs |= any(layer.has_textures for layer in material.layers)
             self.absorption |= material.absorption != mt.CLEAR
         if material.transmits:
             self.transmitting.add(material.kind)
@@ -152,12 +151,6 @@ class MaterialWords:
         word = MIXTURE << 24 | self._encoder.store.append("mixtures", [*words, *children])
         self._depths[word] = 1 + max(self._depths.get(child, 0) for child in children)
         return word
-
-
-def _has_textures(kind: Kind) -> bool:
-    """Return whether a parameter that kernels read is a texture."""
-    values = fields_of(kind)
-    return any(isinstance(values[name], Texture) for name in device_params(type(kind)))
 
 
 def gloss_word(material: Scatterer) -> int:

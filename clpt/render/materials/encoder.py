@@ -22,7 +22,6 @@ from clpt.scene import roles
 from clpt.scene.materials import Material
 from clpt.scene.params import (
     Kind,
-    Texture,
     device_params,
     fields_of,
     interior_params,
@@ -30,6 +29,7 @@ from clpt.scene.params import (
     place_of,
 )
 from clpt.scene.roles import Param, Role, Spectral
+from clpt.scene.texture_values import is_texture
 from clpt.spectra import RGB, Constant, Sensor, Tabulated
 
 BLACK = (Constant(0.0), RGB(0.0, 0.0, 0.0))
@@ -156,9 +156,8 @@ class Encoder:
 
         owner: the kind with this parameter, if any.
         """
-        if isinstance(value, Texture):
-            value = self.textures.folded(value, param.role)
-        if isinstance(value, Texture):
+        value = self.textures.folded(value, param.role)
+        if is_texture(value):
             texture_words = np.zeros(words(param), np.uint32)
             texture_words[-1] = 1 + self.textures.row(value, param.role)
             return texture_words, "texture"

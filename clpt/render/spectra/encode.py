@@ -177,7 +177,7 @@ class SpectraTable:
         """Return the words of a measured material and its source.
 
         They hold the first index of its numbers, and a spectrum from wavelengths to indices of its
-        colours; see kernels/materials/measurement_load.cl.
+        colours; see kernels/materials/measurement.cl.
         """
         key = "measurement", id(value)
         if key not in self._measurements:
@@ -200,7 +200,7 @@ class SpectraTable:
         """Return the words of a MERL table and its source.
 
         They hold the first index of its numbers and, in spectral mode, the rows of red, green and
-        blue; see kernels/materials/merl_load.cl.
+        blue; see kernels/materials/merl_table.cl.
         """
         key = "merl", id(value)
         if key not in self._measurements:

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from clpt import measured
 from clpt.arrays import Floats, Floats32
 from clpt.measured import Measurement, MerlTable, merl
-from clpt.measured.fit import hemispherical
-from clpt.measured.warp import warp
+from clpt.measured.fit import hemispherical, warp
 from clpt.spectra import cie
 from clpt.spectra.spectrum import d65, primaries
 

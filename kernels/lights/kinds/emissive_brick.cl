@@ -1,8 +1,8 @@
-/* A brick of a medium that emits: eight cells along each axis of its grid. A point of it is chosen evenly. What the
- * point emits into a metre counts as if it came from all of the brick's mean chord c, four times its volume over its
- * surface. So its radiance is c times that, and its density [1/sr] that of the point, t^2 times 1 / V, times c: on
- * average one over the solid angle of the brick. Rays that go through the medium weigh what they gather against that,
- * see media/grid_flight.cl (Villemin and Hery 2013 sample flames as lights; the weights are ours). */
+/* A brick of a medium that emits: eight cells along each axis of its grid. A sampled point is uniform in the brick. Its
+ * emission per metre stands for the whole mean chord c of the brick, four times the volume over the surface. So the
+ * radiance of the sample is c times the emission, and its density [1/sr] is c t^2 / V: on average 1 over the solid
+ * angle of the brick. A ray through the medium weighs the emission that it gathers against this density (MIS,
+ * media/grid_flight.cl). Villemin and Hery 2013 sample flames as lights; the weights are ours. */
 
 real emissive_brick_pdf(EmissiveBrick l, real t) { return l.inverse * l.chord * t * t; }
 
