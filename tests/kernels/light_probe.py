@@ -124,7 +124,7 @@ def _program(
         "probe.cl": probe,
         "generated/scene.cl": scene_text(),
         "generated/spectrum.cl": f'#include "spectra/{mode}.cl"\n',
-        "generated/spectrum_read.cl": f'#include "spectra/{mode}_read.cl"\n',
+        "generated/spectrum_read.cl": f'#include "spectra/{mode}.cl#read"\n',
         "generated/lights.cl": light_text,
     }
     defines = {"LANES": lanes, "QUEUED": 0, "SPECTRA_STEP": f"{STEP}f"}
