@@ -521,11 +521,11 @@ class Rays(Camera):
     directions: Any = host(((0.0, 0.0, 1.0),), "(n, 3), or a row for all", form="rows3")
     weights: Any = host(1.0, "(n,) factors, or one for all", form="number_or_list")
 
-    def _rows(self, name: str) -> NDArray[np.float64]:
+    def _rows(self, name: str, values: Any) -> NDArray[np.float64]:
         """Return rows (n, 3) of finite numbers. Raises SceneError."""
         where = f"rays.{name}"
         try:
-            rows = np.asarray(getattr(self, name), np.float64)
+            rows = np.asarray(values, np.float64)
         except (TypeError, ValueError):
             rows = np.zeros(0)
         if rows.ndim < 2 or rows.shape[-1] != 3 or rows.size == 0:
@@ -538,12 +538,12 @@ class Rays(Camera):
 
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
         """Return the film's size and the count of rays."""
-        return {"columns": width, "rows": height, "count": len(self._rows("origins"))}
+        return {"columns": width, "rows": height, "count": len(self._rows("origins", self.origins))}
 
     def record_tables(self) -> dict[str, NDArray[np.float32]]:
         """Return rows of origin, unit direction and weight in the world. Raises SceneError."""
-        matrix, origins = self.affine_matrix(), self._rows("origins")
-        directions = self._rows("directions")
+        matrix, origins = self.affine_matrix(), self._rows("origins", self.origins)
+        directions = self._rows("directions", self.directions)
         if len(directions) not in (1, len(origins)):
             message = f"{len(directions)} rows for {len(origins)} origins"
             raise SceneError(message, where="rays.directions")
@@ -561,7 +561,7 @@ class Rays(Camera):
 
     def view_point(self, width: int, height: int) -> NDArray[np.float64]:
         """Return the mean origin (3,) [m]."""
-        mean = self._rows("origins").mean(axis=0)
+        mean = self._rows("origins", self.origins).mean(axis=0)
         return np.asarray(transforms.transform_points(self.affine_matrix(), mean), np.float64)
 
 
