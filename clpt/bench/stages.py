@@ -23,15 +23,15 @@ from clpt.records import SLABS
 from clpt.render.film.state import FILM_WORDS
 from clpt.render.flow import blocks, programs
 from clpt.render.records import Features
-from clpt.render.wavefront import queues
 from clpt.render.wavefront.bounce_loop import Step
+from clpt.render.wavefront.path_buffers import queue_sizes, queue_steps
 from clpt.scene import Scene
 
 _WORD = 4  # bytes
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _CALL = re.compile(r"(?<!\w)(?P<verb>load|store)_(?P<member>\w+)\((?!Slab )")
 _QUEUED = {"append": (0, 1), "shade": (1, 0)}  # words read and written of a queue
-QUEUEING = [kernel for kernel, *_ in queues.steps(1, 1)]
+QUEUEING = [kernel for kernel, *_ in queue_steps(1, 1)]
 WARM = 4  # bounces before the measurement, so that paths of all depths are in flight
 BOUNCES = 4  # of a round: in a single bounce few paths may begin
 
@@ -169,10 +169,10 @@ def _queue(flight: Flight, copying: Copying, rounds: int) -> Figure:
         flight.stage(step)
     program = device.build(on, programs.append_source(features, layout, wave.lanes))
     named, give = dict(wave.arguments), device.Buffers(on)
-    for name, size in queues.sizes(flight.slots, kinds, True).items():
+    for name, size in queue_sizes(flight.slots, kinds, True).items():
         named[name] = give.allocate("the queues", 4 * size)
     steps = []
-    for name, size, group in queues.steps(flight.slots, kinds):
+    for name, size, group in queue_steps(flight.slots, kinds):
         kernel = program.kernel(name)
         bound = kernel.bind(**{a.name: named[a.name] for a in kernel.arguments})
         steps.append((bound, (size,), (group,) if group else None))

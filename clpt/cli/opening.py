@@ -17,6 +17,7 @@ from clpt.render.flow.check import check
 from .. import device as dev
 from ..device import compilers, share_compilers
 from ..errors import ClusterError
+from ..formats import prepare
 from ..render.progress import Progress
 from ..render.renderer import Renderer
 from ..render.resumable import ResumableRenderer
@@ -83,6 +84,7 @@ def open_scene(
     resources: get the processes that compile for this process.
     """
     began = time.perf_counter()
+    prepare(file)
     alone = ThreadPoolExecutor(max_workers=1)
     with prompt(dev.kill_compilers), reusing(), alone as beside:
         chosen = beside.submit(choose_devices, options.machine)

@@ -7,6 +7,7 @@ import importlib
 import itertools
 import os
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -83,6 +84,18 @@ def load(
         raise SceneError("what it holds is nested too deeply", file=path) from None
     except MemoryError:
         raise SceneError("reading it takes more memory than there is", file=path) from None
+
+
+def prepare(path: str | Path, /) -> None:
+    """Import the library that reads a file's format, before other threads use native code.
+
+    OpenUSD takes Python's lock while the linker loads it. A thread that holds that lock, and asks
+    the linker for a symbol as OpenCL's drivers do, would wait for ever. A library that is missing
+    is an error of `load`.
+    """
+    if FORMATS.get(Path(path).suffix.lower()) == "usd":
+        with suppress(ImportError):
+            importlib.import_module("clpt.formats.usd.scenes")
 
 
 def _load(

@@ -49,9 +49,9 @@ inline ShapeSample area_moved(Motion m, ShapeSample q)
 }
 
 /* Step deforming: lights whose triangles deform. `geometry` has a row of such a triangle for each key, side by side.
- * Between keys rows are linear, as vertices are (motion/vertex_keys.cl). */
+ * Between keys rows are linear, as vertices are (motion/motion.cl). */
 #include "motion/motion.cl"
-#include "motion/vertex_keys.cl"
+#include "motion/motion.cl#vertex_keys"
 
 inline Triangle triangle_then(Scene scene, LightRow l, mask active)
 {

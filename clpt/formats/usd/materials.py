@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,13 +17,14 @@ from clpt.formats.usd.textures import Uses
 from clpt.scene import gltf_material
 from clpt.scene.lights import Area
 from clpt.scene.materials import Blend, GltfSurface, Material, ThinDielectric, TwoSided
+from clpt.scene.params import Kind, fields_of
 from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.scene.values import Textured
 
 PREVIEW = "UsdPreviewSurface"
 GREY = (0.18, 0.18, 0.18)
-COLOR = "displayColor"
+COLOR, ATTRIBUTE = "displayColor", "vertex_"  # a primvar, and how names of attributes begin
 NORMALS = ((2.0, 2.0, 2.0), (-1.0, -1.0, -1.0))  # scale and bias of a map of 8 bits
 
 
@@ -44,6 +46,27 @@ class Surface:
         widths = {name: len(values) for name, values in self.fallbacks.items()}
         return {**widths, **dict.fromkeys(self.uv_sets, 2)}
 
+    def settled(self, value_of: Callable[[str], tuple[float, ...] | None]) -> Surface:
+        """Return the surface of a shape without primvars: numbers stand for them.
+
+        value_of: gives them by a primvar's name, None for its fallback.
+        """
+        if not self.fallbacks:
+            return self
+        rows = {name: value_of(name) or row for name, row in self.fallbacks.items()}
+        emission = None if self.emission is None else _settled(self.emission, rows)
+        return Surface(_settled(self.material, rows), emission, self.uv_sets)
+
+
+def _settled(part: Any, rows: dict[str, tuple[float, ...]]) -> Any:
+    """Return a kind with numbers in place of the primvars in it."""
+    if isinstance(part, MeshAttribute):
+        row = rows[part.name.removeprefix(ATTRIBUTE)]
+        return row[0] if len(row) == 1 else row
+    kinds = {name: value for name, value in fields_of(part).items() if isinstance(value, Kind)}
+    changes = {name: _settled(value, rows) for name, value in kinds.items()}
+    return dataclasses.replace(part, **changes)
+
 
 def surface(
     document: Document, bound: UsdShade.Material | None, prim: Usd.Prim, *, both: bool
@@ -63,7 +86,7 @@ def surface(
 
 
 def _coloured() -> Surface:
-    shown = MeshAttribute(name=f"vertex_{COLOR}")
+    shown = MeshAttribute(name=f"{ATTRIBUTE}{COLOR}")
     return Surface(_sided(GltfSurface(base_color=shown, roughness=0.5)), fallbacks={COLOR: GREY})
 
 

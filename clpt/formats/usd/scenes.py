@@ -7,16 +7,15 @@ import re
 from pathlib import Path
 from typing import Any
 
-from pxr import Tf, Usd, UsdUtils
+from pxr import Gf, Tf, Usd, UsdUtils, Vt  # noqa: F401  all are loaded at one time
 
 from clpt.errors import SceneError, nearest
 from clpt.files import input_files
 from clpt.formats import framing
-from clpt.formats.usd import cameras, gprims, lights, walk
+from clpt.formats.usd import cameras, gprims, lights
 from clpt.formats.usd.document import Document
 from clpt.scene import Scene
 from clpt.scene.lights import Constant, Light
-from clpt.scene.shapes import Shape
 
 VARIABLES = ("camera",)
 DARK = Constant(radiance=0.0)  # in place of the studio's lights where shapes alone shine
@@ -63,14 +62,13 @@ def _reason(error: Exception, path: Path) -> str:
 
 
 def _scene(document: Document, variables: dict[str, Any]) -> Scene:
-    shown = walk.shown(document, document.stage.GetPseudoRoot())
-    shapes: list[Shape] = gprims.shapes(document, shown)
-    own_lights: list[Light] = []
-    for prim in shown["lights"]:
-        lit = lights.light(document, prim, document.placement(prim))
+    world = gprims.content(document, document.stage.GetPseudoRoot())
+    shapes, own_lights = gprims.placed(document, world), list[Light]()
+    for prim, matrix in world.flat_lights():
+        lit = lights.light(document, prim, matrix)
         own_lights += lit.lights
         shapes += lit.shapes
-    chosen = _chosen(document, shown["cameras"], variables.get("camera"))
+    chosen = _chosen(document, world.cameras, variables.get("camera"))
     if not shapes:
         document.warn("holds no shapes", "/")
     view = None if chosen is None else cameras.camera(document, chosen, None)
@@ -78,7 +76,7 @@ def _scene(document: Document, variables: dict[str, Any]) -> Scene:
     known = own_lights or ([DARK] if glowing else [])
     scene = framing.show(shapes, file=document.file, camera=view, own_lights=known, up=document.up)
     scene.lights = [light for light in scene.lights if light is not DARK]
-    scene.extra["cameras"] = [str(prim.GetPath()) for prim in shown["cameras"]]
+    scene.extra["cameras"] = [str(prim.GetPath()) for prim in world.cameras]
     if chosen is not None:
         width, height = cameras.picture_size(document, chosen)
         stops = cameras.exposure(document, chosen)

@@ -33,26 +33,29 @@ ROLES = {
 }  # fmt: skip
 
 
-def shown(document: Document, root: Usd.Prim, *, proxies: bool = False) -> Shown:
-    """Return what is shown below a prim. proxies: of instances, the prims of their prototypes."""
+def shown(document: Document, root: Usd.Prim, *, defined: bool = True) -> Shown:
+    """Return the prims that are shown below a prim, and that prim.
+
+    defined: leave out prims that only `over` speaks of, as a stage does; prototypes may be below
+    such prims.
+    """
     prims: Shown = defaultdict(list)
-    for prim in _prims(document, root, proxies):
+    for prim in _prims(document, root, defined):
         name = prim.GetTypeName()
         role = ROLES.get(name)
         if role is not None:
             prims[role].append(prim)
         elif name in UNREAD:
             document.warn(f"{name} is not read", prim.GetPath())
-        elif prim.IsInstance() and not proxies:
+        elif prim.IsInstance():
             prims["instances"].append(prim)
     return prims
 
 
-def _prims(document: Document, root: Usd.Prim, proxies: bool) -> Iterator[Usd.Prim]:
+def _prims(document: Document, root: Usd.Prim, defined: bool) -> Iterator[Usd.Prim]:
     """Yield a prim and those below it that are visible and of a purpose that is shown."""
-    predicate = Usd.PrimDefaultPredicate
-    prims = Usd.PrimRange(root, Usd.TraverseInstanceProxies(predicate) if proxies else predicate)
-    iterator = iter(prims)
+    anywhere = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
+    iterator = iter(Usd.PrimRange(root, Usd.PrimDefaultPredicate if defined else anywhere))
     for prim in iterator:
         visibility = prim.GetAttribute("visibility")
         if visibility and visibility.Get(document.time) == "invisible":

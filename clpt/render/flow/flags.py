@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from clpt.render.records import Features
-from clpt.render.records.macros import said
+from clpt.render.records.macros import macros_of
 from clpt.render.records.textures import IMAGES
 from clpt.scene.params import device_params
 from clpt.scene.scatterer import Scatterer
@@ -118,12 +118,12 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or not f.lights.few,
 }
 
-SCENE = frozenset(dict(said(Features())))  # the names of flags of a scene
+SCENE = frozenset(dict(macros_of(Features())))  # the names of flags of a scene
 
 
 def of_scene(features: Features) -> Defines:
     """Return the macros that features say."""
-    return {name: value for name, value in said(features) if value is not None}
+    return {name: value for name, value in macros_of(features) if value is not None}
 
 
 def of_material(features: Features, cls: type[Scatterer]) -> Defines:

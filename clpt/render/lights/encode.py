@@ -24,7 +24,7 @@ from clpt.render.lights.bricks import BrickLights
 from clpt.render.lights.encode_lamps import blank_row, lower_lamp
 from clpt.render.lights.find import Source, Sources, is_whole
 from clpt.render.materials.encoder import Encoder
-from clpt.render.records.lights import ALONG, BOTH, FRONT, KINDS, UNSEEN
+from clpt.render.records.lights import ALONG, BOTH, FRONT, KINDS, UNSEEN, LightFeatures
 from clpt.render.records.lowering_cache import content
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
@@ -34,6 +34,8 @@ from clpt.scene.texture_values import mean
 
 PLACED_LIGHT_WEIGHT = 6  # rows of a light at a separate place, to decide on a light tree
 INFINITE_SHARE = 0.5  # of the choices, beside other lights
+
+FEW_LIGHTS = 256  # the most lights for which a random number chooses a light and a point on it
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,19 @@ class LightRows:
     unseen: bool
     bounds: tuple[light_bounds.Bounds, ...]
     tree: NDArray[np.uint32] | None
+
+    def features(self, gloss: int = 0) -> LightFeatures:
+        """Return the features of these rows; gloss: see `LightFeatures`."""
+        return LightFeatures(
+            kinds=self.kinds,
+            infinite=self.infinite > 0,
+            visible=self.visible,
+            two_sided=self.two_sided,
+            unseen=self.unseen,
+            tree=self.tree is not None,
+            few=len(self.rows) <= FEW_LIGHTS,
+            gloss=gloss,
+        )
 
 
 def light_rows(

@@ -11,10 +11,8 @@ from functools import cache, partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clpt import device as dev
-from clpt.arrays import Floats
 from clpt.denoise import needs
 from clpt.errors import DeviceError, SceneError
 from clpt.render.edit.moving import Moving
@@ -47,7 +45,6 @@ TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
 WAY = tuple(f"chosen.{name}" for name in ("integrator", "light_paths", "guide_paths", "splatting"))
 TO_OUTPUT = ("to_first", "to_second", "to_third")
 
-Measure = Callable[[NDArray[np.bool_]], Floats]
 Share = Callable[[object, Callable[[], Any]], Any]
 
 
@@ -128,8 +125,8 @@ class DeviceFilm:
 
     # ---- the film
 
-    def denoised_noise(self, words: Callable[..., FilmState]) -> Measure | None:
-        """Return a function that measures the noise after denoising; None with light paths.
+    def denoised_noise(self, words: Callable[..., FilmState]) -> DenoisedNoise | None:
+        """Return the meter of noise after denoising; None with light paths.
 
         words: returns the film. Raises SceneError if the film has no halves.
         """
@@ -142,7 +139,7 @@ class DeviceFilm:
                 where="noise",
             )
         form = self.form
-        return DenoisedNoise(lambda: Developed(words(), form), self.device, self.denoise).measure
+        return DenoisedNoise(lambda: Developed(words(), form), self.device, self.denoise)
 
     def words(self, *names: str, held: bool = False, taken: Ranges = ()) -> FilmState:
         """Wait for the film or, if `held`, for its copy; return it on the host.

@@ -16,8 +16,8 @@ import numpy as np
 from clpt.errors import SceneError
 from clpt.render.materials.encoder import Encoder
 from clpt.render.materials.normal_maps import NormalPerturbation
-from clpt.render.records.materials import MIXTURE, NORMAL_MAP_WORDS
-from clpt.render.scene_index import any_of
+from clpt.render.records.materials import MIXTURE, NORMAL_MAP_WORDS, MaterialFeatures
+from clpt.render.scene_index import SceneIndex, any_of
 from clpt.scene import materials as mt
 from clpt.scene import roles
 from clpt.scene.params import fields_of
@@ -81,6 +81,18 @@ class MaterialWords:
     @property
     def mixture_depth(self) -> int:
         return max(self._depths.values(), default=0)
+
+    def features(self, index: SceneIndex) -> MaterialFeatures:
+        """Return the features of a scene's materials, with the sources of all loaded values."""
+        return MaterialFeatures(
+            leaves=index.leaves,
+            transmitting=tuple(sorted(self.transmitting)),
+            shining=index.shining,
+            mixtures=self.mixture_depth,
+            normal_mapped=index.normal_mapped,
+            free_panes=index.free_panes,
+            sources=self._encoder.sources,
+        )
 
     def sides(self, shape: Shape) -> tuple[int, int, bool]:
         """Return the words of a shape's front and back, and whether it is two-sided."""

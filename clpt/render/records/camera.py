@@ -22,7 +22,7 @@ _PINHOLE = {
 }
 
 WEIGHTED = ("lens",)  # cameras whose rays have weights
-GHOST_CELLS = 1024  # of equal probability, from which pairs of reflecting surfaces are drawn
+GHOST_CELLS = 1024  # of equal probability; a cell gives a pair of reflecting surfaces
 
 RECORDS: dict[str, Record] = {
     "perspective": Record("PerspectiveCamera", "A pinhole.", **_PINHOLE),
@@ -52,7 +52,7 @@ RECORDS: dict[str, Record] = {
         blade_normals=("integer", "where the blades' normals begin"),
         blade_distance=("real", "of a blade from the axis, in radii of the stop"),
         ghosts=("real", "share of samples that are reflected twice"),
-        ghost_cells=("integer", "where the pairs of surfaces begin that they are drawn from"),
+        ghost_cells=("integer", "where the pairs of reflecting surfaces begin"),
         rear_radius=("real", "on the rear plane, of rays that meet the last surface [m]"),
     ),
     "orthographic": Record(

@@ -1,4 +1,4 @@
-"""Dispatch in lanes: OpenCL text that does for each kind what only the lanes of that kind need.
+"""Dispatch in lanes: OpenCL text that serves each kind in the lanes of that kind.
 
 Lanes may differ in their kind, so a `switch` cannot choose. A case is skipped where no lane has its
 kind; else all lanes compute it, and a mask chooses which of them keep it. A lane without the kind
@@ -17,8 +17,8 @@ from clpt.layout import select_name
 class Case:
     """A value for some lanes.
 
-    test: the mask of these lanes; "": all. value: an expression, in which `m` is that mask. before:
-    statements that the value needs.
+    test: the mask of these lanes; "": all. value: an expression that may use the mask as `m`.
+    before: statements that the value needs.
     """
 
     test: str
@@ -31,7 +31,7 @@ class Function:
     """A function whose value is that of the last case that holds, in every lane.
 
     signature: type, name and parameters; otherwise: the value where no case holds; before:
-    statements that the cases need; result: what is made of `value`.
+    statements that the cases need; result: the returned expression of `value`.
     """
 
     signature: str

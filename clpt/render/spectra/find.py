@@ -62,7 +62,7 @@ class Density:
         return np.linspace(self.lo, self.hi, count)
 
     def words(self) -> NDArray[np.float32]:
-        """Return the table for kernels/spectra/density.cl: n, lo, step, sums, values, guide.
+        """Return the table for kernels/spectra/wavelengths.cl: n, lo, step, sums, values, guide.
 
         The sums (n + 1) are the cumulative distribution at the nodes. The guide (GUIDES + 1) has
         the cells in which equal shares begin, at which a search begins.

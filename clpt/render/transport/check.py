@@ -1,4 +1,4 @@
-"""Rules of paths that start at lights, where the integrator has no others."""
+"""Rules for scenes whose integrator has light paths alone."""
 
 from __future__ import annotations
 
