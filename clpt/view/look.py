@@ -9,7 +9,7 @@ import dataclasses
 from collections import deque
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -92,7 +92,10 @@ class Look:
         return dataclasses.replace(film, **changes) if changes else film
 
 
-def with_spectrum(light: Light, lamp: str) -> Light:
+_L = TypeVar("_L", bound=Light)
+
+
+def with_spectrum(light: _L, lamp: str) -> _L:
     """Return a light with a lamp's spectrum and its own luminance; textures and images stay."""
     changes: dict[str, Any] = {}
     given = fields_of(light)
