@@ -160,8 +160,8 @@ class CameraWork:
         at = viewpoint.pose(self.scene.camera)
         target = at.origin + self._distance() * at.forward
         points = {"origin": at.origin, "target": target, "up": at.up}
-        rounded = {name: rounded(point) for name, point in points.items()}
-        reply({"type": "look_at", **rounded})
+        vectors = {name: rounded(point) for name, point in points.items()}
+        reply({"type": "look_at", **vectors})
 
     def _do_pick(self, reply: Reply, x: int, y: int) -> None:
         self._ask_hit(x, y, reply, lambda hit: self._aim_at(hit, reply))

@@ -59,7 +59,7 @@ def show(scene: Path, settings: Settings) -> int:
             display=looked_at,
             where=where,
             make=make,
-            **settings.options.renderer_options,
+            **settings.options.build,
         )
         resources.callback(session.close)
         if begins is not None:
