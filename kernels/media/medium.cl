@@ -62,7 +62,7 @@ inline Spectrum medium_dims(Scene scene, integer medium, real t, Wavelengths lam
     return spectrum_mul(value, medium_transmittance(scene, medium, t, lambdas));
 }
 
-/* Twin, where a shadow ray may go through several media: tracing/transmittance_media.cl multiplies as it is traced. */
+/* Twin, where a shadow ray may go through several media: tracing/transmittance.cl multiplies as it is traced. */
 inline Spectrum medium_dims(Scene scene, integer medium, real t, Wavelengths lambdas, Spectrum value) { return value; }
 
 /* Step lights: the table `media`: first the aims of media/equiangular.cl; then, with light paths, two words for each

@@ -3,8 +3,7 @@
 /* Step. */
 #include "core/rounding.cl"
 #include "shapes/surface.cl#flags"
-#include "tracing/trace_hit.cl"
-#include "shapes/surface_point.cl"
+#include "tracing/trace.cl"
 #include "shapes/surface_point.cl"
 #include "generated/hit_space.cl"
 #include "generated/surface_steps.cl"

@@ -22,7 +22,7 @@
 #include "generated/bsdf.cl"
 #include "generated/medium.cl"
 #include "transport/vertex.cl"
-#include "spectra/hero.cl"
+#include "spectra/hero.cl#sample"
 #include "generated/integrator.cl"
 
 #if QUEUED

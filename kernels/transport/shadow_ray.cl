@@ -3,7 +3,7 @@
 /* Step. */
 #include "shapes/shape.cl"
 #include "generated/trace.cl"
-#include "tracing/passage.cl"
+#include "tracing/transmittance.cl"
 #include "generated/transmittance.cl"
 #define ShadowPassage Passage
 #define shadow_most(passes) passage_most(passes)

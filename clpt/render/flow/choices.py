@@ -37,7 +37,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/spectrum_read.cl": lambda f, _: _spectrum_read(f),
     "generated/sampler.cl": lambda f, _: (
         f"samplers/kinds/{f.transport.sampler}.cl",
-        f"samplers/pixel_sampler{'_z' * (f.transport.sampler == 'zsobol')}.cl",
+        f"samplers/pixel_sampler.cl{'#z' * (f.transport.sampler == 'zsobol')}",
     ),
     "generated/exposure.cl": lambda f, _: (
         "film/splatting.cl" if f.film_weights else "film/exposure.cl",
@@ -57,10 +57,10 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         when(f.media.bodies, "media/bodies.cl#vertex")
         or either(f.media.absorbing, "media/vertex_media.cl")
     ),
-    "generated/front_motion.cl": lambda f, _: either(f.motion.camera, "cameras/front_motion.cl"),
+    "generated/front_motion.cl": lambda f, _: either(f.motion.camera, "cameras/motion.cl#front"),
     "generated/ghosts.cl": lambda f, _: either(f.transport.lit_ghosts, "cameras/ghosts.cl"),
     "generated/first_ray.cl": lambda f, _: (
-        f"cameras/first_ray{'_weighted' * f.camera.weighs}.cl",
+        f"cameras/first_ray.cl{'#weighted' * f.camera.weighs}",
     ),
     "generated/sky.cl": lambda f, _: (
         *either(f.lights.infinite, "lights/sky.cl"),
@@ -78,13 +78,13 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
             f.film.layers.words > 0,
             *_screen_motion(f),
             *either(f.screen_motion, "film/screen_motion_record.cl"),
-            *either(f.motion.camera, "cameras/camera_axis.cl"),
+            *either(f.motion.camera, "cameras/motion.cl#axis"),
         ),
         *either(f.film.layers.words > 0, "film/layers_record.cl"),
     ),
     "generated/path_covers.cl": lambda f, _: either(f.film.alpha, "film/covers.cl"),
     "generated/path_start.cl": lambda f, _: either(
-        f.film.alpha and f.camera.weighs, "cameras/start.cl"
+        f.film.alpha and f.camera.weighs, "cameras/first_ray.cl#again"
     ),
     "generated/scouts.cl": lambda f, _: either(f.scouts, "film/scouts.cl"),
     "generated/scouts_begin.cl": lambda f, _: either(f.scouts, "film/scouts_begin.cl"),
@@ -119,7 +119,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         or either(f.hemispheres, "lights/receiver.cl#kept_hemisphere")
     ),
     "generated/seen_wavelengths.cl": lambda f, _: either(
-        f.fluorescence, "spectra/seen_wavelengths.cl"
+        f.fluorescence, "spectra/wavelengths.cl#seen"
     ),
     "generated/infinite_weight.cl": lambda f, _: either(
         f.transport.balanced, "lights/infinite.cl#weight"
@@ -192,17 +192,17 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *when(f.materials.normal_mapped, "generated/normal_map.cl"),
         *either(f.materials.normal_mapped, "materials/shading_frame.cl"),
     ),
-    "generated/transmittance.cl": lambda f, _: (f"tracing/transmittance{_passing(f)}.cl",),
+    "generated/transmittance.cl": lambda f, _: (f"tracing/transmittance.cl#{_passing(f)}",),
     "generated/shadow_ray.cl": lambda f, _: (
         when(f.shadow_media, "transport/shadow_ray.cl#media")
         or when(f.media.escapes, "transport/shadow_ray.cl#escapes")
         or ("transport/shadow_ray.cl",)
     ),
     "generated/trace.cl": lambda _, layout: (
-        f"tracing/trace_{'lanes' if layout == 'brute' else 'one'}.cl",
+        f"tracing/trace.cl#{'lanes' if layout == 'brute' else 'one'}",
     ),
     "generated/curve_others.cl": lambda f, _: either(
-        f.geometry.analytic != ("curves",), "tracing/curve_others.cl"
+        f.geometry.analytic != ("curves",), "tracing/curves.cl#others"
     ),
     "generated/shape_traversal.cl": lambda f, layout: (
         (f"bvh/shapes.cl#{bvh.shapes_layout(layout).removeprefix('shapes_')}",)
@@ -242,15 +242,15 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.geometry.instances,
     "generated/motion.cl": lambda f, _: (
         *either(f.motion.present, "motion/motion.cl"),
-        *when(f.motion.vertices or f.motion.spheres, "motion/vertex_keys.cl"),
+        *when(f.motion.vertices or f.motion.spheres, "motion/motion.cl#vertex_keys"),
     ),
     "generated/keyed_layout.cl": lambda f, layout: (
         (f"bvh/{layout}.cl#keyed",) * (f.motion.vertices and layout != "brute")
     ),
     "generated/instance_traversal.cl": lambda f, layout: (
         (
-            f"tracing/instances_{'few' if f.geometry.few_instances else layout}.cl",
-            "tracing/trace_instances.cl",
+            f"tracing/instances.cl#{'few' if f.geometry.few_instances else layout}",
+            "tracing/instances.cl#hits",
         )
         * f.geometry.instances
     ),
@@ -293,9 +293,9 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
     ),
     "generated/hero_steps.cl": lambda f, cls: (
         *either(
-            f.ratios and flags.is_chromatic(f, cls) and f.spectra.spectral, "spectra/hero_weighs.cl"
+            f.ratios and flags.is_chromatic(f, cls) and f.spectra.spectral, "spectra/hero.cl#weighs"
         ),
-        *either(f.told_dispersion, "spectra/hero_alone.cl"),
+        *either(f.told_dispersion, "spectra/hero.cl#alone"),
         *(
             either(
                 flags.is_chromatic(f, cls) and (f.told_dispersion or cls.is_phase),
@@ -359,17 +359,17 @@ def _corners_move(features: Features) -> bool:
 
 
 def _passing(features: Features) -> str:
-    """Return the end of the name of the file that tells which light passes."""
+    """Return the step that tells which light passes."""
     if features.shadow_media:
-        return "_media"
-    return "" if features.materials.null_surfaces else "_opaque"
+        return "media"
+    return "surfaces" if features.materials.null_surfaces else "opaque"
 
 
 def _spectrum_read(features: Features) -> tuple[str, ...]:
     """The look-up of spectra, and in spectral mode how the camera draws wavelengths."""
-    read = f"spectra/{features.spectra.mode}_read.cl"
-    drawn = f"spectra/{'density' if features.spectra.tabulated_density else 'visible'}.cl"
-    return (read, drawn) if features.spectra.spectral else (read,)
+    read = f"spectra/{features.spectra.mode}.cl#read"
+    step = "density" if features.spectra.tabulated_density else "visible"
+    return (read, *when(features.spectra.spectral, f"spectra/wavelengths.cl#{step}"))
 
 
 def virtual_files(features: Features, layout: str) -> dict[str, tuple[str, ...]]:

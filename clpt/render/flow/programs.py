@@ -76,8 +76,8 @@ def _stages(
     join_lanes = bounce.join_lanes(features, layout, lanes, interleaved)
     rays: Files = {}
     if interleaved and layout != "brute":
-        traced = "curves" if "curves" in features.geometry.analytic else "interleaved"
-        rays["generated/trace.cl"] = (f"tracing/trace_{traced}.cl",)
+        file = "curves" if "curves" in features.geometry.analytic else "trace"
+        rays["generated/trace.cl"] = (f"tracing/{file}.cl#interleaved",)
     joins = {**files, **(rays if features.geometry.analytic else {})}
     if begin == "flare":
         return {

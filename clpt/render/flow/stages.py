@@ -28,7 +28,7 @@ def camera_text(features: CameraFeatures, *, moves: bool = False) -> str:
     kind, losses = features.kind, features.losses or features.ghosts
     record = camera_records.RECORDS[kind]
     camera = f"(global const {record.name} *)(scene).camera"
-    moving = '#include "cameras/moved.cl"\n' * moves
+    moving = '#include "cameras/motion.cl"\n' * moves
     if kind in camera_records.WEIGHTED:
         surface = camera_records.LENS_SURFACE
         return (
@@ -61,16 +61,16 @@ def connect_text(features: Features) -> str:
     It is nothing where no path is joined.
     """
     if features.transport.lit_ghosts and features.transport.light_paths:
-        return '#include "cameras/lens_ghosts.cl"\n'
+        return '#include "cameras/kinds/lens.cl#ghosts"\n'
     if not features.transport.joined:
         return ""
     kind = features.camera.kind
     record = camera_records.RECORDS[kind]
-    files = f'#include "cameras/{kind}_connect.cl"\n'
+    files = f'#include "cameras/kinds/{kind}.cl#connect"\n'
     camera = f"(global const {record.name} *)(scene).camera"
     if features.motion.camera:
         rest = f"{kind}_connect({camera}, (scene).settings, p, away, lens)"
-        return f'{files}#include "cameras/moved_connect.cl"\n' + function(
+        return f'{files}#include "cameras/motion.cl#connect"\n' + function(
             "CameraPoint camera_connect(Scene scene, vec3 p, mask away, vec2 lens)",
             "Motion motion = camera_motion(scene);",
             "p = camera_point_back(motion, p, away);",
@@ -90,7 +90,7 @@ def screen_text(features: Features) -> str:
     kind = features.camera.kind
     camera = f"(global const {camera_records.RECORDS[kind].name} *)(scene).camera"
     return (
-        f'#include "cameras/{kind}_screen.cl"\n#define camera_screen(scene, p, away, seen) '
+        f'#include "cameras/kinds/{kind}.cl#screen"\n#define camera_screen(scene, p, away, seen) '
         f"{kind}_screen({camera}, p, away, seen)\n"
     )
 

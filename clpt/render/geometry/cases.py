@@ -62,8 +62,8 @@ def hit_text(features: Features) -> str:
         "return none;",
     ]
     files = '#include "generated/motion.cl"\n' * moves
-    files += '#include "tracing/curve_beside.cl"\n' * curves
-    files += f'#include "tracing/shape_rows_{rows}.cl"\n'
+    files += '#include "tracing/curves.cl"\n' * curves
+    files += f'#include "tracing/shape_rows.cl#{rows}"\n'
     return _includes(features) + files + function(signature, *body)
 
 

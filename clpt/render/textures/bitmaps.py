@@ -34,7 +34,7 @@ from clpt.scene.pixels import channel, image_file
 from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role
 from clpt.scene.textures import Bitmap
 
-NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectral_read.cl
+NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectral.cl
 LARGEST = 2**31 - 1  # words in `images` that an index reaches
 THREADS = 8
 UNKNOWN, NEW, PACKED = range(3)

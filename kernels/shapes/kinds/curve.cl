@@ -9,7 +9,7 @@
  * straight pieces, else the next estimate; a bisection replaces a step that leaves the bounds. (That local cones
  * converge fast: Reshetov and Luebke
  * 2018, "Phantom Ray-Hair Intersector".) u is the azimuth over 2 pi, v runs along. Lengths in metres. */
-#include "tracing/analytic.cl"
+#include "core/rounding.cl"
 #define CURVE_STEPS 24
 #define CURVE_NEAR 2e-4f    /* of a piece: a smaller step is the last; the error that remains is far smaller */
 #define CURVE_OVERLAP 2e-3f /* [rad] overlap of a piece beyond its end, so that no ray passes between two pieces */

@@ -1,5 +1,5 @@
 /* An open tube; sampled evenly over its area. u is the azimuth over 2 pi, v runs along the axis. */
-#include "tracing/analytic.cl"
+#include "core/rounding.cl"
 
 real cylinder_size(Cylinder q) { return EXACT_SIZE * (q.radius + size3(q.axis) + size3(q.p0)); }
 

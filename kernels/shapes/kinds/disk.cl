@@ -1,6 +1,6 @@
 /* A disk, or an ellipse where its transform stretches it; sampled evenly over its area. u is the
  * distance from the centre (1 at the rim), v the azimuth over 2 pi. */
-#include "tracing/analytic.cl"
+#include "core/rounding.cl"
 
 inline real disk_reach(Disk q) { return size3(q.s) + size3(q.t); }
 real disk_size(Disk q) { return EXACT_SIZE * (disk_reach(q) + size3(q.center)); }

@@ -1,6 +1,6 @@
 /* A sphere. As a light it is sampled evenly over the cone that it subtends from outside, and evenly over its area from
  * inside. u is the azimuth about its z axis over 2 pi, v the angle from it over pi. */
-#include "tracing/analytic.cl"
+#include "core/rounding.cl"
 
 real sphere_size(Sphere q) { return EXACT_SIZE * (q.radius + size3(q.center)); }
 

@@ -40,7 +40,7 @@ KINDS = 5
 VIRTUAL = {
     "generated/scene.cl": scene_text(),
     "generated/spectrum.cl": '#include "spectra/rgb.cl"\n',
-    "generated/spectrum_read.cl": '#include "spectra/rgb_read.cl"\n',
+    "generated/spectrum_read.cl": '#include "spectra/rgb.cl#read"\n',
     "generated/block.cl": blocks_text([lower(Scene(camera=Perspective())).features]),
     "sorting.cl": """
 #include "core/base.cl"

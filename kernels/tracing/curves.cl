@@ -1,15 +1,68 @@
-/* Tracing a work-item's rays in scenes with curves, triangles and few other shapes. Rays step in turn from node to node
- * of the tree over pieces, with prefetches, until each reaches a piece that it does not pass beside, or ends. Then
- * these pieces are tested in lanes. Triangles are traced before, ray by ray. Hits equal the hits of
- * tracing/trace_one.cl to the bit. */
+/* Tracing in scenes with curves. */
+
+/* Whether a ray passes beside a piece of a curve: all control points are farther to the same side than its radius. Most
+ * pieces with hit boxes are rejected here, four points at a time. `piece`: its words, see
+ * kernels/shapes/kinds/curves.cl. */
+inline int curve_beside(global const float *piece, float3 o, float3 d)
+{
+    float4 x = vload4(0, piece) - o.x, y = vload4(1, piece) - o.y, z = vload4(2, piece) - o.z;
+    float4 r = fabs(vload4(3, piece));
+    float3 chord = (float3)(x.w - x.x, y.w - y.x, z.w - z.x);
+    float nx = chord.y * d.z - chord.z * d.y, ny = chord.z * d.x - chord.x * d.z, nz = chord.x * d.y - chord.y * d.x;
+    float4 w = x * nx + y * ny + z * nz, away = fabs(x) + fabs(y) + fabs(z);
+    float2 half_reach = fmax(r.lo, r.hi), half_away = fmax(away.lo, away.hi);
+    float reach = fmax(half_reach.x, half_reach.y) + 1e-6f * fmax(half_away.x, half_away.y); /* and rounding errors */
+    float limit = reach * reach * (nx * nx + ny * ny + nz * nz);
+    return all((w * w > limit) & (w > 0.0f)) || all((w * w > limit) & (w < 0.0f));
+}
+
+/* The same for tracing with a ray a work-item; in lanes the test is skipped. */
+#if LANES == 1
+#define curve_beside_one(piece, o, d) curve_beside(piece, (float3)(o.x, o.y, o.z), (float3)(d.x, d.y, d.z))
+#else
+#define curve_beside_one(piece, o, d) 0
+#endif
+
+/* Step others: hits of few other shapes beside curves, such as a spherical lamp: each is tested against all lanes. */
+#include "generated/shape_tree.cl"
+#define CURVE_OTHERS scene.settings->single_count /* primitives below are not curves */
+
+/* Adds to `hit` the active lanes' hits before t of primitives that are not curves. */
+inline ShapeHit curve_others(Scene scene, integer prim, mask active, vec3 o, vec3 d, real t, ShapeHit hit)
+{
+    TraceInteger prims = {prim}, left = {active & (prim < CURVE_OTHERS)};
+    for (uint i = 0; i < LANES; i++) {
+        if (!left.at[i]) continue;
+        int shape = prims.at[i];
+        ShapeHit own = shape_hit(scene, shape, shape_row_like(scene, shape), o, d, (real)(0.0f), t);
+        mask same = (left.v != 0) & (prim == shape);
+        hit.t = sel(same, own.t, hit.t);
+        hit.n = sel3(same, own.n, hit.n);
+        hit.uv.x = sel(same, own.uv.x, hit.uv.x);
+        hit.uv.y = sel(same, own.uv.y, hit.uv.y);
+        left.v = sel_i(same, (integer)(0), left.v);
+    }
+    return hit;
+}
+
+/* Twin, where there are none. */
+inline ShapeHit curve_others(Scene scene, integer prim, mask active, vec3 o, vec3 d, real t, ShapeHit hit)
+{
+    return hit;
+}
+#define CURVE_OTHERS 0
+
+/* Step interleaved: a work-item's rays in scenes with curves, triangles and few other shapes. Rays step in turn from
+ * node to node of the tree over pieces, with prefetches, until each reaches a piece that it does not pass beside, or
+ * ends. Then these pieces are tested in lanes. Triangles are traced before, ray by ray. Hits equal the hits of
+ * tracing/trace.cl's step `one` to the bit. */
 #include "tracing/trace.cl"
 #include "generated/layout.cl"
 #include "generated/trace_args.cl"
 #include "bvh/hints.cl"
 #include "generated/shape/curves.cl"
-#include "tracing/curve_beside.cl"
-#include "tracing/shape_rows_many.cl"
-#include "tracing/trace_each.cl"
+#include "tracing/shape_rows.cl#many"
+#include "tracing/trace.cl#each"
 #include "generated/curve_others.cl"
 
 typedef struct {

@@ -1,8 +1,35 @@
-/* Wavelengths by a tabulated density, linear between nodes of equal distance
- * (clpt/render/spectra/find.py).
- * At settings->density in `distributions`: the number of cells n, the first node and the distance
- * [nm], n + 1 cumulative shares, n + 1 densities [1/nm], and the cells in which the shares i / DENSITY_GUIDES
- * lie, for i from 0 to DENSITY_GUIDES. Same functions in spectra/visible.cl. */
+/* Wavelengths of paths: how the camera draws them, and what a sample adds to a pixel. */
+
+/* Step visible: by visible importance: pdf proportional to sech^2(0.0072 (lambda - 538)), cut to where
+ * the sensor responds (Radziszewski et al. 2009; pbrt-v4's constants). */
+#include "generated/importance.cl"
+inline Wavelengths wavelengths_sample(Scene scene, real u)
+{
+    real a = scene.settings->tanh_min, b = scene.settings->tanh_max, offset = 0.0f;
+    Wavelengths r;
+#define C(c)                                                                                   \
+    {                                                                                          \
+        real v = u + offset;                                                                   \
+        real t = clamp_r(a + (v - floor(v)) * (b - a), (real)(-0.999999f), (real)(0.999999f)); \
+        r.c = IMPORTANCE_PEAK + log_r((1.0f + t) / (1.0f - t)) * (0.5f / IMPORTANCE_SLOPE);    \
+        offset += 0.25f;                                                                       \
+    }
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+/* What a sample adds to a pixel: XYZ; rows 1 to 3 hold the sensor's curves over the pdf. */
+inline vec3 film_value(Scene scene, Spectrum radiance, Wavelengths lambdas)
+{
+    return v3(spectrum_mean(spectrum_mul(radiance, spectra_row(scene, (integer)(1), lambdas))),
+              spectrum_mean(spectrum_mul(radiance, spectra_row(scene, (integer)(2), lambdas))),
+              spectrum_mean(spectrum_mul(radiance, spectra_row(scene, (integer)(3), lambdas))));
+}
+
+/* Step density: by a tabulated density, linear between nodes of equal distance (clpt/render/spectra/find.py). At
+ * settings->density in `distributions`: the number of cells n, the first node and the distance [nm], n + 1 cumulative
+ * shares, n + 1 densities [1/nm], and for i from 0 to DENSITY_GUIDES the cell that holds the share i / DENSITY_GUIDES.
+ * */
 #include "generated/density_sizes.cl"
 
 /* The wavelength below which a share u of the density lies [nm]. */
@@ -66,3 +93,13 @@ inline vec3 film_value(Scene scene, Spectrum radiance, Wavelengths lambdas)
               spectrum_mean(spectrum_mul(weighed, spectra_row(scene, (integer)(2), lambdas))),
               spectrum_mean(spectrum_mul(weighed, spectra_row(scene, (integer)(3), lambdas))));
 }
+
+/* Step seen: the wavelengths of a path as the film sees them, where it fluoresces; lambdas: of the light that comes. */
+inline Wavelengths seen_wavelengths(Scene scene, Slab path, uint at, Wavelengths lambdas)
+{
+    Sampler begun = pixel_sampler(scene.settings, load_path_pixel_key(path, at), load_path_sample(path, at));
+    return wavelengths_sample(scene, sampler_pair(begun, (natural)(DIMENSION_WAVELENGTH)).x);
+}
+
+/* Twin, where nothing fluoresces. */
+inline Wavelengths seen_wavelengths(Scene scene, Slab path, uint at, Wavelengths lambdas) { return lambdas; }
