@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -169,7 +169,7 @@ def photometer(
         )
         added = [receivers]
     count = REPLICAS * len(points) * (len(AXES) if quantity.everywhere else 1)
-    width = min(len(camera.origins), LONGEST_ROW)
+    width = min(np.shape(camera.origins)[0], LONGEST_ROW)
     height = math.ceil(count / width)
     film = dataclasses.replace(
         scene.film, width=width, height=height, crop=None, filter=Box(radius=0.25)
@@ -227,7 +227,7 @@ def _random_frames(count: int, seed: int) -> Floats:
     return np.moveaxis(np.array(rows), -1, 0)
 
 
-def _rows(values: Any, where: str) -> Floats:
+def _rows(values: ArrayLike, where: str) -> Floats:
     """Return rows (..., 3) of finite numbers. Raises SceneError."""
     rows = np.atleast_2d(np.asarray(values, np.float64))
     if rows.shape[-1] != 3 or rows.size == 0:

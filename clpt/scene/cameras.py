@@ -517,11 +517,11 @@ class Rays(Camera):
 
     shorthands = ()
 
-    origins: Any = host(((0.0, 0.0, 0.0),), "(n, 3), where rays begin", "m", form="rows3")
-    directions: Any = host(((0.0, 0.0, 1.0),), "(n, 3), or a row for all", form="rows3")
-    weights: Any = host(1.0, "(n,) factors, or one for all", form="number_or_list")
+    origins: ArrayLike = host(((0.0, 0.0, 0.0),), "(n, 3), where rays begin", "m", form="rows3")
+    directions: ArrayLike = host(((0.0, 0.0, 1.0),), "(n, 3), or a row for all", form="rows3")
+    weights: ArrayLike = host(1.0, "(n,) factors, or one for all", form="number_or_list")
 
-    def _rows(self, name: str, values: Any) -> NDArray[np.float64]:
+    def _rows(self, name: str, values: ArrayLike) -> NDArray[np.float64]:
         """Return rows (n, 3) of finite numbers. Raises SceneError."""
         where = f"rays.{name}"
         try:
