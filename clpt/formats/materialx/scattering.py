@@ -7,14 +7,23 @@ from typing import Any
 import numpy as np
 
 from clpt.formats.materialx.graph import Graph, Node, category
-from clpt.scene.materials import Blend, Material, Openpbr, TwoSided
+from clpt.scene.materials import Blend, Material, Openpbr, TwoSided, parts
 
 MATT = {"specular_weight": 0.0}
 EDGE = 1.0 / 7.0  # the cosine at which OpenPBR tints a metal
 
 
 def material(graph: Graph, node: Node, name: str) -> Material:
-    """Return a node of scattering as a material; grey, with a warning, for one that is not read."""
+    """Return a node of scattering as a material; grey, with a warning, for one that is not read.
+
+    It has two sides, unless light goes through a part: then others have a front alone.
+    """
+    inner = _front(graph, node, name)
+    clear = any(part.transmits for part in parts(inner))
+    return inner if clear else TwoSided(front=inner, name=name)
+
+
+def _front(graph: Graph, node: Node, name: str) -> Material:
     if category(node.kind) == "mix_bsdf":
         first, second = (_part(graph, node, end, name) for end in ("bg", "fg"))
         weight = graph.texture(node, "mix", 0.0, wide=False)
@@ -23,13 +32,12 @@ def material(graph: Graph, node: Node, name: str) -> Material:
     if values is None:
         graph.host.warn(f"{node.kind} is not read; grey stands for it", node.path)
         values = {}
-    lobe = Openpbr(**values, name=name)
-    return lobe if lobe.transmits else TwoSided(front=lobe, name=name)
+    return Openpbr(**values, name=name)
 
 
 def _part(graph: Graph, node: Node, end: str, name: str) -> Material:
     source = node.source(end)
-    return TwoSided(front=Openpbr()) if source is None else material(graph, source[0], name)
+    return Openpbr() if source is None else _front(graph, source[0], name)
 
 
 def _values(graph: Graph, node: Node) -> dict[str, Any] | None:
