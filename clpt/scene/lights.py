@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
@@ -63,6 +63,7 @@ class Light(Kind):
     """
 
     reach: ClassVar[Reach] = "placed"
+    only_light_paths: ClassVar[bool] = False  # no path from the camera finds it
     falloff = True  # irradiance falls with the distance
     two_sided = False
     visible = True
@@ -170,7 +171,10 @@ def _grey(emitted: object) -> float | None:
     return emitted.r if isinstance(emitted, RGBIlluminant) and alike else None
 
 
-def with_emission(light: Light, area: float = 0.0) -> Light:
+_L = TypeVar("_L", bound=Light)
+
+
+def with_emission(light: _L, area: float = 0.0) -> _L:
     """Return a light whose emission says all that its temperature and its strength say.
 
     area: of the shape that it is on [m^2]. Raises SceneError for a light that is dark.
@@ -225,6 +229,7 @@ class DirectionalArea(PoweredLamp):
     """
 
     reach = "surface"
+    only_light_paths = True
 
     irradiance: Textured = emission(
         1.0, "through a surface across the beam", "W m^-2 nm^-1", textured=True

@@ -6,7 +6,7 @@ A look changes no scene: it makes another one of it for the renderers.
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -89,7 +89,10 @@ class Look:
         return dataclasses.replace(film, **changes) if changes else film
 
 
-def with_spectrum(light: Light, lamp: str) -> Light:
+_L = TypeVar("_L", bound=Light)
+
+
+def with_spectrum(light: _L, lamp: str) -> _L:
     """Return a light with a lamp's spectrum and its own luminance; textures and images stay."""
     changes: dict[str, Any] = {}
     given = fields_of(light)

@@ -28,6 +28,7 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("materials/film_stack.cl#?*",),
     ("materials/shading_frame.cl*", "media/phase.cl#frame"),
     ("lights/receiver.cl#kept*",),
+    ("lights/light.cl#by_power", "lights/light_tree.cl"),
     ("cameras/first_ray.cl", "cameras/first_ray.cl#weighted"),
     ("media/bodies.cl#vertex", "media/vertex_media.cl*"),
     ("media/vertex_ways.cl#bodies", "media/vertex_ways.cl#media"),

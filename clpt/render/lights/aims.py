@@ -14,7 +14,6 @@ from clpt.geometry import shape_records
 from clpt.render.geometry.find import Geometry
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import materials as mt
-from clpt.scene.params import fields_of
 
 AIMED = 0.7  # share of the light paths that aim
 MOST = 32  # spheres
@@ -59,26 +58,13 @@ def is_sharp(material: mt.Material, below: float = SHARP) -> bool:
     A coat over a diffuse base does not count, nor does a material that ends light paths. below:
     the roughness alpha up to which a rough material counts.
     """
-    if isinstance(material, mt.NormalMapped) or not material.reversible:
+    if not material.reversible:
         return False
-    if isinstance(material, mt.COMPOSITES):
-        return any(is_sharp(part, below) for _, part in mt.inner(material))
+    if material.is_composite:
+        return any(is_sharp(part, below) for part in material.shared_parts.values())
     if material.delta:
         return not material.is_null
-    return _roughness(material) < below
-
-
-def _roughness(material: mt.Material) -> float:
-    """Return the least alpha of a metal or a transmissive material, 1 of others and of images."""
-    if isinstance(material, (mt.RoughDielectric, mt.RoughConductor, mt.CoatedConductor)):
-        alphas = material.alpha_u, material.alpha_v
-        return min((v for v in alphas if isinstance(v, (int, float))), default=1.0)
-    values = fields_of(material)
-    shares = [values.get(name, 0.0) for name in ("metallic", "spec_trans", "transmission")]
-    roughness = values.get("roughness", 1.0)
-    if not isinstance(roughness, (int, float)) or all(share == 0.0 for share in shares):
-        return 1.0
-    return roughness**2
+    return material.least_alpha < below
 
 
 def sharp_pieces(

@@ -28,7 +28,7 @@ from clpt.render.records.lights import ALONG, BOTH, FRONT, KINDS, UNSEEN, LightF
 from clpt.render.records.lowering_cache import content
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
-from clpt.scene.lights import Light, PoweredLamp
+from clpt.scene.lights import Light
 from clpt.scene.params import fields_of
 from clpt.scene.texture_values import mean
 
@@ -161,7 +161,7 @@ def _volume_rows(word: int, part: BrickLights | BodyLight, encoder: Encoder) -> 
 def _emitter_rows(emitter: Emitter, encoder: Encoder) -> np.ndarray:
     shape = emitter.shape
     emission = shape.emission
-    assert isinstance(emission, PoweredLamp)
+    assert emission is not None
     value = fields_of(emission)[emission.emission_name]
     radiance = encoder.store.append("light_params", encoder.emission_words(value))
     kind = "triangle"

@@ -27,7 +27,7 @@ from clpt.render.records.lights import INFINITE
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
 from clpt.scene import lights
-from clpt.scene.lights import Light, PoweredLamp
+from clpt.scene.lights import Light
 from clpt.scene.media import Medium
 from clpt.scene.params import fields_of, params
 from clpt.scene.roles import EMISSION
@@ -168,7 +168,7 @@ def _of_volume(part: BrickLights | BodyLight) -> Source:
 def _of_emitter(emitter: Emitter, look: Look) -> Source:
     shape, cache = emitter.shape, look.cache
     emission = shape.emission
-    assert isinstance(emission, PoweredLamp)
+    assert emission is not None
     both = emission.two_sided
     value = fields_of(emission)[emission.emission_name]
     strength = emission.extent(1.0)  # power of a square metre whose emission is 1

@@ -21,12 +21,10 @@ from clpt.records import DENSITY_SIZES
 from clpt.render.film.colour import sensor
 from clpt.render.scene_index import SceneIndex
 from clpt.scene.integrators import Film
-from clpt.scene.materials import Material
-from clpt.scene.media import Dyed
+from clpt.scene.materials import Material, parts
 from clpt.scene.params import fields_of, params
-from clpt.scene.phases import Reradiating
 from clpt.scene.roles import EMISSION
-from clpt.scene.textures import Texture
+from clpt.scene.texture_values import is_texture
 from clpt.spectra import RGB, RGBIlluminant, Spectrum
 from clpt.spectra.reradiation import Reradiation
 from clpt.spectra.spectrum import d65, gridded
@@ -147,22 +145,18 @@ def _glow(index: SceneIndex, nodes: Floats) -> tuple[Floats, Floats]:
     absorbed = np.linspace(film.lambda_min, film.lambda_max, cells + 1)
     matrices = {id(m): m for shape in index.shapes for m in _fluorescent(shape.material)}
     for medium in (part for whole in index.media for part in whole.parts):
-        phases = [leaf.reradiation for leaf in medium.phase.leaves if isinstance(leaf, Reradiating)]
-        phases += [medium.dye] if isinstance(medium, Dyed) else []
-        matrices |= {id(m): m for m in phases if m is not None}
+        dyes = (medium.dye, *(leaf.reradiation for leaf in medium.phase.leaves))
+        matrices |= {id(m): m for m in dyes if m is not None}
     total = np.zeros((len(nodes), len(absorbed)))
     for matrix in matrices.values():
         total += (absorbed[1] - absorbed[0]) * matrix.sample(nodes[:, None], absorbed[None, :])
     return total, absorbed
 
 
-def _fluorescent(material: object) -> Iterator[Reradiation]:
-    """Yield the reradiation matrices of a material and of those inside it."""
-    for value in fields_of(material).values() if isinstance(material, Material) else ():
-        if isinstance(value, Reradiation):
-            yield value
-        elif isinstance(value, Material):
-            yield from _fluorescent(value)
+def _fluorescent(material: Material) -> Iterator[Reradiation]:
+    """Yield the reradiation matrices of a material and of the materials inside it."""
+    for part in parts(material):
+        yield from (v for v in fields_of(part).values() if isinstance(v, Reradiation))
 
 
 def emissions(index: SceneIndex) -> Iterator[Spectrum]:
@@ -186,7 +180,7 @@ def emissions(index: SceneIndex) -> Iterator[Spectrum]:
 
 def _emitted(value: Any) -> Spectrum:
     """Return an emission as a spectrum; a texture's mean."""
-    if isinstance(value, Texture):
+    if is_texture(value):
         return _mean(fields_of(value).get("image"), f"{value.kind}.image")
     return RGBIlluminant(value.r, value.g, value.b) if isinstance(value, RGB) else value
 
