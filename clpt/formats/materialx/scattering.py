@@ -112,7 +112,7 @@ def _dielectric(graph: Graph, node: Node) -> dict[str, Any]:
     return {**values, "transmission_weight": 1.0, "transmission_color": tint}
 
 
-def _metal(color: Any, edge: Any, graph: Graph, node: Node) -> dict[str, Any]:
+def _metal(color: object, edge: object, graph: Graph, node: Node) -> dict[str, Any]:
     return {
         "base_metalness": 1.0,
         "base_color": color,
