@@ -40,6 +40,7 @@ class Content:
     shapes: list[tuple[Usd.Prim, Shape, Matrix]] = field(default_factory=list)
     lights: list[tuple[Usd.Prim, Matrix]] = field(default_factory=list)
     cameras: list[Usd.Prim] = field(default_factory=list)
+    volumes: list[Usd.Prim] = field(default_factory=list)
     copies: list[tuple[Content, Floats]] = field(default_factory=list)
 
     def flat(self) -> Content:
@@ -76,7 +77,9 @@ def content(
     if depth > DEEPEST:
         raise document.error("instances are nested too deeply", root.GetPath())
     prims = walk.shown(document, root, defined=base is None)
-    whole = Content(cameras=prims["cameras"])
+    whole = Content(cameras=prims["cameras"], volumes=prims["volumes"])
+    for prim in prims["volumes"] if base is not None else ():
+        document.warn("volumes of prototypes are left out", prim.GetPath())
 
     def placement(prim: Usd.Prim) -> Matrix:
         matrix = document.placement(prim)
