@@ -24,8 +24,9 @@ from rich.table import Table
 import clpt
 from bench import machine
 from bench.cluster import processor_time
+from clpt.cli.display import Lines
 from clpt.cli.files.checkpoints import PERIOD, Checkpoints, path_of
-from clpt.cli.opening.factories import DEVICE_SECONDS
+from clpt.cli.opening import DEVICE_SECONDS
 from clpt.cluster import processes
 from clpt.cluster.cluster_renderer import ClusterRenderer
 from clpt.render.film import film_file
@@ -108,7 +109,7 @@ def compare(size: tuple[int, int], period: float, rounds: int, folder: Path) -> 
             without = passes(renderer, samples, count, lambda: None)
             renderer.reset().wait()
             saving = Checkpoints(
-                renderer, path_of(target, (target,)), period, False, [target], print
+                renderer, path_of(target, (target,)), period, False, [target], Lines()
             )
             began = time.perf_counter()
             with_them = passes(renderer, samples, count, saving.after_pass)
@@ -146,7 +147,7 @@ def compare_on_cluster(
                 before, saving = processor_time(started), None
                 if saves:
                     saving = Checkpoints(
-                        renderer, path_of(target, (target,)), period, False, [target], print
+                        renderer, path_of(target, (target,)), period, False, [target], Lines()
                     )
                 renderer.run(samples, after)
                 if saving is not None:

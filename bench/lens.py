@@ -57,7 +57,7 @@ def rate(on: device.Device, lens: Lens, lanes: int) -> float:
     files = {
         "generated/scene.cl": scene_text(),
         "generated/spectrum.cl": '#include "spectra/spectral.cl"\n',
-        "generated/spectrum_read.cl": '#include "spectra/spectral_read.cl"\n',
+        "generated/spectrum_read.cl": '#include "spectra/spectral.cl#read"\n',
         "generated/camera.cl": stages.camera_text(camera),
         "bench": MAIN,
     }

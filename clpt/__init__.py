@@ -34,10 +34,11 @@ if TYPE_CHECKING:
     from clpt.formats.mitsuba.dicts import ScalarTransform4f
     from clpt.images import read as read_image
     from clpt.images import write as write_image
-    from clpt.images.colour.view import View
+    from clpt.images.colour import View
     from clpt.images.spectral_exr import SpectralImage
     from clpt.images.spectral_exr import read as read_spectral
     from clpt.images.spectral_exr import write as write_spectral
+    from clpt.instruments import Measurement, measure
     from clpt.rays import Accel, AllHits, Hits, InstancedAccel
     from clpt.render.film.denoised_picture import DenoisedPicture
     from clpt.render.film.layer_channels import write_layers
@@ -56,7 +57,7 @@ logging.getLogger("clpt").addHandler(_Cleaning())  # quiet until the program ask
 _HOMES = {  # the module of each name, and what it is called there
     "Budget": ("files.budget", "Budget"),
     "MultiRenderer": ("cluster.multi_renderer", "MultiRenderer"),
-    "View": ("images.colour.view", "View"),
+    "View": ("images.colour", "View"),
     "ClptError": ("errors", "ClptError"),
     "ClusterError": ("errors", "ClusterError"),
     "DeviceError": ("errors", "DeviceError"),
@@ -72,6 +73,8 @@ _HOMES = {  # the module of each name, and what it is called there
     "read_image": ("images", "read"),
     "write_image": ("images", "write"),
     "render": ("render.one_call", "render"),
+    "measure": ("instruments", "measure"),
+    "Measurement": ("instruments", "Measurement"),
     "Accel": ("rays", "Accel"),
     "AllHits": ("rays", "AllHits"),
     "Hits": ("rays", "Hits"),
@@ -121,10 +124,10 @@ class _Front(ModuleType):
 
 def _give_widgets() -> None:
     """Let renderers have widgets: they know nothing of who shows their pictures."""
-    from clpt.render.pictures import DevicePictures
+    from clpt.render.resumable import ResumableRenderer
     from clpt.view.notebook import widget
 
-    DevicePictures._make_widget = widget
+    ResumableRenderer._make_widget = widget
 
 
 def _give_pictures() -> None:
@@ -165,6 +168,7 @@ __all__ = [
     "Hits",
     "InstancedAccel",
     "KernelBuildError",
+    "Measurement",
     "MemoryBudgetError",
     "MultiRenderer",
     "Progress",
@@ -181,6 +185,7 @@ __all__ = [
     "kernel_source",
     "load",
     "load_dict",
+    "measure",
     "read_image",
     "read_spectral",
     "render",

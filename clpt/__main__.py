@@ -7,12 +7,12 @@ import sys
 from collections.abc import Sequence
 
 from .cli import cli
-from .cli.process import allocator, failures, stopping, streams
+from .cli.process import allocator, failures, stopping, terminal
 
 
 def main() -> None:
     """Run the command line and leave with its exit status."""
-    streams.make_safe()
+    terminal.make_safe()
     allocator.return_large_blocks()
     allocator.collect_later()
     # PoCL compiles a kernel once for its binary, and once more for each size of groups, if it may

@@ -87,7 +87,7 @@ HIT = Record(
     side=("real", "of a triangle: length that counts for what float32 rounds at the hit [m]"),
     prim=("integer", "primitive; -1: nothing was hit"),
     shape=("integer", "row of the shape in `shapes`"),
-    material=("integer", "material word of the hit side, see kernels/shapes/surface_flags.cl"),
+    material=("integer", "material word of the hit side, see kernels/shapes/surface.cl"),
     instance=("integer", "1 + row in `instances`; 0: none"),
 )
 

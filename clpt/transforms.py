@@ -153,6 +153,16 @@ def is_singular(matrix: ArrayLike) -> bool:
     return bool(abs(np.linalg.det(linear / lengths)) < SINGULAR_BELOW)
 
 
+def rigid(matrix: ArrayLike) -> Matrix:
+    """Return a transform without its scale: the nearest rotation, and the translation, (4, 4)."""
+    affine = np.asarray(matrix, np.float64)
+    u, _, v = np.linalg.svd(affine[:3, :3])
+    nearest = np.eye(4)
+    nearest[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
+    nearest[:3, 3] = affine[:3, 3]
+    return nearest
+
+
 def flips_handedness(matrix: ArrayLike) -> bool:
     """Whether the transform mirrors space, so that the winding of triangles is reversed."""
     return bool(np.linalg.det(np.asarray(matrix, np.float64)[:3, :3]) < 0.0)

@@ -14,7 +14,7 @@ TARGETS = ("nvptx64-nvidia-nvcl", "amdgcn-amd-amdhsa", "spir64-unknown-unknown")
 LINE = re.compile(r'^#line \d+ "', re.MULTILINE)
 OWNER = re.compile(r"(\d+)\.cl[/:]")
 DRIVERS = ("-finclude-default-header", "-fdeclare-opencl-builtins")  # what a driver declares
-OURS = ("-include", "opencl-c-base.h")  # types alone: for `clpt.device.declarations`
+OURS = ("-include", "opencl-c-base.h")  # types alone: for `clpt.device.building`
 LANGUAGE = ("-x", "cl", "-cl-std=CL1.2")
 FLAGS = (
     *(*LANGUAGE, "-fsyntax-only", "-Wall", "-Werror"),

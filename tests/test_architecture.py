@@ -43,10 +43,12 @@ MAY_IMPORT = {
     "formats": BASE | {"lenses", "geometry", "scene"},
     "mie": BASE | {"scene"},
     "testing": BASE | {"scene", "device", "render"},
+    "instruments": RENDERS,
     "view": RENDERS,
     "cluster": RENDERS,
     "bench": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},
-    "cli": RENDERS | {"lenses", "geometry", "mie", "bvh", "view", "cluster", "bench"},
+    "cli": RENDERS
+    | {"lenses", "geometry", "mie", "bvh", "view", "cluster", "bench", "instruments"},
     "__main__": {"cli"},
 }
 OPENCL = {"device", "bvh", "denoise", "rays", "render"}  # only these import pyopencl
@@ -58,7 +60,8 @@ FLOORS = (
 )  # fmt: skip
 # clpt/cli/<room>: the same; commands stand on top of all.
 FLOORS_OF_COMMANDS = (
-    {"process"}, {"printing", "options"}, {"opening"}, {"files"}, {"plots"}, {"render", "view"},
+    {"process"}, {"display", "console", "options"}, {"opening"}, {"files"}, {"plots"},
+    {"render", "view"},
 )  # fmt: skip
 # What kinds share, by what a reader looks for.
 SHARED = {
@@ -67,7 +70,7 @@ SHARED = {
     "transport/photons",
 }  # fmt: skip
 KINDS = {
-    "cameras/kinds", "lights/emission", "lights/kinds", "materials/kinds", "media/kinds",
+    "cameras/kinds", "lights/kinds", "materials/kinds", "media/kinds",
     "samplers/kinds", "shapes/kinds", "textures/kinds",
 }  # fmt: skip
 # kernels/<folder>: the folders that its files may include; generated text stands between them.

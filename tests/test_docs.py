@@ -363,7 +363,7 @@ LIMITS = (  # on the page, and where the code has them
     ("at most 300 characters", "clpt.errors", "LONGEST", 300),
     ("| 65 536 bytes |", "clpt.formats.meshes.ply_tables", "LONGEST_HEADER", 65536),
     ("| 65 536 corners |", "clpt.formats.meshes.ply", "MOST_CORNERS", 65536),
-    ("2^29 pixels", "clpt.images.sizes", "PIXELS", 1 << 29),
+    ("2^29 pixels", "clpt.images.checks", "PIXELS", 1 << 29),
     ("| 64 |", "clpt.formats.mitsuba.xml", "MAX_NESTING", 64),
     ("| 16 |", "clpt.formats.mitsuba.xml", "MAX_INCLUDES", 16),
     ("1000 parts", "clpt.scene.params", "MOST_PARTS", 1000),

@@ -14,7 +14,7 @@ BOUNDS = {
     "functions over 60 lines": 0,
     "functions over 40 lines": 12,
     "lines of the longest function": 56,
-    "functions with 8 or more parameters": 4,
+    "functions with 8 or more parameters": 5,
     "parameters of a function, most": 10,
     "#if, #ifdef, #ifndef and #elif in kernels": 170,
     "lines of the longest kernel function": 50,
@@ -28,12 +28,12 @@ BOUNDS = {
     "rooms in circles of imports": 0,
     "stays of a scene from render() to the tables": 37,
     "rooms of these stays": 20,
-    "lines of Python": 88_700,
-    "lines of OpenCL": 21_500,
+    "lines of Python": 94_000,
+    "lines of OpenCL": 23_000,
     "words of README.md": 1_200,
     "docstrings that begin with What, Of, How, Those, The same": 0,
     "lines of accumulate of Cornell's box": 205,
-    "lines of shade_diffuse of Cornell's box": 1_800,
+    "lines of shade_diffuse of Cornell's box": 1_760,
 }
 SHOWN = 12  # places of a figure that has risen
 

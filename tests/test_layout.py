@@ -30,7 +30,7 @@ def run(on: device.Device, text: str, lanes: int, *arrays: np.ndarray) -> None:
         "probe.cl": text,
         "generated/scene.cl": scene_text(),
         "generated/spectrum.cl": '#include "spectra/spectral.cl"\n',
-        "generated/spectrum_read.cl": '#include "spectra/spectral_read.cl"\n',
+        "generated/spectrum_read.cl": '#include "spectra/spectral.cl#read"\n',
     }
     defines = {"LANES": lanes, "SPECTRA_SIZE": 471, "SPECTRA_STEP": "1.0f"}
     defines["SLAB_BLOCK"] = SLAB_BLOCK if lanes == 1 else 0

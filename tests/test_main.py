@@ -137,7 +137,7 @@ def test_side_tools_do_not_weigh_on_a_render(tmp_path):
 import sys
 from clpt.__main__ import run
 assert run(sys.argv[1:]) == 0
-side = ("clpt.mie", "clpt.lenses.spots", "clpt.images.tev", "clpt.cli.plots", "clpt.view")
+side = ("clpt.mie", "clpt.lenses.tracing", "clpt.images.tev", "clpt.cli.plots", "clpt.view")
 side += ("clpt.cluster", "clpt.bench", "clpt.testing", "matplotlib", "scipy", "trimesh")
 side += ("dask", "IPython")
 assert "clpt.render.renderer" in sys.modules and not {*side} & sys.modules.keys()

@@ -15,6 +15,7 @@ import pytest
 
 import clpt
 from clpt import bvh, device
+from clpt.device import source
 from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.scene import Film, Scene, lights, materials, shapes
 from clpt.scene.cameras import Perspective
@@ -60,15 +61,15 @@ def builders() -> list[str]:
     """What builds trees, and what rays of applications are traced with."""
     made = []
     for path in sorted((ROOT / "kernels" / "bvh").glob("*.cl")):
-        text = path.read_text(encoding="utf-8")
-        if not re.search("^kernel ", text, re.MULTILINE) or path.stem == "place":
-            continue
-        for layout in bvh.TREES if "generated/" in text else ("",):
-            virtual = {"generated/instance_traversal.cl": ""}
-            if layout:
-                all_hits = path.stem == "query_all_hits"
-                virtual["generated/layout.cl"] = bvh.traversal_text(layout, all_hits)
-            made.append(device.assemble(f"bvh/{path.name}", virtual).text)
+        for step, part in source.sections(ROOT / "kernels", f"bvh/{path.name}").items():
+            if not re.search("^kernel ", part.text, re.MULTILINE) or path.stem == "place":
+                continue
+            for layout in bvh.TREES if "generated/" in part.text else ("",):
+                virtual = {"generated/instance_traversal.cl": ""}
+                if layout:
+                    virtual["generated/layout.cl"] = bvh.traversal_text(layout, "all_hits" in step)
+                root = f"bvh/{path.name}{step}" if step != "#" else f"bvh/{path.name}"
+                made.append(device.assemble(root, virtual).text)
     return made
 
 

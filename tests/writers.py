@@ -15,13 +15,14 @@ import numpy as np
 
 import clpt
 from clpt import images, measured, scene
+from clpt.cli.display import Display
 from clpt.cli.files import checkpoints
 from clpt.cli.render import video
 from clpt.files import output_files
 from clpt.formats.meshes import spheres_curves
 from clpt.formats.native import motion
 from clpt.images import spectral_exr
-from clpt.measured import tensor_file
+from clpt.measured import measurement
 from clpt.render.film import film_file
 from clpt.scene.motion import Deformation
 from tests.render.film.test_film_file import made as film
@@ -48,9 +49,11 @@ def spectral(path: Path) -> None:
 def checkpoint(path: Path) -> None:
     """Write one as a render does; what it could not do is an error."""
     said: list[str] = []
+    shown = Display()
+    shown.note = said.append
     kept = film((1, 10, 4, 5))
     renderer = SimpleNamespace(_hold=lambda: None, saved_film=lambda held: kept)
-    writer = checkpoints.Checkpoints(renderer, path, 1e9, False, (), said.append)
+    writer = checkpoints.Checkpoints(renderer, path, 1e9, False, (), shown)
     try:
         writer.save(stopped=False)
     finally:
@@ -73,7 +76,7 @@ def plot(path: Path) -> None:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    from clpt.cli.plots import pixels as plots
+    from clpt.cli import plots
 
     same = {"SOURCE_DATE_EPOCH": "0"}
     with rc_context({"svg.hashsalt": "same"}), mock.patch.dict(os.environ, same):
@@ -113,7 +116,10 @@ WRITERS: dict[str, tuple[str, Writer]] = {
         ),
     ),
     "merl": ("a.binary", merl),
-    "tensors": ("a.bsdf", lambda path: tensor_file.write(path, {"points": POINTS, "n": NOISE})),
+    "tensors": (
+        "a.bsdf",
+        lambda path: measurement.write_tensors(path, {"points": POINTS, "n": NOISE}),
+    ),
     "plot png": ("a.png", plot),
     "plot svg": ("a.svg", plot),
     "plot pdf": ("a.pdf", plot),

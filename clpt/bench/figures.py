@@ -13,7 +13,7 @@ import numpy as np
 from clpt import device
 from clpt.device.stream import Timings
 
-SECONDS = "s"  # the only unit where less is better
+SECONDS = "s"
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,11 @@ class Figure:
             return 0.0
         low, high = np.percentile(self.rounds, (25, 75))
         return float((high - low) / 2 / self.value)
+
+    @property
+    def less_is_better(self) -> bool:
+        """Whether the figure is a time."""
+        return self.unit == SECONDS
 
     def refuse(self, *complaints: str) -> Figure:
         """Return a copy of this figure, refused if any complaint is not empty."""

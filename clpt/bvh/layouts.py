@@ -11,7 +11,7 @@ import pyopencl as cl
 
 from ..choices import Quality
 from ..records import TREE_BITS, TREE_SIZES
-from . import tree, wide
+from . import tree
 from .building import Building
 
 REINSERT_LIMIT = 10_000  # triangles; below, the program takes longer to load than it saves
@@ -112,10 +112,10 @@ def wide8(building: Building, mesh: Mesh) -> Packed:
     built = _binary_tree(building, mesh, _BLOCK, at_once=_BLOCK)
     if mesh.quality == "high" and mesh.count >= REINSERT_LIMIT:
         built = tree.reinserted(building, built)
-    chosen = wide.collapse(building, built)
-    figures = wide.figures(building, chosen)
+    chosen = tree.collapse(building, built)
+    figures = tree.figures(building, chosen)
     nodes, blocks = building.allocate(256 * figures.nodes), building.allocate(352 * figures.leaves)
-    wide.write_nodes(building, chosen, nodes)
+    tree.write_nodes(building, chosen, nodes)
     source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
     leaves = {"nodes": built.nodes, "items": built.items, "leaf_roots": chosen.leaf_roots}
     building.run_each(
@@ -158,15 +158,15 @@ def wide8_shapes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
 
 def _wide_over_boxes(
     building: Building, count: int, boxes: cl.Buffer, spare: bool = False
-) -> tuple[wide.Collapse, wide.Figures, dict[str, cl.Buffer]]:
+) -> tuple[tree.Collapse, tree.Figures, dict[str, cl.Buffer]]:
     """Return a wide tree and its buffers; spare: leave room for later trees over the boxes."""
     items, parts = tree.items_of_boxes(building, count, boxes)
-    chosen = wide.collapse(building, tree.over(building, count, items, parts, 1))
-    figures = wide.figures(building, chosen)
+    chosen = tree.collapse(building, tree.over(building, count, items, parts, 1))
+    figures = tree.figures(building, chosen)
     room = figures.nodes + figures.nodes // 4 + 8 if spare else figures.nodes
     nodes, indices = building.allocate(256 * room), building.allocate(4 * count)
-    wide.write_nodes(building, chosen, nodes)
-    wide.write_indices(building, chosen, indices)
+    tree.write_nodes(building, chosen, nodes)
+    tree.write_indices(building, chosen, indices)
     return chosen, figures, {"nodes": nodes, "indices": indices}
 
 
@@ -195,14 +195,14 @@ def _compact_nodes(
     building: Building, built: tree.Tree, leaves: cl.Buffer, tags: cl.Buffer | None
 ) -> tuple[cl.Buffer, Part, dict[str, float]]:
     """Fill in leaves, and return compressed nodes without boxes, for `refit_nodes`."""
-    chosen = wide.collapse(building, built)
-    figures = wide.figures(building, chosen)
+    chosen = tree.collapse(building, built)
+    figures = tree.figures(building, chosen)
     nodes = building.allocate(_round_up(80 * figures.nodes))
     common = {"places": building.allocate(8 * figures.nodes), "compact": nodes, "tags": tags}
     common |= {"nodes": built.nodes, "items": built.items, "leaves": leaves}
     common |= {"costs": chosen.costs, "roots": chosen.roots, "firsts": chosen.firsts}
     for begin, count in reversed(figures.steps):
-        building.run_each("bvh/compact_pack.cl", "compact_nodes", count, begin=begin, **common)
+        building.run_each("bvh/collapse.cl#compact", "compact_nodes", count, begin=begin, **common)
     bounds = building.allocate(32 * figures.nodes)
     part = Part(built.count, built.reach(building), figures.steps, bounds=bounds)
     return nodes, part, figures.stats
@@ -247,8 +247,8 @@ BOX_LAYOUTS: dict[str, Callable[[Building, int, cl.Buffer], Packed]] = {
 
 # Kernel files that replace others on devices without vectors.
 ALONE: dict[str, tuple[str, ...]] = {
-    "bvh/mask8.cl": ("bvh/mask8_bits.cl",),
-    "bvh/wide8_waiting.cl": ("bvh/wide8_levels.cl",),
+    "bvh/mask8.cl": ("bvh/mask8.cl#bits",),
+    "bvh/wide8_stack.cl": ("bvh/wide8_stack.cl#levels",),
 }
 
 TREES = tuple(name for name in LAYOUTS if name in BOX_LAYOUTS)  # all but brute force
@@ -264,7 +264,7 @@ def traversal_text(layout: str, all_hits: bool = False) -> str:
 
     all_hits: the traversal that finds all triangles that a ray meets instead, LAYOUT(all_hits).
     """
-    file = f"bvh/{layout}{'_all_hits' * all_hits}.cl"
+    file = f"bvh/{layout}.cl{'#all_hits' * all_hits}"
     return f'#include "{file}"\n#define LAYOUT(verb) {layout}_##verb\n'
 
 

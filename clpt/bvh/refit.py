@@ -12,7 +12,6 @@ from collections.abc import Iterable
 import pyopencl as cl
 
 from . import tree as trees
-from . import wide
 from .build import Bvh
 from .building import Building
 from .layouts import SHAPES_DEPTH, SHAPES_LEAF, refit_nodes
@@ -99,9 +98,9 @@ def _adopt_binary(building: Building, tree: Bvh, built: trees.Tree) -> None:
 def _adopt_wide(building: Building, tree: Bvh, built: trees.Tree) -> None:
     """Enqueue copies of a new binary and wide tree over the old trees, if there is room."""
     part, nodes = tree.parts[0], tree.buffers["nodes"]
-    chosen, indices = wide.collapse(building, built), building.allocate(4 * tree.count)
-    wide.write_nodes(building, chosen, nodes)
-    wide.write_indices(building, chosen, indices)
+    chosen, indices = trees.collapse(building, built), building.allocate(4 * tree.count)
+    trees.write_nodes(building, chosen, nodes)
+    trees.write_indices(building, chosen, indices)
     adopted = [built.nodes, built.ranges, indices, chosen.totals]
     former = [part.binary, part.ranges, tree.buffers["indices"], part.totals]
     for new, old in zip(adopted, former, strict=True):

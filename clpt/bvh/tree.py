@@ -1,20 +1,30 @@
-"""The binary tree of all layouts, built on the device by kernels/bvh/build.cl."""
+"""The binary tree of all layouts, built on the device by kernels/bvh/build.cl.
+
+For fast builds kernels/bvh/curve.cl cuts leaves from a space-filling curve. kernels/bvh/collapse.cl
+collapses a tree to 8-wide nodes.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pyopencl as cl
+from numpy.typing import NDArray
 
-from ..records import TREE_SIZES
-from . import curve
+from ..records import CURVE_KEYS, TREE_SIZES
 from .building import Building
 
 _BUILD, _PACK, _REINSERT = "bvh/build.cl", "bvh/pack.cl", "bvh/reinsert.cl"
+_COLLAPSE, _CURVE = "bvh/collapse.cl", "bvh/curve.cl"
 _DEPTH = TREE_SIZES["depth"]
-_RUN = 2048  # items that a work-item bounds
+_RUN = 2048  # items that a work-item bounds; of a curve it also cuts them
+_DIGIT, _INDEX = CURVE_KEYS["bits"], CURVE_KEYS["index"]
+_CODE = 33  # bits of a key above the index
+_CHUNKS = 4  # of a compute unit, for the sort
 _SUBTREES = 64  # of a compute unit, for an even load
 _CPU_UNITS = 16  # of any CPU: the tree depends on this number by the order of reinsertion
 _PASSES = 4  # of reinsertion; each further pass costs a build 2 % and saves rays less
@@ -109,9 +119,9 @@ def over_runs(
     building: Building, count: int, items: cl.Buffer, parts: cl.Buffer, leaf_size: int
 ) -> Tree:
     """Build like `over`, with runs of a space-filling curve as leaves."""
-    n, ordered, runs, parts = curve.runs(building, count, items, parts, leaf_size)
+    n, ordered, leaves, parts = runs(building, count, items, parts, leaf_size)
     cut = {"leaf_size": 1, "at_once": 0, "runs": 1, "depth": _DEPTH}
-    tree = _divided(building, n, runs, parts, cut)
+    tree = _divided(building, n, leaves, parts, cut)
     return replace(tree, items=ordered)
 
 
@@ -133,3 +143,149 @@ def _divided(
         building.run(_BUILD, "build_level", 1 << level, begin=(1 << level) - 1, **shared)
     building.run(_BUILD, "build_subtree", 1 << levels, begin=(1 << levels) - 1, **shared)
     return Tree(count, items, nodes, ranges, extents, levels)
+
+
+@dataclass(frozen=True)
+class Collapse:
+    """The binary nodes that become wide nodes and leaves, on the device.
+
+    costs, occlusion: of the binary nodes; roots: binary nodes that become wide nodes; firsts: a
+    wide node's first child and first leaf; leaf_roots: binary nodes that become wide leaves;
+    totals: the numbers of both, and the wide tree's figures.
+    """
+
+    built: Tree
+    costs: cl.Buffer
+    occlusion: cl.Buffer
+    roots: cl.Buffer
+    firsts: cl.Buffer
+    leaf_roots: cl.Buffer
+    totals: cl.Buffer
+
+
+@dataclass(frozen=True)
+class Figures:
+    """The numbers of a wide tree's nodes and leaves.
+
+    steps: (begin, count) of the nodes of each level, the lowest first; stats: see `Bvh`.
+    """
+
+    nodes: int
+    leaves: int
+    steps: tuple[tuple[int, int], ...]
+    stats: dict[str, float]
+
+
+def collapse(building: Building, built: Tree) -> Collapse:
+    """Enqueue the choice and numbering of wide nodes; the host does not wait."""
+    n = built.count
+    costs, occlusion = building.allocate(64 * n), building.allocate(8 * n)
+    below = {"nodes": built.nodes, "costs": costs, "occlusion": occlusion}
+    parts = {"items": built.items, "ranges": built.ranges, **below}
+    begin = (1 << built.levels) - 1
+    building.run(_COLLAPSE, "collapse_subtree", 1 << built.levels, begin=begin, **parts)
+    for level in reversed(range(built.levels)):
+        begin = (1 << level) - 1
+        building.run(_COLLAPSE, "collapse_level", 1 << level, begin=begin, **parts)
+
+    roots, firsts = building.allocate(4 * n), building.allocate(8 * n)
+    leaf_roots, totals = building.allocate(4 * n), building.allocate(4 * (4 + _DEPTH))
+    numbers = {"roots": roots, "firsts": firsts, "leaf_roots": leaf_roots, "totals": totals}
+    binary = {"nodes": built.nodes, "costs": costs, "count": 2 * n}
+    building.run(_COLLAPSE, "collapse_number", 1, **binary, **numbers)
+    return Collapse(built, costs, occlusion, roots, firsts, leaf_roots, totals)
+
+
+def figures(building: Building, chosen: Collapse) -> Figures:
+    """Wait and return the figures of a wide tree."""
+    words = building.read(chosen.totals, 4 + _DEPTH, np.uint32)
+    n_nodes, n_leaves, levels = words[:3].tolist()
+    starts = [*words[4 : 4 + levels].tolist(), n_nodes]
+    steps = tuple((begin, end - begin) for begin, end in pairwise(starts))[::-1]
+    cost = float(words[3:].view(np.float32)[0])
+    stats = {"nodes": n_nodes, "leaves": n_leaves, "depth": levels - 1, "cost": cost}
+    return Figures(n_nodes, n_leaves, steps, stats)
+
+
+def write_nodes(building: Building, chosen: Collapse, nodes: cl.Buffer) -> None:
+    """Enqueue writing of all wide nodes, or as many as the buffer holds."""
+    building.run_each(
+        _COLLAPSE, "collapse_nodes", nodes.size // 256, nodes=chosen.built.nodes,
+        costs=chosen.costs, occlusion=chosen.occlusion, roots=chosen.roots, firsts=chosen.firsts,
+        totals=chosen.totals, wide=nodes,
+    )  # fmt: skip
+
+
+def write_indices(building: Building, chosen: Collapse, indices: cl.Buffer) -> None:
+    """Enqueue the boxes of leaves with a box each; binary leaves get these numbers."""
+    built = chosen.built
+    leaves = {"nodes": built.nodes, "items": built.items, "leaf_roots": chosen.leaf_roots}
+    building.run_each(_COLLAPSE, "collapse_indices", built.count, indices=indices, **leaves)
+
+
+def runs(
+    building: Building, count: int, items: cl.Buffer, parts: cl.Buffer, leaf_size: int
+) -> tuple[int, cl.Buffer, cl.Buffer, cl.Buffer]:
+    """Cut items into leaves of at most `leaf_size` <= 8; wait for the number of leaves.
+
+    Returns it, the items in the leaves' order, an item for each leaf, and their extents.
+    """
+    keys = _sorted(building, count, items, parts)
+    stretches = -(-count // _RUN)
+    ordered, lengths = building.allocate(32 * count), building.allocate(count)
+    numbers = building.allocate(4 * (stretches + 1))
+    curve = {"count": count, "run": _RUN, "sorted": ordered, "lengths": lengths}
+    cut = {"items": items, "keys": keys, "leaf_size": leaf_size, "numbers": numbers}
+    building.run(_CURVE, "curve_cut", stretches, **curve, **cut)
+    building.run(_CURVE, "curve_scan", 1, numbers=numbers, rows=stretches, columns=1)
+    n = int(building.read(numbers, stretches + 1, np.uint32)[-1])
+    leaves, extents = building.allocate(32 * n), building.allocate(64 * stretches)
+    output = {"numbers": numbers, "runs": leaves, "extents": extents}
+    building.run(_CURVE, "curve_runs", stretches, **curve, **output)
+    return n, ordered, leaves, extents
+
+
+def _sorted(building: Building, count: int, items: cl.Buffer, parts: cl.Buffer) -> cl.Buffer:
+    """Return the items' keys in ascending order."""
+    whole, unused = building.allocate(64), building.allocate(16)
+    root = {"parts": parts, "n_parts": parts.size // 64, "ranges": unused, "extents": whole}
+    building.run(_BUILD, "build_root", 1, count=count, **root)
+    keys, others = building.allocate(8 * count), building.allocate(8 * count)
+    cells = _cells(building.read(whole, 16, np.float32)[8:])
+    cells["tables"] = building.upload(cells["tables"], np.uint64)
+    building.run_each(_CURVE, "curve_keys", count, items=items, keys=keys, **cells)
+    chunk = -(-count // (_CHUNKS * building.device.info.compute_units))
+    chunks = -(-count // chunk)
+    numbers = building.allocate(4 * ((chunks << _DIGIT) + 1))
+    chunked = {"count": count, "run": chunk, "numbers": numbers}
+    for shift in range(_INDEX, _INDEX + _CODE, _DIGIT):
+        building.run(_CURVE, "curve_count", chunks, keys=keys, shift=shift, **chunked)
+        building.run(_CURVE, "curve_scan", 1, numbers=numbers, rows=chunks, columns=1 << _DIGIT)
+        moved = {"keys": keys, "sorted": others}
+        building.run(_CURVE, "curve_move", chunks, shift=shift, **moved, **chunked)
+        keys, others = others, keys
+    return keys
+
+
+def _cells(span: NDArray[np.float32]) -> dict[str, Any]:
+    """Return the arguments of `curve_keys`, which encodes doubled centroids.
+
+    span: low corner and negated high corner of the doubled centroids, (8,). Each step halves a
+    cell's longest side; the first step is the code's highest bit (Vinkler, Bittner and Havran 2017,
+    "Extended Morton codes").
+    """
+    low = span[:3].astype(float)
+    size = np.maximum(-span[4:7].astype(float) - low, 0.0)
+    left, bits = size.copy(), np.zeros(3, int)
+    tables = np.zeros((3, 2, 256), np.uint64)
+    halved = []
+    for _ in range(_CODE):
+        axis = int(np.argmax(np.where(bits < 16, left, -1.0)))
+        left[axis] /= 2
+        bits[axis] += 1
+        halved.append((axis, bits[axis]))
+    for position, (axis, nth) in enumerate(reversed(halved)):
+        byte, bit = divmod(int(bits[axis] - nth), 8)
+        tables[axis, byte] |= (np.arange(256, dtype=np.uint64) >> bit & 1) << position
+    scale = 0.999999 * 2.0**bits / np.maximum(size, 1e-30)  # finite as a float32
+    return {"low": (*low, 0.0), "scale": (*scale, 0.0), "tables": tables}

@@ -11,23 +11,24 @@ import logging
 import click
 
 from ..errors import nearest
-from .options.verbosity import Handler, verbose_option
+from .options.records import Handler, verbose_option
 from .process import terminal
 
-COMMANDS = {  # with the first words of their help, for which nothing is imported
+COMMANDS = {  # with the first words of their help: the list of commands imports none of them
     "render": "Render each SCENE: a scene file, a mesh or a folder.",
     "view": "Show the scene file, mesh or folder SCENE in the browser, and let it be steered.",
     "merge": "Add FILMS, of `clpt render --samples FIRST:END -o NAME.film`, and write the picture.",
     "warm": "Compile the programs of SCENES into the caches, and render nothing.",
     "worker": "Render for the scheduler at ADDRESS, such as tls://192.168.1.5:8786, until it ends.",
     "cluster": "Render on several machines; see also `clpt worker`.",
-    "devices": "List the OpenCL devices, with the one that would be used and why.",
+    "devices": "List the OpenCL devices, and the choice among them.",
     "scenes": "List the scenes that come with clpt: path, size in pixels, what each shows.",
     "info": "Show what the file or folder SCENE holds, without rendering it.",
+    "measure": "Measure light in SCENE at points or along rays, with standard errors.",
     "inspect": "Show what the image or film FILE holds, and the values of its pixels.",
     "convert": "Write the image or film SOURCE as TARGET, in another format or for a screen.",
     "compare": "Measure how the image or film A differs from B.",
-    "kernels": "Write the OpenCL programs that render SCENE, one file each.",
+    "kernels": "Write the OpenCL programs that render SCENE, each to its file.",
     "mie": "Make the medium of spheres of RADIUS micrometres: fog, mist, milk.",
     "lens": "Describe LENS: a file (.dat, .zmx, .txt) or a name of the library.",
     "completion": "Let the TAB key of a SHELL complete clpt's commands, options and values.",

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from .options.verbosity import verbose_option
+from .options.records import verbose_option
 from .process import terminal
 
 
@@ -34,7 +34,7 @@ def start(host: str, port: int, keys: Path | None, verbose: int) -> int:
     machine commands of yours find it by themselves.
     """
     from ..cluster import processes
-    from ..cluster.keys import default_folder
+    from ..cluster.processes import default_folder
 
     def tell(address: str) -> None:
         keyed = "" if keys is None else f" --keys {keys}"

@@ -32,12 +32,12 @@ def compare(a: Path, b: Path, output: Path | None, most: float | None, as_json: 
     """
     locate(a)
     locate(b)
-    from .files import comparisons
+    from .files import image_tools
 
-    pair = comparisons.Pair.read(a, b)
+    pair = image_tools.Pair.read(a, b)
     if as_json:
-        terminal.write(comparisons.as_json(pair))
+        terminal.write(image_tools.as_json(pair))
     else:
-        terminal.say_lines(comparisons.as_text(pair))
+        terminal.say_lines(image_tools.as_text(pair))
     if output is not None:
-        terminal.say(comparisons.write(pair, output, most))
+        terminal.say(image_tools.write(pair, output, most))

@@ -15,7 +15,7 @@ from .options.values import Choice
 from .process import terminal
 
 SHELLS = ("bash", "zsh", "fish")
-VARIABLE = "_CLPT_COMPLETE"  # by which a shell asks clpt
+VARIABLE = "_CLPT_COMPLETE"  # a shell sets it to ask clpt
 
 
 @click.command()
@@ -27,9 +27,9 @@ def completion(ctx: click.Context, shell: str, printed: bool) -> None:
 
     The script is written to the user's folder for such scripts. It is in force in the next shell.
     """
-    made = get_completion_class(shell)
-    assert made is not None
-    script = made(ctx.find_root().command, {}, "clpt", VARIABLE).source()
+    completer = get_completion_class(shell)
+    assert completer is not None
+    script = completer(ctx.find_root().command, {}, "clpt", VARIABLE).source()
     if printed:
         terminal.write(script)
         return
@@ -61,7 +61,7 @@ def file_of(shell: str) -> Path:
 
 
 def advice(shell: str, path: Path) -> str:
-    """Return what the user has still to do."""
+    """Return the step that is left to the user."""
     if shell == "zsh":
         return f"put fpath+=({path.parent}) into ~/.zshrc, before compinit"
     needs = " with the package bash-completion" if shell == "bash" else ""

@@ -9,21 +9,22 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import SceneError
-from ..formats import errors_of, load, locate
-from .options.loading_options import loading_options
-from .options.scene_path import ScenePath
+from ..formats import errors_of, locate
+from .options.loading import loading_options
+from .options.scene_options import Loading
+from .options.values import ScenePath
 from .process import terminal
 
 if TYPE_CHECKING:
     from ..scene import Scene
 
 
-def read(scene: Path, variables: dict[str, Any]) -> Scene:
+def read_scene(scene: Path, loading: Loading) -> Scene:
     """Return the scene of a file. Raises SceneError behind the list of all its errors."""
     try:
-        return load(scene, **variables)
+        return loading.read(scene)
     except SceneError as error:
-        raise all_of(error, errors_of(locate(scene), **variables)) from None
+        raise all_of(error, errors_of(locate(scene), **loading.variables)) from None
 
 
 def all_of(first: SceneError, errors: list[SceneError]) -> SceneError:
@@ -52,7 +53,7 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
 
     contents: dict[str, Any]
     if is_film(scene):
-        from .files.film_contents import film_summary
+        from .files.image_contents import film_summary
 
         contents = film_summary(scene)
     elif scene.suffix.lower() in READERS:
@@ -60,7 +61,7 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
 
         contents = dict(read_contents(scene).facts)
     else:
-        loaded = read(scene, variables)
+        loaded = read_scene(scene, Loading(variables))
         from .files.scene_contents import summary, tidy
 
         contents = summary(loaded)
@@ -70,7 +71,7 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
         return
     from rich.table import Table
 
-    from .printing.console import output_console, shown
+    from .console import output_console, shown
 
     table = Table(show_header=False, title=shown(scene), title_justify="left")
     for name, value in contents.items():

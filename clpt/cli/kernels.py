@@ -1,4 +1,4 @@
-"""`clpt kernels`: the OpenCL sources that a scene is rendered with, or one launch of them."""
+"""`clpt kernels`: the OpenCL sources of a scene, or a single launch of them."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from clpt.files import output_files
 from ..choices import LAYOUTS, MODES, PICTURE_SCENES
 from ..errors import SceneError
 from ..formats import load, locate
-from .options.loading_options import loading_options
+from .options.loading import loading_options
 from .options.records import with_records
-from .options.scene_path import ScenePath
-from .options.values import Choice
+from .options.values import Choice, ScenePath
 from .process import terminal
 
 if TYPE_CHECKING:
@@ -26,17 +25,15 @@ FIRST = "first"  # in the place of a stage's name: the first that is wrong
 
 
 @dataclass(frozen=True)
-class Texts:
-    """The kind of device that texts are for: paths of a work-item, and trees."""
+class Programs:
+    """Programs to write.
+
+    lanes: paths of a work-item; layout: of trees; repro: a stage whose launch is written instead;
+    device: that runs the stage.
+    """
 
     lanes: str
     layout: str
-
-
-@dataclass(frozen=True)
-class Reproduction:
-    """The stage whose launch is written, if one is asked for, and where it runs."""
-
     repro: str | None
     device: str | None
 
@@ -63,66 +60,64 @@ class Reproduction:
 )  # fmt: skip
 @click.option("--device", help="Of --repro: index or part of the name of the device.")
 @loading_options
-@with_records(texts=Texts, reproduction=Reproduction)
+@with_records(programs=Programs)
 def kernels(
     scene: Path,
     folder: Path,
     mode: str | None,
-    texts: Texts,
-    reproduction: Reproduction,
+    programs: Programs,
     variables: dict[str, Any],
 ) -> None:
-    """Write the OpenCL programs that render SCENE, one file each.
+    """Write the OpenCL programs that render SCENE, each to its file.
 
     Each is a complete program for any OpenCL compiler. No device is needed. On a CPU a render has
-    their functions in one program. SCENE may be one of `clpt bench --list`.
+    their functions in a single program. SCENE may be a name of `clpt bench --list`.
     """
     plan = _opened(scene, mode, variables)
-    if reproduction.repro is not None:
-        _reproduce(plan, scene, folder, reproduction.repro, reproduction.device)
+    if programs.repro is not None:
+        _reproduce(plan, scene, folder, programs.repro, programs.device)
         return
-    _write_texts(plan, folder, texts)
+    _write_texts(plan, folder, programs)
 
 
-def _write_texts(plan: Scene, folder: Path, texts: Texts) -> None:
-    """Write the programs of a scene, one file each."""
+def _write_texts(plan: Scene, folder: Path, programs: Programs) -> None:
+    """Write each program of a scene to its file."""
     from clpt.render.flow.programs import film_sources, sources  # here: help needs no OpenCL
     from clpt.render.flow.scene_to_tables import lower
 
     features = lower(plan).features
     queued = len(features.materials.kinds) > 1
-    made = film_sources(features, texts.layout)
-    for own in features.passes:
-        label = "light_" if own is not features else ""
-        written = sources(own, texts.layout, int(texts.lanes), queued=queued)
-        made |= {f"{label}{name}": text for name, text in written.items()}
+    texts_by_name = film_sources(features, programs.layout)
+    for features_of_pass in features.passes:
+        label = "light_" if features_of_pass is not features else ""
+        written = sources(features_of_pass, programs.layout, int(programs.lanes), queued=queued)
+        texts_by_name |= {f"{label}{name}": text for name, text in written.items()}
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, source in made.items():
+        for name, source in texts_by_name.items():
             output_files.write_text(folder / f"{name}.cl", source.text)
     except OSError as error:
         raise SceneError(f"cannot be written: {error}", file=folder) from error
-    for name, source in made.items():
+    for name, source in texts_by_name.items():
         rows, files = source.text.count("\n"), len(source.files)
         terminal.say(f"{folder / name}.cl  {rows:,} lines from {files} files", err=False)
 
 
 def _opened(scene: Path, mode: str | None, variables: dict[str, Any]) -> Scene:
     """Return a scene of a file, or of the benchmark where there is no such file."""
-    own = str(scene) in PICTURE_SCENES and not scene.exists()
-    if not own:
+    built_in = str(scene) in PICTURE_SCENES and not scene.exists()
+    if not built_in:
         locate(scene)
-    from clpt.bench.picture_scenes import PICTURES  # here: help needs no OpenCL
-    from clpt.bench.scenes import build_scene, in_mode
+    from clpt.bench.scenes import PICTURES, build_scene, in_mode  # here: help needs no OpenCL
 
-    if own:
+    if built_in:
         return in_mode(build_scene(str(scene)), mode or PICTURES[str(scene)].mode)
     return in_mode(load(scene, **variables), mode)
 
 
 def _reproduce(plan: Scene, scene: Path, folder: Path, stage: str, which: str | None) -> None:
     """Write a program that shows whether a device runs a stage right."""
-    from clpt.bench import agreement, repro
+    from clpt.bench import agreement, launches
 
     from .. import device
 
@@ -135,6 +130,6 @@ def _reproduce(plan: Scene, scene: Path, folder: Path, stage: str, which: str | 
     else:
         raise SceneError(f"no stage is wrong beside {witness.name}", file=scene)
     verdict, launch = result.problem or "right", result.launch
-    repro.write(folder, launch, str(scene), on.info, witness.name, verdict)
+    launches.write_program(folder, launch, str(scene), on.info, witness.name, verdict)
     terminal.say(f"{launch.stage} on {on.info.label}: {verdict}, beside {witness.name}", err=False)
     terminal.say(f"{folder / 'README.txt'} says how to run it without clpt", err=False)

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ..errors import SceneError
 from .process import terminal
-from .process.extras import extra
+from .process.failures import extra
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from ..lenses import Prescription
 
 
 @click.command()
@@ -35,24 +42,23 @@ def lens(
     the root of its mean squared radius.
     """
     from .. import lenses  # here: help needs no numpy
-    from .printing import lens as tables
-    from .printing.console import output_console, shown
+    from .console import output_console, shown
 
-    made = lenses.read(lens) if Path(lens).suffix else lenses.library(lens)
+    prescription = lenses.read(lens) if Path(lens).suffix else lenses.library(lens)
     if f_number is not None:
-        made = made.with_stop(lenses.paraxial.stop_radius(made, f_number))
+        prescription = prescription.with_stop(lenses.paraxial.stop_radius(prescription, f_number))
     waves = _numbers(wavelengths, "--wavelengths", 200.0, 2000.0)
     angles = _numbers(fields, "--fields", -89.0, 89.0)
     console = output_console()
-    source = f"; {made.source}" * bool(made.source)
-    console.print(shown(f"{made.name}, {len(made.surfaces)} surfaces{source}"))
-    console.print(tables.near_axis(made, waves))
-    console.print(tables.of_spots(made, waves, angles))
+    source = f"; {prescription.source}" * bool(prescription.source)
+    console.print(shown(f"{prescription.name}, {len(prescription.surfaces)} surfaces{source}"))
+    console.print(_near_axis(prescription, waves))
+    console.print(_spots(prescription, waves, angles))
     if plot is not None:
         with extra("plot", "a plot"):
-            from .plots import lens as lens_plot  # here: matplotlib is an extra, and slow to import
+            from . import plots  # here: matplotlib is an extra, and slow
 
-        lens_plot.write(plot, made, waves, angles)
+        plots.plot_lens(plot, prescription, waves, angles)
         terminal.say(str(plot))
 
 
@@ -65,3 +71,41 @@ def _numbers(text: str, option: str, low: float, high: float) -> list[float]:
         message = f"{text!r} is no list of 1 to 12 numbers from {low:g} to {high:g}"
         raise SceneError(message, where=option) from None
     return values
+
+
+def _near_axis(lens: Prescription, waves: Sequence[float]) -> Table:
+    """Return paraxial properties of a lens, a row for each wavelength [nm]."""
+    from rich.table import Table
+
+    from .. import lenses
+
+    table = Table(box=None, pad_edge=False)
+    headings = ("nm", "focal length", "back focus", "f-number", "entrance pupil", "exit pupil")
+    for heading in headings:
+        table.add_column(heading, justify="right")
+    for wavelength in waves:
+        points = lenses.cardinal(lens, wavelength)
+        table.add_row(
+            f"{wavelength:g}", f"{points.focal_length:.5g}", f"{points.back_focus:.5g}",
+            f"{points.f_number:.4g}",
+            f"{2.0 * points.entrance_radius:.4g} at {points.entrance:.4g}",
+            f"{2.0 * points.exit_radius:.4g} at {points.exit:.4g}",
+        )  # fmt: skip
+    return table
+
+
+def _spots(lens: Prescription, waves: Sequence[float], angles: Sequence[float]) -> Table:
+    """Return the spots of points at angles [degrees], a row for each and a wavelength [nm]."""
+    from rich.table import Table
+
+    from ..lenses import tracing
+
+    table = Table(box=None, pad_edge=False)
+    for heading in ("degrees", "nm", "spot [um]", "light through"):
+        table.add_column(heading, justify="right")
+    for angle in angles:
+        for wavelength in waves:
+            spot = tracing.spot(lens, angle, wavelength)
+            size = f"{spot.radius * 1e3:.4g}" if len(spot.points) else "-"
+            table.add_row(f"{angle:g}", f"{wavelength:g}", size, f"{spot.through:.3f}")
+    return table

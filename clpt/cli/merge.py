@@ -1,4 +1,4 @@
-"""`clpt merge`: films of different samples of one scene to one film, and to its picture."""
+"""`clpt merge`: films of different samples of a scene are added, and make its picture."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from .files.targets import checked
 from .options.grading import GradingOptions, grading_options, names_option
 from .options.records import with_records
 from .options.scene_options import denoise_option
-from .process import terminal
 
 if TYPE_CHECKING:
     from ..render.film.saved_film import SavedFilm
@@ -41,33 +40,30 @@ def merge(
 ) -> None:
     """Add FILMS, of `clpt render --samples FIRST:END -o NAME.film`, and write the picture.
 
-    The order does not matter: the film is to the bit that of one render of all samples. Checkpoints
-    (NAME.resume.exr) are films too. Films of another scene, setting or version are refused, and
-    those that have a sample that another one has. No device is needed.
+    The order does not matter: the film is to the bit that of a single render of all samples.
+    Checkpoints (NAME.resume.exr) are films too. Films of another scene, setting or version are
+    refused, and films that share a sample. No device is needed.
     """
     for film in films:
         locate(film)
     from ..render.film.saved_film import other_devices  # here: help needs no OpenCL
+    from .display import display
     from .files import checkpoints, outputs
-    from .printing.display import display
 
     how = graded.grading
     targets = checked(paths)
 
-    def note(text: str) -> None:
-        if not quiet:
-            terminal.say(text)
-
+    shown = display(quiet, None)
     if text := how.unused(targets):
-        note(f"clpt: warning: {text}")
+        shown.note(f"clpt: warning: {text}")
     total = added(films)
     for change in other_devices(total.sessions, total.sessions[0].device):
-        note(f"clpt: warning: the films are of several classes of devices: {change}")
+        shown.note(f"clpt: warning: the films are of several classes of devices: {change}")
     stats = _figures(total) | {"films": len(films)}
     denoiser = denoise or total.denoise
-    with display(quiet, None).phase(f"denoising ({denoiser})") if denoiser else nullcontext():
-        outputs.write_all(targets, total, stats, how, note, denoise)
-    note(checkpoints.summary(total))
+    with shown.phase(f"denoising ({denoiser})") if denoiser else nullcontext():
+        outputs.write_all(targets, total, stats, how, shown, denoise)
+    shown.note(checkpoints.summary(total))
 
 
 def _figures(total: SavedFilm) -> dict[str, str | int | float]:

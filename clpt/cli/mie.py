@@ -15,7 +15,7 @@ from ..errors import SceneError
 from .options.records import with_records
 from .options.values import Choice
 from .process import terminal
-from .process.extras import extra
+from .process.failures import extra
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,19 +25,16 @@ DIGITS = 6  # of the table in a file
 
 @dataclass(frozen=True)
 class Drops:
-    """The sizes of drops, see `clpt.mie.sizes`, and their share of the volume; radius [um]."""
+    """Drops: sizes, see `clpt.mie.sizes`, share of the volume, indices; radius [um].
+
+    k: absorption of the drops; host: index of the medium around them; wavelengths: of the table.
+    """
 
     radius: float
     law: str
     spread: float
     share: float
     radii: int
-
-
-@dataclass(frozen=True)
-class Indices:
-    """Indices of drops and of what is around them, absorption of drops, and wavelengths."""
-
     index: str
     k: str
     host: str
@@ -87,21 +84,20 @@ class Indices:
     "--plot", type=click.Path(path_type=Path),
     help="The phase function by angle and wavelength, .png, .svg or .pdf.",
 )  # fmt: skip
-@with_records(drops=Drops, indices=Indices)
-def mie(drops: Drops, indices: Indices, output: Path | None, plot: Path | None) -> None:
+@with_records(drops=Drops)
+def mie(drops: Drops, output: Path | None, plot: Path | None) -> None:
     """Make the medium of spheres of RADIUS micrometres: fog, mist, milk.
 
     It follows from Mie's theory (1908), for each wavelength. Without -o, a table of it is shown.
     """
     from .. import mie as theory  # here: help needs no numpy
     from ..formats.native.write import write_medium
-    from .printing.mie import print_medium
 
-    at = _wavelengths(indices.wavelengths)
+    at = _wavelengths(drops.wavelengths)
     medium = theory.droplets(
         theory.sizes(drops.law, drops.radius * 1e-6, drops.spread, drops.radii), drops.share,
-        index=_index(indices.index, "eta"), k=_index(indices.k, "k"),
-        host=_index(indices.host, "eta"), lambdas=at,
+        index=_index(drops.index, "eta"), k=_index(drops.k, "k"),
+        host=_index(drops.host, "eta"), lambdas=at,
     )  # fmt: skip
     if output is not None:
         if output.suffix.lower() != ".json":
@@ -113,13 +109,13 @@ def mie(drops: Drops, indices: Indices, output: Path | None, plot: Path | None) 
         terminal.say(str(output))
     if plot is not None:
         with extra("plot", "a plot"):
-            from .plots import mie as mie_plot  # here: matplotlib is an extra, and slow to import
+            from . import plots  # here: matplotlib is an extra, and slow
 
-        title = f"{drops.law}, {drops.radius:g} um, {indices.index} in {indices.host}"
-        mie_plot.write(plot, medium, title)
+        title = f"{drops.law}, {drops.radius:g} um, {drops.index} in {drops.host}"
+        plots.plot_phase(plot, medium, title)
         terminal.say(str(plot))
     if output is None and plot is None:
-        print_medium(medium, at)
+        _print_medium(medium, at)
 
 
 def _wavelengths(text: str) -> np.ndarray:
@@ -145,3 +141,22 @@ def _index(text: str, column: Any) -> Any:
 
         return spectra.read_index(Path(text), column)
     return text
+
+
+def _print_medium(medium: Any, at: np.ndarray) -> None:
+    """Print coefficients and phase function of a medium at wavelengths [nm]."""
+    import numpy as np
+    from rich.table import Table
+
+    from .console import output_console
+
+    table = Table(box=None, pad_edge=False)
+    for heading in ("nm", "sigma_t [1/m]", "albedo", "mean cosine", "back [1/sr]"):
+        table.add_column(heading, justify="right")
+    phase = medium.phase
+    moment = phase.values * phase.cosines
+    g = np.pi * ((moment[:, 1:] + moment[:, :-1]) @ np.diff(phase.cosines))
+    sigma_t, albedo = (each.sample(at) for each in (medium.sigma_t, medium.albedo))
+    for row in zip(at, sigma_t, albedo, g, phase.values[:, 0], strict=True):
+        table.add_row(*(f"{value:.6g}" for value in row))
+    output_console().print(table)

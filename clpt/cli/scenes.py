@@ -25,17 +25,17 @@ def scenes(as_json: bool, schema: bool) -> None:
     if schema:
         terminal.write((own_scenes.scenes_folder() / "schema.json").as_uri())
         return
-    found = list(own_scenes.every())
+    listed = list(own_scenes.every())
     if as_json:
-        rows = [{"path": one.path, "size": one.size, "text": one.text} for one in found]
+        rows = [{"path": entry.path, "size": entry.size, "text": entry.text} for entry in listed]
         terminal.write(json.dumps(rows, indent=2))
         return
     from rich.table import Table
 
-    from .printing.console import output_console, shown
+    from .console import output_console, shown
 
     table = Table("scene", "size", "what it shows")
-    for one in found:
-        size = "" if one.size is None else "x".join(map(str, one.size))
-        table.add_row(shown(one.path), shown(size), shown(one.text))
+    for entry in listed:
+        size = "" if entry.size is None else "x".join(map(str, entry.size))
+        table.add_row(shown(entry.path), shown(size), shown(entry.text))
     output_console().print(table)

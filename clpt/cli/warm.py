@@ -9,11 +9,9 @@ from pathlib import Path
 import click
 
 from ..formats import locate
-from .options.headings import Grouped
-from .options.records import with_records
+from .options.records import Grouped, verbose_option, with_records
 from .options.scene_options import SceneOptions, denoise_option, scene_options
-from .options.scene_path import ScenePath
-from .options.verbosity import verbose_option
+from .options.values import ScenePath
 from .process import terminal
 
 
@@ -32,22 +30,21 @@ def warm(scenes: tuple[Path, ...], options: SceneOptions, verbose: int, quiet: b
     """
     for scene in scenes:
         locate(scene)
-    from .opening.factories import DeviceFactory
-    from .opening.scenes import open_scene
-    from .printing.display import display
+    from .display import display
+    from .opening import DeviceFactory, open_scene
 
     for scene in scenes:
         shown, began = display(quiet, None), time.perf_counter()
         with ExitStack() as resources:
-            opened = open_scene(scene, options, shown, resources)
-            renderer = DeviceFactory(opened.devices, options).make(opened.scene, shown)
+            plan, opened, loading = open_scene(scene, options, shown, resources)
+            renderer = DeviceFactory(opened, options).make(plan, shown)
             with shown.phase("compiling for the first samples"):
                 renderer.prepare()
         builds, seconds = [on.builds for on in renderer.devices], time.perf_counter() - began
-        programs, found = sum(b.programs for b in builds), sum(b.cached for b in builds)
+        programs, cached = sum(b.programs for b in builds), sum(b.cached for b in builds)
         terminal.say(
-            f"{scene}: {programs} programs, {found} of them found, in {seconds:.1f}"
-            f" s; the scene took {opened.loading:.1f} s of it",
+            f"{scene}: {programs} programs, {cached} of them found, in {seconds:.1f}"
+            f" s; the scene took {loading:.1f} s of it",
             err=False,
         )
         renderer.close()

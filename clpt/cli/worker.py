@@ -6,9 +6,8 @@ from pathlib import Path
 
 import click
 
-from .options.records import with_records
+from .options.records import verbose_option, with_records
 from .options.scene_options import Machine
-from .options.verbosity import verbose_option
 from .process import terminal
 
 
@@ -39,8 +38,8 @@ def worker(
 ) -> int:
     """Render for the scheduler at ADDRESS, such as tls://192.168.1.5:8786, until it ends.
 
-    It renders with one device, or with several: --device all, gpu, or 0,2. Who has the keys of the
-    cluster can run any program here, as you can.
+    It renders with a single device, or with several: --device all, gpu, or 0,2. Who has the keys of
+    the cluster can run any program here, as you can.
     """
     from ..cluster import processes, tasks
 

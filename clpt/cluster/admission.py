@@ -14,7 +14,7 @@ from typing import Any
 from clpt.cluster import tasks
 from clpt.cluster.blocks import WorkerRecord
 from clpt.cluster.bundle import Bundle
-from clpt.cluster.calls import Call, Calls, reply_of
+from clpt.cluster.tasks import Call, Calls, reply_of
 from clpt.errors import ClusterError
 from clpt.scene.fingerprint import Plain
 

@@ -15,8 +15,7 @@ from functools import partial
 from typing import NoReturn
 
 from clpt.cluster.blocks import Block, Blocks, WorkerRecord, gaps
-from clpt.cluster.device_worker import DeviceWorker
-from clpt.cluster.threads import TICK, Threads
+from clpt.cluster.device_worker import TICK, DeviceWorker, Threads
 from clpt.errors import ClusterError
 from clpt.render.film.state import FilmState, Ranges, join_ranges
 from clpt.render.makers.maker import Held

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from clpt.cluster import tasks
 from clpt.cluster.admission import Admission, Job, Known
 from clpt.cluster.blocks import gaps
-from clpt.cluster.calls import Call, Calls, reply_of
+from clpt.cluster.tasks import Call, Calls, reply_of
 from clpt.errors import ClusterError
 from clpt.render.film.state import FilmState, Ranges
 from clpt.render.wavefront.tracer import Selection

@@ -9,7 +9,8 @@ from clpt import device as dev
 from clpt.errors import ClusterError
 from clpt.render.film.state import FilmState
 from clpt.render.makers.maker import Maker
-from clpt.render.wavefront.tracer import OnBatch, Selection, Tracer
+from clpt.render.wavefront.tracer import Selection, Tracer
+from clpt.render.wavefront.wavefront import OnBatch
 
 
 class HostMaker(Maker):

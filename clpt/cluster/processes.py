@@ -23,13 +23,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from clpt.cluster import keys
+import platformdirs
+
 from clpt.errors import ClusterError
 from clpt.files import child_processes
 
 if TYPE_CHECKING:
     from distributed import Client, Scheduler, Worker
+    from distributed.security import Security
 
+KEYS_FILE = "clpt-cluster.pem"
 LOOPBACK = "127.0.0.1"
 SETTINGS = {
     "distributed.scheduler.worker-ttl": "30 s",  # of a silent worker
@@ -48,6 +51,73 @@ SETTINGS = {
 }
 START_SECONDS = 60.0  # for a worker to find its scheduler
 END_SECONDS = 5.0  # for a process to end by itself
+
+
+def default_folder() -> Path:
+    """Return the default folder of a user's keys on a machine."""
+    return platformdirs.user_state_path("clpt", appauthor=False) / "cluster"
+
+
+def make_keys(folder: Path) -> None:
+    """Write the keys of a cluster, unless the folder has them: a file that only this user can read.
+
+    The file holds a certificate, its key, and the authority that signed it. The authority's key is
+    not kept, so nobody can issue a second certificate. Copy the folder to the machines of the
+    cluster, by ssh for example. Raises ClusterError.
+    """
+    if (folder / KEYS_FILE).exists():
+        return
+    try:
+        import trustme
+    except ImportError:
+        raise ClusterError("a cluster needs keys: pip install 'clpt[cluster]'") from None
+    authority = trustme.CA(organization_name="clpt cluster")
+    certificate = authority.issue_cert("cluster.clpt")
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        descriptor, temporary = tempfile.mkstemp(dir=folder)  # only this user can read it
+        try:
+            with open(descriptor, "wb") as file:
+                pem = certificate.private_key_and_cert_chain_pem.bytes()
+                file.write(pem + authority.cert_pem.bytes())
+            os.rename(temporary, folder / KEYS_FILE)
+        except BaseException:
+            os.unlink(temporary)
+            raise
+    except OSError as error:
+        raise ClusterError(f"{folder}: keys cannot be written: {error.strerror}") from None
+
+
+def security(folder: Path | None = None) -> Security:
+    """Return Dask's security object for the keys of a folder, by default this user's.
+
+    Raises ClusterError without keys, and where other users can read or replace them.
+    """
+    from distributed.security import Security
+
+    folder = default_folder() if folder is None else folder
+    path = folder / KEYS_FILE
+    if not path.is_file():
+        raise ClusterError(
+            f"{folder} has no keys of a cluster: clpt cluster start makes them; "
+            "give its folder by --keys on other machines"
+        )
+    if os.name == "posix":
+        for checked, others in ((path, 0o077), (folder, 0o022)):
+            if checked.stat().st_uid not in (os.getuid(), 0):
+                raise ClusterError(f"{checked} belongs to another user")
+            if checked.stat().st_mode & others:
+                raise ClusterError(f"{checked} is open to others (see: chmod go= {checked})")
+    roles = ("client", "scheduler", "worker")
+    try:
+        keys = Security(
+            require_encryption=True, tls_ca_file=str(path),
+            **{f"tls_{role}_cert": str(path) for role in roles},
+        )  # fmt: skip
+        keys.get_listen_args("scheduler")
+    except OSError as error:
+        raise ClusterError(f"{path} holds no keys of a cluster: {error}") from None
+    return keys
 
 
 def configure() -> None:
@@ -127,7 +197,7 @@ def new_worker(address: str, folder: Path | None, scratch: str, **options: Any) 
 
     return _without_web_server(distributed.Worker)(
         address, nthreads=1, memory_limit=0, dashboard=False, local_directory=scratch,
-        death_timeout=START_SECONDS, security=keys.security(folder), **options,
+        death_timeout=START_SECONDS, security=security(folder), **options,
     )  # fmt: skip
 
 
@@ -192,8 +262,8 @@ def run_scheduler(
     the address. Raises ClusterError where keys cannot be written and where the port is in use.
     """
     configure()
-    folder = keys.default_folder() if folder is None else folder
-    keys.make(folder)
+    folder = default_folder() if folder is None else folder
+    make_keys(folder)
     return asyncio.run(_scheduler(host, port, folder, tell))
 
 
@@ -218,7 +288,7 @@ def new_scheduler(host: str, port: int, folder: Path, scratch: str) -> Scheduler
 
     return _without_web_server(distributed.Scheduler)(
         host=host, port=port, protocol="tls://", dashboard=False, local_directory=scratch,
-        security=keys.security(folder),
+        security=security(folder),
     )  # fmt: skip
 
 
@@ -261,12 +331,12 @@ def local_scheduler() -> Iterator[tuple[Client, Path]]:
 
     with _scratch() as scratch:
         folder = Path(scratch) / "keys"
-        keys.make(folder)
-        security = keys.security(folder)
+        make_keys(folder)
+        secured = security(folder)
         spec = {"cls": partial(new_scheduler, LOOPBACK, 0, folder, scratch)}
         with (
-            SpecCluster(scheduler=spec, security=security, silence_logs=False) as cluster,
-            Client(cluster.scheduler_address, security=security) as client,
+            SpecCluster(scheduler=spec, security=secured, silence_logs=False) as cluster,
+            Client(cluster.scheduler_address, security=secured) as client,
         ):
             yield client, folder
 

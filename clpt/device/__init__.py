@@ -14,7 +14,7 @@ from .context import (
     share_compilers,
 )
 from .program import Argument, BoundKernel, Kernel, Program
-from .refusals import refused, wait
+from .runtimes import refused, wait
 from .source import Part, Source, Virtual, assemble, kernels_folder
 from .stream import Events, Rows, Stream, Timing, Timings, tiles
 

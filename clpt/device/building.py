@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import logging
 import os
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from typing import TypeVar
 
 import pyopencl as cl
 from pyopencl.characterize import nv_compute_capability
 
-from clpt.device import compile_limits, declarations, disk_cache, native_programs
+from clpt.device import compilers, disk_cache, native_programs
 
 from ..errors import DeviceError, KernelBuildError
 from .compilers import Job
 from .context import Device
 from .program import Program, Signatures, decode, encode, read_signatures
-from .source import Source
+from .source import Source, kernels_folder
 
 log = logging.getLogger(__name__)
 
@@ -28,6 +30,8 @@ OPTIONS = ("-cl-std=CL1.2", "-cl-kernel-arg-info", "-w")
 _PART = "a part, to be linked"  # in a key, like _LIMIT
 _LIMIT = "the limit of registers that suits it"
 _COUNTED = re.compile(r"^<kernel>:(\d+):")
+_GUARD = "-D_OPENCL_H_"
+_Built = TypeVar("_Built")
 
 
 def build(device: Device, source: Source, options: Sequence[str] = ()) -> Program:
@@ -49,7 +53,7 @@ def build(device: Device, source: Source, options: Sequence[str] = ()) -> Progra
     entry = _entry(device, source, flags)
     device.builds.on_compile(entry)
     start = time.perf_counter()
-    with compile_limits.watched(source):
+    with compilers.watched(source):
         program = _from_source(device, source, flags)
         if on_disk:  # a binary is fully compiled; the driver's program may not be
             binary = native_programs.binary(program.cl_program)
@@ -90,7 +94,7 @@ def link(
             _drop_parts(device, sources, flags)
             return program
         start = time.perf_counter()
-        with compile_limits.watched(whole):
+        with compilers.watched(whole):
             linked = _linked_with_retry(device, sources, whole, flags)
             program = Program(whole.name, linked, signatures)
             if _has_binaries(device):
@@ -126,8 +130,8 @@ def compile_ahead(device: Device, sources: Mapping[str, Source], main: str) -> N
     for source in sources.values():
         part = _entry(device, source, [*flags, _PART])
         if not disk_cache.holds(part):
-            text, options = next(declarations.forms(device, source.text, flags))
-            seconds = compile_limits.seconds_for(source)
+            text, options = next(forms(device, source.text, flags))
+            seconds = compilers.seconds_for(source)
             names = device.info.platform, device.info.name
             device.builds.on_compile(part)
             job = Job(source.name, seconds, *names, " ".join(options), text)
@@ -184,7 +188,7 @@ def _compiled(device: Device, source: Source, flags: list[str]) -> cl.Program:
     device.builds.on_compile(entry)
     try:
         make = partial(native_programs.compile_part, device.context, device.info.cl_device)
-        part = declarations.built(device, source.text, flags, make)
+        part = first_built(device, source.text, flags, make)
     except cl.Error as error:
         raise _build_error(source, str(error)) from error
     if _has_binaries(device):
@@ -275,7 +279,7 @@ def _natively(device: Device, source: Source, flags: list[str]) -> cl.Program:
     cl_device = device.info.cl_device
     make = partial(native_programs.build, device.context, cl_device)
     if not (source.registers and device.info.limits_registers):
-        return declarations.built(device, source.text, flags, make)
+        return first_built(device, source.text, flags, make)
     entry = _entry(device, source, [*flags, _LIMIT, *map(str, source.registers)])
     if chosen := disk_cache.load(entry):
         options = native_programs.register_options(int(chosen[0]))
@@ -324,3 +328,41 @@ def _build_error(source: Source, log: str) -> KernelBuildError:
     elif counted := next(filter(None, map(_COUNTED.search, rows)), None):
         file, line = source.location(int(counted[1]))  # NVIDIA's compiler ignores `#line`
     return KernelBuildError(source.name, file, line, log, disk_cache.keep_failed(source))
+
+
+def forms(device: Device, text: str, flags: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
+    """Yield the texts and options of a program, in the order of attempts."""
+    if device.info.is_pocl:
+        yield declarations() + text, [*flags, _GUARD]
+    yield text, [*flags]
+
+
+def first_built(
+    device: Device, text: str, flags: Sequence[str], build: Callable[[str, list[str]], _Built]
+) -> _Built:
+    """Return the result of `build` for the first form that builds.
+
+    Raises the pyopencl.Error of the last form.
+    """
+    *others, last = forms(device, text, flags)
+    for form in others:
+        try:
+            return build(*form)
+        except cl.Error:
+            continue
+    return build(*last)
+
+
+@functools.cache
+def declarations() -> str:
+    """Return declarations of OpenCL's built-in functions, followed by #undef of their macros.
+
+    PoCL puts clang's header before each text: 18,000 lines, which take longer than most of clpt's
+    programs. With its guard macro defined the header is empty, and these declarations
+    (`kernels/core/builtins.cl`) precede the text. A text that calls other functions, such as a
+    user's, fails to build, and is built again with the header.
+    """
+    text = (kernels_folder() / "core" / "builtins.cl").read_text(encoding="utf-8")
+    text = re.sub(r"/\*.*?\*/|\\\n\s*|\n(?=\n)", "", text, flags=re.DOTALL)
+    macros = dict.fromkeys(re.findall(r"^#define (\w+)", text, re.MULTILINE))
+    return text + "".join(f"#undef {name}\n" for name in macros)

@@ -20,15 +20,15 @@ from clpt.device import (
     disk_cache,
     forking,
     native_programs,
-    program_cache,
     runtimes,
     speed_trial,
 )
-from clpt.files import host_memory
+from clpt.files import budget
 
 from ..errors import DeviceError
 from ..scalars import is_whole
 from .compilers import Compilers, spare_cores
+from .program import cache_of
 
 log = logging.getLogger(__name__)
 
@@ -122,7 +122,7 @@ class DeviceInfo:
     def free_memory(self) -> int:
         """Return an estimate of the device's free memory [bytes]; OpenCL has no query for it."""
         if self.is_cpu:
-            return min(self.global_mem, host_memory.available() or self.global_mem)
+            return min(self.global_mem, budget.free_memory() or self.global_mem)
         if "cl_amd_device_attribute_query" in self.cl_device.extensions:
             try:
                 kib = self.cl_device.get_info(cl.device_info.GLOBAL_FREE_MEMORY_AMD)
@@ -178,7 +178,7 @@ class Device:
         self.builds = Builds()
         self.compilers: Compilers | None = None  # compiler processes, set by the caller
         self.hurries = False  # whether its jobs precede those of other devices
-        self.programs = program_cache.cache_of(queue)
+        self.programs = cache_of(queue)
 
     @classmethod
     def open(
@@ -370,8 +370,8 @@ def _by_speed(
     peers = [info for info in infos if _same_processor(info, infos[0])]
     if len(peers) < 2:
         return infos, {}
-    runtimes = [f"{i.label} {i.version} {i.driver} {i.compute_units}" for i in peers]
-    times = speed_trial.remembered(runtimes, lambda: _measured(peers))
+    names = [f"{i.label} {i.version} {i.driver} {i.compute_units}" for i in peers]
+    times = speed_trial.remembered(names, lambda: _measured(peers))
     if times is None:
         return infos, {}
     seconds = dict(zip(peers, times, strict=True))

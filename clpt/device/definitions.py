@@ -12,8 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
-from .conditions import BRANCHING, OPENING
-from .text_rows import Row, joined, rows_of
+from .conditions import BRANCHING, OPENING, Row, joined, rows_of
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _PASTED_MEMBER = re.compile(r"->(\w*)\s*##\s*(\w*)")

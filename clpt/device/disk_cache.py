@@ -11,6 +11,7 @@ import functools
 import hashlib
 import logging
 import os
+import re
 import stat
 import sys
 import tempfile
@@ -23,7 +24,7 @@ from pathlib import Path
 import platformdirs
 
 from clpt.device import forking
-from clpt.files import output_files, ownership
+from clpt.files import output_files
 
 from .source import Source
 
@@ -129,7 +130,7 @@ def temporary_folder() -> Path:
 def _why_unsafe(path: Path) -> str | None:
     """Return how other users could replace a folder, or why this is unknown; None if safe."""
     try:
-        return ownership.fault(path)
+        return output_files.ownership_fault(path)
     except OSError as error:
         return f"cannot be read ({error.strerror or error})"
 
@@ -140,7 +141,7 @@ def unfit(path: Path, parts: Collection[str] | None = None) -> str | None:
     Folders in it must be safe too: all of them, or the names in `parts`.
     """
     try:
-        if reason := ownership.fault(path):
+        if reason := output_files.ownership_fault(path):
             return reason
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
         output_files.check_folder(path)
@@ -150,7 +151,7 @@ def unfit(path: Path, parts: Collection[str] | None = None) -> str | None:
         for part in (path, *(entry for entry in inside if entry.is_dir())):
             if {part.lstat().st_uid, part.stat().st_uid} != {os.getuid()}:
                 return "belongs to another user"
-            if ownership.others_write(part.stat()):
+            if output_files.others_write(part.stat()):
                 return f"can be written by others (see: chmod go-w {part})"
     except OSError as error:
         return f"cannot be written ({error.strerror or error})"
@@ -265,7 +266,7 @@ def _warn(text: str) -> None:
 def keep_failed(source: Source) -> str | None:
     """Write the text of a program that failed to build; return its path, None on failure."""
     digest = hashlib.sha256(source.text.encode()).hexdigest()[:12]
-    stem = source.name.replace("/", "_").removesuffix(".cl")
+    stem = re.sub(r"\W", "_", source.name.removesuffix(".cl"))
     path = folder() / "failed" / f"{stem}-{digest}.cl"
     try:
         _keep(path, source.text.encode())

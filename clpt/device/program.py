@@ -6,7 +6,9 @@ import json
 import math
 import re
 import threading
-from collections.abc import Callable, Mapping, Sequence
+import weakref
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from typing import Any, TypeVar
 
@@ -14,7 +16,7 @@ import numpy as np
 import pyopencl as cl
 
 from . import forking
-from .refusals import refused
+from .runtimes import refused
 
 _R = TypeVar("_R")
 
@@ -33,6 +35,9 @@ _SCALARS = {
 # A null pointer as bytes: PyOpenCL accepts None only from 2026.1.3.
 _NULL = np.uintp(0)
 _VECTOR = re.compile(r"([a-z]+?)(2|3|4|8|16)$")
+_LIMIT = 128  # programs, some megabytes of driver memory
+
+_contexts_lock = forking.renewed(threading.Lock())
 
 
 @dataclass(frozen=True)
@@ -263,3 +268,48 @@ def encode(signatures: Signatures) -> str:
 def decode(text: str) -> Signatures:
     """Return the signatures of a text from `encode`. Raises TypeError, ValueError."""
     return {name: tuple(Argument(*a) for a in args) for name, args in json.loads(text).items()}
+
+
+class ProgramCache:
+    """The most recently used programs of a context.
+
+    The cache lives as long as a Python object of the context's queues: only queues of `Device`
+    objects refer to it.
+    """
+
+    def __init__(self, context: cl.Context):
+        self.context = context
+        self._programs: OrderedDict[Hashable, Any] = OrderedDict()
+        self._lock = forking.renewed(threading.Lock())
+
+    def __len__(self) -> int:
+        return len(self._programs)
+
+    def find(self, key: Hashable) -> Any:
+        """Return a program, None if it is missing."""
+        with self._lock:
+            if key in self._programs:
+                self._programs.move_to_end(key)
+            return self._programs.get(key)
+
+    def keep(self, key: Hashable, program: object) -> None:
+        """Keep a program; drop the least recently used program beyond the limit."""
+        with self._lock:
+            self._programs[key] = program
+            while len(self._programs) > _LIMIT:
+                self._programs.popitem(last=False)
+
+
+_caches: weakref.WeakValueDictionary[int, ProgramCache] = weakref.WeakValueDictionary()
+
+
+def cache_of(queue: cl.CommandQueue) -> ProgramCache:
+    """Return the cache of the queue's context."""
+    context = queue.context
+    with _contexts_lock:
+        # The handle is unique while a cache refers to its context.
+        cache = _caches.get(context.int_ptr)
+        if cache is None:
+            cache = _caches[context.int_ptr] = ProgramCache(context)
+        queue.clpt_programs = cache  # PyOpenCL's objects have no weak references
+    return cache

@@ -11,9 +11,8 @@ from typing import NoReturn
 
 from ..errors import KernelBuildError
 from ..records import constant_files
-from .conditions import OPENING, Macros, taken
+from .conditions import OPENING, Macros, Row, rows_of, taken
 from .definitions import Paragraph, macro, named, paragraphs, whole, with_gaps
-from .text_rows import Row, rows_of
 
 _GENERATED = "generated/"  # prefix of files generated for a scene
 TWIN = "#none"  # suffix of the section of a file with the step that does nothing

@@ -13,7 +13,7 @@ import pyopencl as cl
 from . import forking
 from .buffers import host_buffer
 from .program import BoundKernel
-from .refusals import failed_before, refused, wait
+from .runtimes import failed_before, refused, wait
 
 Events = Iterable[cl.Event] | None  # for `wait_for`
 TILE = (64, 2)  # pixels of a work-group

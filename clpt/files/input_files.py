@@ -21,6 +21,8 @@ REACH = {
     "mitsuba": ANYWHERE,
     "pbrt": ANYWHERE,
     "gltf": BELOW,
+    "materialx": ANYWHERE,
+    "usd": ANYWHERE,
     "mesh": ANYWHERE,  # .obj, with its .mtl, and .ply
 }
 POINTER = b"version https://git-lfs.github.com/spec/"  # git-lfs docs/spec.md

@@ -6,7 +6,8 @@ import difflib
 import importlib
 import itertools
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -14,9 +15,10 @@ from clpt.choices import Missing
 from clpt.errors import LONGEST_WARNING, SceneError, nearest, one_line
 from clpt.files import budget as budgets
 from clpt.files.budget import Budget
-from clpt.formats import own_scenes, reading
+from clpt.formats import own_scenes
 
 if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
+    from clpt.formats.reading import Progress
     from clpt.scene import Scene
     from clpt.scene.materials import Material
 
@@ -27,6 +29,11 @@ FORMATS = {  # what reads files of a suffix: a module, imported on use, or a par
     ".pbrt.gz": "pbrt",
     ".glb": "gltf",
     ".gltf": "gltf",
+    ".mtlx": "materialx",
+    ".usd": "usd",
+    ".usda": "usd",
+    ".usdc": "usd",
+    ".usdz": "usd",
     ".obj": "mesh",
     ".ply": "mesh",
     ".stl": "mesh",
@@ -35,12 +42,12 @@ FORMATS = {  # what reads files of a suffix: a module, imported on use, or a par
     ".nvdb": "density",
     ".vol": "density",
 }
-WITH_VARIABLES = ("mitsuba", "gltf")
+WITH_VARIABLES = ("mitsuba", "gltf", "usd")
 
-# The scene of a folder: the first of these, else the one with the folder's name, else the only one.
+# The scene of a folder: the first of these, else the scene with the folder's name, else the only.
 IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
-SCENES = (".xml", ".pbrt", ".pbrt.gz", ".glb", ".gltf")
-MOST_COMPARED, CLOSE = 4096, 0.7  # names of a folder, and how near one is that is meant
+SCENES = tuple(suffix for suffix, kind in FORMATS.items() if kind in (*WITH_VARIABLES, "pbrt"))
+MOST_COMPARED, CLOSE = 4096, 0.7  # names of a folder; least similarity of a suggested name
 MOST_NAMED = 8  # scenes of a folder that a message names
 ARGUMENTS = ("kinds", "progress", "missing_textures", "budget")  # of `load`, beside variables
 
@@ -52,21 +59,20 @@ def load(
     /,
     *,
     kinds: Iterable[type[Material]] = (),
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress | None = None,
     missing_textures: Missing = "error",
     budget: Budget | None = None,
     **variables: Any,
 ) -> Scene:
     """Read a scene, a bare mesh or a bare density; a folder means the scene in it (see IN_FOLDERS).
 
-    `path` is that of the file. `kinds` are materials that are not clpt's own, of which a scene.json
-    may speak. `variables` set the `$names` of Mitsuba's XML; of glTF they choose scene, animation
-    and time; of both `camera` is the number or name of one of several. `progress` is called with
-    the share that is read, from 0 to 1, and a text, for files of many shapes.
-    `missing_textures`: "grey" puts grey in the place of images that are not there, and of unknown
-    materials of Mitsuba and PBRT; it leaves out unknown shapes and lights. Each has a warning.
-    `budget`: what the load may take of memory and time; a file that asks for more is refused.
-    Raises SceneError with the file and, where it is known, the line.
+    `path` is that of the file. A scene.json may name `kinds`, materials that are not clpt's own.
+    `variables` set the `$names` of Mitsuba's XML; docs/gltf.md and docs/usd.md have theirs; of all
+    three `camera` is a camera's number or name. `progress` is called with the share that is read,
+    from 0 to 1, and a text, for files of many shapes. `missing_textures`: "grey" replaces missing
+    images, and unknown materials of Mitsuba and PBRT, by grey; it leaves out unknown shapes and
+    lights. Each has a warning. `budget`: memory and time that the load may take; a file that asks
+    for more is refused. Raises SceneError with the file and, where it is known, the line.
     """
     path = locate(path)
     try:
@@ -81,10 +87,22 @@ def load(
         raise SceneError("reading it takes more memory than there is", file=path) from None
 
 
+def prepare(path: str | Path, /) -> None:
+    """Import the library that reads a file's format, before other threads use native code.
+
+    OpenUSD takes Python's lock while the linker loads it. A thread that holds that lock, and asks
+    the linker for a symbol as OpenCL's drivers do, would wait for ever. A library that is missing
+    is an error of `load`.
+    """
+    if FORMATS.get(Path(path).suffix.lower()) == "usd":
+        with suppress(ImportError):
+            importlib.import_module("clpt.formats.usd.scenes")
+
+
 def _load(
     path: Path,
     kinds: Iterable[type[Material]],
-    progress: Callable[[float, str], None] | None,
+    progress: Progress | None,
     missing_textures: Missing,
     variables: dict[str, Any],
 ) -> Scene:
@@ -94,12 +112,13 @@ def _load(
         known = " ".join(FORMATS)
         raise SceneError(f"unknown format {path.suffix!r}; known: {known}", file=path)
     if "camera" in variables and kind not in WITH_VARIABLES:
-        message = f"only .xml and glTF have cameras to choose from, no {variables['camera']!r}; "
+        message = "only .xml, glTF and USD have cameras to choose from, no "
+        message += f"{variables['camera']!r}; "
         message += "--camera AZIMUTH,ELEVATION such as 45,20 looks at all of a scene"
         raise SceneError(message, file=path)
     if variables and kind not in WITH_VARIABLES:
         name = min(variables)
-        message = f"only .xml and glTF have variables, so {name!r} means nothing"
+        message = f"only .xml, glTF and USD have variables, so {name!r} means nothing"
         near = difflib.get_close_matches(name, ARGUMENTS)
         raise SceneError(message + (nearest(name, ARGUMENTS) if near else ""), file=path)
     if kinds and kind != "native":
@@ -121,12 +140,14 @@ def _load(
 
 
 def errors_of(path: str | Path, /, **variables: Any) -> list[SceneError]:
-    """Return the errors of a file, in the order in which they are met, each once.
+    """Return the distinct errors of a file, in the order of reading.
 
-    path: of a scene of any format; of Mitsuba's and PBRT's materials, textures, shapes, lights and
-    parameters each have their own. variables: see `load`.
+    path: a scene of any format; of Mitsuba's and PBRT's, each material, texture, shape, light and
+    parameter can add an error. variables: see `load`.
     """
-    with reading.collecting() as errors:
+    from clpt.formats.reading import collecting  # which imports numpy
+
+    with collecting() as errors:
         try:
             load(path, **variables)
         except SceneError as error:
@@ -146,8 +167,8 @@ def load_dict(
 
     Its values are numbers, texts, sequences of three numbers, transforms (any object with a
     `matrix` (4, 4), such as clpt.ScalarTransform4f), arrays of images (h, w) or (h, w, c) and of
-    volumes (z, y, x) or (z, y, x, c), and dictionaries with a `type`. `folder` is that of relative
-    file names, by default the current one. `missing_textures` and `budget` are those of `load`.
+    volumes (z, y, x) or (z, y, x, c), and dictionaries with a `type`. Relative file names are in
+    `folder`, by default the current folder. `missing_textures` and `budget` are those of `load`.
     Raises SceneError with the name of the entry.
     """
     loader = importlib.import_module("clpt.formats.mitsuba").load_dict
@@ -166,8 +187,8 @@ def save(scene: Scene, path: str | Path, /) -> None:
     .npy. An image that the scene has by its path is named, not copied. Colours of meshes keep
     their float32. `warnings` and `extra` are not written.
 
-    Raises TypeError for what is no scene; SceneError for another suffix, for a buffer on a device,
-    and where a file cannot be written.
+    Raises TypeError for anything but a scene; SceneError for another suffix, for a buffer on a
+    device, and where a file cannot be written.
     """
     from clpt.scene import Scene
 
@@ -184,7 +205,7 @@ def save(scene: Scene, path: str | Path, /) -> None:
 def locate(path: str | Path, /) -> Path:
     """Return the file that `load` reads: of a folder the scene in it. Raises SceneError.
 
-    A relative path that begins with `scenes` and is not there names one of clpt's own scenes.
+    A missing relative path that begins with `scenes` names a scene that comes with clpt.
     """
     path = Path(path)
     try:
@@ -192,9 +213,9 @@ def locate(path: str | Path, /) -> Path:
             return _inside(path)
         if path.is_file():
             return path
-        own = brought(path)
-        if own != path:
-            return locate(own)
+        bundled = brought(path)
+        if bundled != path:
+            return locate(bundled)
     except SceneError:
         raise
     except (OSError, ValueError) as error:
@@ -203,26 +224,28 @@ def locate(path: str | Path, /) -> Path:
 
 
 def brought(path: str | os.PathLike[str], /) -> Path:
-    """Return the path; of one that begins with `scenes` and is not there, clpt's own if any."""
+    """Return the path; if it is missing and begins with `scenes`, the path of clpt's own scene."""
     path = Path(path)
-    own = own_scenes.scenes_folder().parent / path
-    mine = path.parts[:1] == ("scenes",) and ".." not in path.parts and os.path.exists(own)
-    return own if mine and not os.path.exists(path) else path
+    bundled = own_scenes.scenes_folder().parent / path
+    is_bundled = (
+        path.parts[:1] == ("scenes",) and ".." not in path.parts and os.path.exists(bundled)
+    )
+    return bundled if is_bundled and not os.path.exists(path) else path
 
 
 def _nearest_file(path: Path) -> str:
     """Return the end of a message: scenes and folders of nearly the same name, if there are any.
 
-    Of a path whose folder is not there, folders near the first one that is missing.
+    If a folder of the path is missing, the names are those near the first missing folder.
     """
     whole = path
     while not path.parent.is_dir() and path.parent != path:
         path = path.parent
     try:
         names = [
-            one.name
-            for one in itertools.islice(path.parent.iterdir(), MOST_COMPARED)
-            if one.is_dir() or one.name.lower().endswith(tuple(FORMATS))
+            entry.name
+            for entry in itertools.islice(path.parent.iterdir(), MOST_COMPARED)
+            if entry.is_dir() or entry.name.lower().endswith(tuple(FORMATS))
         ]
     except OSError:
         names = []
@@ -245,9 +268,9 @@ def _meant(here: list[str], path: Path) -> str:
 def _inside(folder: Path) -> Path:
     """Return the scene of a folder, see IN_FOLDERS."""
     scenes = sorted(file for file in folder.iterdir() if file.name.lower().endswith(SCENES))
-    own = [file for file in scenes if file.name.split(".")[0] == folder.resolve().name]
+    same_name = [file for file in scenes if file.name.split(".")[0] == folder.resolve().name]
     named = [folder / name for name in IN_FOLDERS if (folder / name).is_file()]
-    for files in (named[:1], own, scenes):
+    for files in (named[:1], same_name, scenes):
         if len(files) == 1:
             return files[0]
     if not scenes:

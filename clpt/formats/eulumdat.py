@@ -1,4 +1,4 @@
-"""EULUMDAT files (.ldt): lamps as European makers measure them, one value a line.
+"""EULUMDAT files (.ldt): lamps as European makers measure them, with a value on each line.
 
 Their intensities are in candela for 1000 lm of their lamps; the lines are those of Stockmar's
 specification (1990).
@@ -24,7 +24,7 @@ KINDS = 5  # of symmetry
 
 
 def read(path: Path) -> Photometry:
-    """Read an EULUMDAT file. Raises SceneError with the line of what is broken."""
+    """Read an EULUMDAT file. Raises SceneError with the broken line."""
     return _Reader(path).photometry()
 
 
@@ -78,7 +78,7 @@ class _Reader:
         return 90.0 + angles, candela[::-1]  # from 270 over 0 to 90, mirrored
 
     def _lumens(self, sets: int) -> float:
-        """Return the light of the first set of lamps [lm]; sets stand one after the other."""
+        """Return the light of the first set of lamps [lm]; further sets are alternatives."""
         line = SETS + 1 + FLUX
         lumens = abs(self._number(line, "luminous flux"))
         if not lumens > 0.0:

@@ -30,16 +30,16 @@ def load_mesh(path: Path, missing: Missing = "error") -> Scene:
 
 
 def show(
-    things: Sequence[shapes.Shape],
+    contents: Sequence[shapes.Shape],
     *,
     file: Path,
     camera: cameras.Camera | None = None,
     own_lights: Sequence[lights.Light] = (),
     up: Up = "y",
 ) -> Scene:
-    """Return a scene of the shapes of a file; see `Scene.studio` for what is missing."""
+    """Return a scene of the shapes of a file; `Scene.studio` adds missing cameras and lights."""
     try:
-        scene = Scene.studio(things, camera=camera, lights=own_lights, up=up, name=file.stem)
+        scene = Scene.studio(contents, camera=camera, lights=own_lights, up=up, name=file.stem)
     except SceneError as error:
         raise SceneError(error.message, file=file) from None
     scene.extra["format"] = file.suffix.lower()[1:]
@@ -54,16 +54,16 @@ TO_BOX = transforms.translate([0.5, 0.5, 0.5]) @ transforms.scale(0.5)  # from a
 def load_density(path: Path) -> Scene:
     """Read a bare density and put it into the studio, whatever its size, position and density.
 
-    What a density means differs from program to program, so it is scaled to be as thick as DEPTH.
-    Raises SceneError for what is no density, and for one that is 0 everywhere.
+    Programs give densities different units, so it is scaled to be as thick as DEPTH.
+    Raises SceneError for a file without a density, and for a density that is 0 everywhere.
     """
-    found = volumes.read(path)
-    to_world = np.asarray(found.to_world, float)
-    steps = np.linalg.norm(to_world[:3, :3], axis=0) / found.values.shape  # of a cell, [m]
-    columns = [float(found.values.sum(axis=i, dtype=float).max()) * steps[i] for i in range(3)]
+    density = volumes.read(path)
+    to_world = np.asarray(density.to_world, float)
+    steps = np.linalg.norm(to_world[:3, :3], axis=0) / density.values.shape  # of a cell, [m]
+    columns = [float(density.values.sum(axis=i, dtype=float).max()) * steps[i] for i in range(3)]
     if not min(columns) > 0.0:
         raise SceneError("its density is 0 everywhere: nothing would be seen", file=path)
-    cloud = media.Grid(density=found, sigma_t=DEPTH / float(np.mean(columns)), albedo=0.99)
+    cloud = media.Grid(density=density, sigma_t=DEPTH / float(np.mean(columns)), albedo=0.99)
     box = shapes.Cube(
         to_world=to_world @ TO_BOX, material=materials.Null(), interior=cloud, name=path.stem
     )

@@ -21,9 +21,9 @@ from clpt.scene.textures import Bitmap
 ROWS, COLUMNS = 360, 720  # of the image: half degrees
 MOST_VALUES = 1 << 22
 AROUND = ((0, 90), (0, 180), (0, 360), (90, 270))
-NEW = ("IESNA:", "IES:")  # begin files of 1995 and later; IESNA91 or nothing begins older ones
+NEW = ("IESNA:", "IES:")  # begin files of 1995 and later; IESNA91 or nothing begins older files
 TYPES = {2: "B", 3: "A"}  # of photometry, about axes that lie; 1 is C, about the vertical
-# keys of what follows TILT, in their order
+# names of the numbers after TILT, in their order
 HEADER = (
     "lamps", "lumens", "multiplier", "vertical", "horizontal", "photometry", "units", "width",
     "length", "height", "ballast", "ballast_lamp", "watts",
@@ -67,7 +67,7 @@ class Photometry:
 
 
 def read(path: Path) -> Photometry:
-    """Read an IES file. Raises SceneError with the line of what is broken or not supported."""
+    """Read an IES file. Raises SceneError with the line that is broken or not supported."""
     return _Reader(path).photometry()
 
 
@@ -111,7 +111,7 @@ class _Reader:
         raise SceneError(message, file=self.path, line=self.line)
 
     def photometry(self) -> Photometry:
-        tilt = next((i for i, one in enumerate(self.lines) if one.strip()[:5] == "TILT="), None)
+        tilt = next((i for i, line in enumerate(self.lines) if line.strip()[:5] == "TILT="), None)
         if tilt is None:
             self.fail("is no IES file: it has no line TILT=")
         self.line = tilt + 1
@@ -129,8 +129,8 @@ class _Reader:
             self.fail(
                 f"{sizes[0]} x {sizes[1]} values are more than the {MOST_VALUES} that are read"
             )
-        rest = self._many("header", len(HEADER) - 5)
-        photometry = rest[0]
+        geometry = self._many("header", len(HEADER) - 5)
+        photometry = geometry[0]
         if photometry in TYPES:
             self.fail(f"photometry of type {TYPES[int(photometry)]}; only type C is supported")
         if photometry != 1.0:
@@ -140,7 +140,7 @@ class _Reader:
         )
         if vertical[0] < -1e-9 or vertical[-1] > 180.0 + 1e-9:
             self.fail("vertical angles must lie between 0 and 180 degrees")
-        scale = head["multiplier"] * rest[5] * (rest[6] if self._factor_of_lamps() else 1.0)
+        scale = head["multiplier"] * geometry[5] * (geometry[6] if self._factor_of_lamps() else 1.0)
         values = self._many("candela", math.prod(sizes))
         candela = np.array(values).reshape(sizes[1], sizes[0]) * scale
         horizontal, candela = self._around(horizontal, candela)
@@ -162,8 +162,8 @@ class _Reader:
         """Return horizontal angles and candela (h, v) that go around wholly, or cover a half or a
         quarter.
 
-        Some files leave out 360, which repeats 0: even steps, of which one more ends there, say so.
-        Raises SceneError.
+        Some files leave out 360, which repeats 0: their even steps would end there with another
+        step. Raises SceneError.
         """
         if len(angles) == 1:
             return angles, candela
@@ -173,9 +173,9 @@ class _Reader:
             return np.append(angles, 360.0), np.vstack([candela, candela[:1]])
         ends = angles[[0, -1]]
         if not any(np.abs(ends - known).max() < 1e-6 for known in AROUND):
-            found = f"{angles[0]:g} to {angles[-1]:g}"
+            extent = f"{angles[0]:g} to {angles[-1]:g}"
             message = "horizontal angles go from 0 to 90, 180 or 360, or from 90 to 270 degrees"
-            self.fail(f"{message}, not from {found}")
+            self.fail(f"{message}, not from {extent}")
         return angles, candela
 
     def _angles(self, name: str, count: int) -> NDArray[np.float64]:
@@ -196,15 +196,15 @@ class _Reader:
                     self.fail(f"{word[:20]!r} is no number")
                 yield value
 
-    def _many(self, what: str, count: int) -> list[float]:
+    def _many(self, quantity: str, count: int) -> list[float]:
         values = [value for _, value in zip(range(count), self.numbers, strict=False)]
         if len(values) < count:
             self.line = len(self.lines)
-            self.fail(f"ends early: {len(values)} of {count} numbers of its {what}")
+            self.fail(f"ends early: {len(values)} of {count} numbers of its {quantity}")
         return values
 
-    def _count(self, what: str) -> int:
-        value = self._many(f"number of {what}", 1)[0]
+    def _count(self, quantity: str) -> int:
+        value = self._many(f"number of {quantity}", 1)[0]
         if value != int(value) or not 1 <= value <= MOST_VALUES:
-            self.fail(f"the number of {what} must be a whole one from 1, not {value:g}")
+            self.fail(f"the number of {quantity} must be a whole one from 1, not {value:g}")
         return int(value)

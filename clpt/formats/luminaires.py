@@ -20,7 +20,7 @@ EULUMDAT = ".ldt"
 def parameters(path: Path) -> dict[str, Any]:
     """Return `image` and `candela` of a Goniometric from an .ies or .ldt file.
 
-    Raises SceneError with the line of what is broken.
+    Raises SceneError with the broken line.
     """
     read = eulumdat.read if path.suffix.lower() == EULUMDAT else ies.read
     return ies.table(read(path))

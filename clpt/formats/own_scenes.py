@@ -1,4 +1,4 @@
-"""The scenes that come with clpt: names, what each shows, and names near a wrong one."""
+"""The scenes that come with clpt: names, subjects, and suggestions for a misspelled name."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-SCENES = "scenes"  # the first part of a path to one of them
+SCENES = "scenes"  # the first part of their paths
 _ROW = re.compile(r"^\| \[(\w+)\]\(\1\) \| (.+) \|$", re.M)  # of the table in scenes/README.md
 _LINK = re.compile(r"\[([^\]]+)\]\([^)]*\)")
 CLOSE = 0.7  # how near a name is that is meant
@@ -17,10 +17,10 @@ CLOSE = 0.7  # how near a name is that is meant
 
 @dataclass(frozen=True)
 class OwnScene:
-    """One of clpt's own scenes.
+    """A scene that comes with clpt.
 
-    path: from any folder, as "scenes/prism"; text: what it shows; size: (width, height) of its
-    picture [pixels], None where its file does not say.
+    path: from any folder, as "scenes/prism"; text: its subject; size: (width, height) of its
+    picture [pixels], None if its file does not say.
     """
 
     path: str
@@ -55,8 +55,8 @@ def every() -> Iterator[OwnScene]:
 
 
 def nearest_paths(path: Path) -> list[str]:
-    """Return the paths that somebody may mean who gives this one, which is not there."""
-    known = {own.removeprefix(f"{SCENES}/"): own for own in paths()}
+    """Return the paths that are spelled like a missing path."""
+    known = {known_path.removeprefix(f"{SCENES}/"): known_path for known_path in paths()}
     parts = path.parts[1:] if path.parts[:1] == (SCENES,) else path.parts
     if not parts or path.is_absolute():
         return []

@@ -1,6 +1,7 @@
-"""Readers of all formats share these: errors with a location, collected errors, stand-ins.
+"""Readers of all formats share these: errors with a location, collected errors, packed files.
 
-While errors are collected, a reader goes on after each of them."""
+While errors are collected, a reader goes on after each of them.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +9,14 @@ import gzip
 import os
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
-
 from clpt.errors import SceneError
 from clpt.files import budget, input_files
-from clpt.scene.roles import REFLECTANCE, Spectral
 
 
 class Located(ABC):
@@ -48,6 +46,7 @@ class Located(ABC):
 
 
 T = TypeVar("T")
+Progress = Callable[[float, str], None]  # called with the share that is read, and a text
 MOST = 200  # errors that are kept
 _found: ContextVar[list[SceneError] | None] = ContextVar("blockers", default=None)
 
@@ -73,30 +72,13 @@ def note(error: SceneError) -> bool:
 
 @contextmanager
 def collecting() -> Iterator[list[SceneError]]:
-    """Collect the errors of what is read inside; the list grows as they are met."""
+    """Collect the errors of readers that run inside; the list grows with each error."""
     errors: list[SceneError] = []
     token = _found.set(errors)
     try:
         yield errors
     finally:
         _found.reset(token)
-
-
-GREY = np.full((1, 1, 3), 0.5, np.float32)
-EVEN = np.array([[[0.5, 0.5, 1.0]]], np.float32)  # a normal map that bends nothing
-GREY.flags.writeable = EVEN.flags.writeable = False
-
-
-def grey_for(name: object) -> str:
-    """Return the warning of an image for which GREY or EVEN stands."""
-    return f"there is no file {str(name)!r}; grey stands for it"
-
-
-def colour(role: Spectral, rgb: Sequence[float]) -> Any:
-    """Return linear Rec.709 as the spectrum of a role; its kind checks the limits."""
-    if role is REFLECTANCE or role.colour is None:
-        return tuple(rgb)
-    return role.colour(*rgb)
 
 
 CHUNK = 1 << 22
@@ -106,7 +88,7 @@ WHAT = "unpacking it"
 def read_bytes(path: Path) -> bytes:
     """Read a file, unpacked if it is gzip's.
 
-    Raises SceneError for what is broken, or takes too much memory.
+    Raises SceneError for a file that is broken, or takes too much memory.
     """
     with input_files.opened(path) as file:
         if file.read(2) != b"\x1f\x8b":

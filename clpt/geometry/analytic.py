@@ -197,7 +197,7 @@ AROUND, ALONG = 96, 48  # steps of the azimuth, and of a sphere's polar angle
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tessellated(Mesh):
-    """A sphere or a tube as triangles, which layers still count as one primitive."""
+    """A sphere or a tube as triangles; layers still count it as a single primitive."""
 
 
 def keeps_its_kind(shape: Shape) -> bool:

@@ -1,10 +1,11 @@
 """Surfaces of signed distances on a grid, as triangles: marching tetrahedra (Doi and Koide 1991).
 
 Between the grid's points the distance is trilinear. Each cell that the surface goes through is cut
-into pieces. A piece whose corners are on one side is left: the distance in it lies between those at
-its corners. The others are cut into six tetrahedra that meet those of their neighbours. Vertices
-lie where the trilinear distance is zero. Normals are those of Mitsuba's smooth sdfgrids (Soderlund
-et al. 2022): the gradients of the eight cells around a point, trilinear between their middles.
+into pieces. A piece is skipped if its corners are all inside or all outside: the distance in it
+lies between its corners' distances. Other pieces are cut into six tetrahedra that meet their
+neighbours' tetrahedra. Vertices lie where the trilinear distance is zero. Normals are those of
+Mitsuba's smooth sdfgrids (Soderlund et al. 2022): the gradients of the eight cells around a point,
+trilinear between their middles.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ from clpt.files import budget
 from clpt.scene.shapes import SdfGrid
 
 MOST_PIECES = 16
-MOST_POINTS = 1 << 26  # at which distances are computed: corners of all pieces, cell by cell
+MOST_POINTS = 1 << 26  # most corners of pieces; the distance at each is computed, cell by cell
 AT_ONCE = 1 << 21  # of them
 CORNERS = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)])  # of a cell, z fastest
-# Six tetrahedra around the diagonal of a cell, one for each order of the axes (Kuhn 1960).
+# Six tetrahedra around the diagonal of a cell, by the orders of the axes (Kuhn 1960).
 TETRAHEDRA = np.array(
     [
         np.cumsum([np.zeros(3, int), *np.eye(3, dtype=int)[list(order)]], axis=0)
@@ -38,10 +39,10 @@ HALVINGS = 8  # of an edge, until its zero is looked for along a straight line
 def surface(shape: SdfGrid, name: str) -> tuple[Any, Any, Any, Any]:
     """Return vertices, faces, normals or None, and uvs, before the transform.
 
-    vertices, normals (n, 3) float32 in the unit cube; faces (m, 3) uint32, seen from where the
-    distance is positive; uvs (n, 2) float32, all 0, so that a texture does not show how the
-    surface is cut into triangles. name: for messages. Raises SceneError for values that are no
-    grid, for a grid without a surface, and for one of too many pieces.
+    vertices, normals (n, 3) float32 in the unit cube; faces (m, 3) uint32, whose front is on the
+    side of positive distances; uvs (n, 2) float32, all 0, so that a texture does not show the
+    triangles. name: for messages. Raises SceneError for values that are no grid, for a grid without
+    a surface, and for a grid of too many pieces.
     """
     values, pieces = _checked(shape, name), shape.pieces
     cells = _crossed(values)
@@ -173,7 +174,7 @@ def _tetrahedra(
 
 
 def _cases() -> list[tuple[int, list[tuple[int, ...]]]]:
-    """For each set of corners inside, as bits, the edges of its one or two triangles."""
+    """Return for each set of corners inside, as bits, the edges of its triangles."""
     cases: list[tuple[int, list[tuple[int, ...]]]] = []
     for number in range(1, 15):
         within = [i for i in range(4) if number >> i & 1]

@@ -1,7 +1,7 @@
 """Groups and their instances, on their way to the device.
 
-What rays meet as triangles stays one copy for all instances of its group. The rest is placed as so
-many ordinary shapes: lights, analytic shapes, and what is instanced only once.
+Triangles of a group are shared by all its instances. Lights, analytic shapes and groups with a
+single instance are copied as ordinary shapes.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from clpt.geometry.analytic import keeps_its_kind, tessellate
 from clpt.geometry.shapes import where
 from clpt.geometry.tubes import Tubes, as_tubes
 from clpt.records import INSTANCE
-from clpt.scene.shapes import Curves, Cylinder, Group, Instance, Mesh, Shape, Sphere
+from clpt.scene.shapes import Curves, Cylinder, Group, Mesh, Shape, Sphere
 
 CELLS = 16  # columns along a side, see `outline`
-FEW = 16  # instances of curves up to which each has its own, as tubes would take more memory
-ROUNDING = 4e-6  # of its coordinates, by which a box is larger than what float32 makes of it
+FEW = 16  # up to this number of instances curves are copied, as tubes would take more memory
+ROUNDING = 4e-6  # growth of a box over its coordinates, as float32 rounds them
 POINTS = 1 << 20  # that are transformed at once
 
 
@@ -72,8 +72,9 @@ class Shared:
 class Instances:
     """All instances of a scene.
 
-    rows: (k,) of INSTANCE.dtype; boxes: (k, 2, 3) float32; prototypes: (k,), what each places;
-    triangles, middles: of each prototype; keys: rows that each of its vertices has, one a time.
+    rows: (k,) of INSTANCE.dtype; boxes: (k, 2, 3) float32; prototypes: (k,) number of each
+    instance's prototype; triangles, middles: of each prototype; keys: rows of each of its vertices,
+    a row for each time.
     """
 
     rows: NDArray[Any]
@@ -85,7 +86,7 @@ class Instances:
 
 
 def concatenated(parts: Sequence[Shared]) -> Instances:
-    """Return the instances of all prototypes, one after the other."""
+    """Return the instances of all prototypes in order."""
     return Instances(
         np.concatenate([np.zeros(0, INSTANCE.dtype), *(part.rows for part in parts)]),
         np.concatenate([np.zeros((0, 2, 3), np.float32), *(part.boxes for part in parts)]),
@@ -100,7 +101,7 @@ def distinct(shapes_: Iterable[Shape]) -> Iterator[Shape]:
     """Yield every shape that a scene has, those of its groups once and where the group has them."""
     seen: set[int] = set()
     for shape in shapes_:
-        if not isinstance(shape, Instance):
+        if shape.group is None:
             yield shape
         elif id(shape.group) not in seen:
             seen.add(id(shape.group))
@@ -108,30 +109,30 @@ def distinct(shapes_: Iterable[Shape]) -> Iterator[Shape]:
 
 
 def sort(
-    things: Sequence[Shape], warnings: list[str], moving: Collection[int] = ()
+    shapes: Sequence[Shape], warnings: list[str], moving: Collection[int] = ()
 ) -> tuple[list[Placed], list[Prototype]]:
-    """Return the shapes that are lowered as they are, and those that are shared.
+    """Return the shapes that are lowered as they are, and the shared shapes.
 
-    moving: indices of those that move. Their triangles are instances, each with its own.
+    moving: indices of moving shapes; the triangles of each become a prototype and its instance.
     A sphere or tube that an instance stretches becomes a mesh; a line about it goes to `warnings`.
     Raises SceneError for an instance whose transform is singular or a projection.
     """
     placed: list[Placed] = []
     prototypes: list[Prototype] = []
     groups: dict[int, tuple[Group, list[int]]] = {}
-    for number, given in enumerate(things):
-        thing = _met_as(given)
-        if isinstance(thing, Instance):
-            groups.setdefault(id(thing.group), (thing.group, []))[1].append(number)
-        elif number in moving and thing.kind not in shape_records.ANALYTIC:
-            prototypes.append(_alone(thing, number))
+    for number, member in enumerate(shapes):
+        as_met = _met_as(member)
+        if (group := as_met.group) is not None:
+            groups.setdefault(id(group), (group, []))[1].append(number)
+        elif number in moving and as_met.kind not in shape_records.ANALYTIC:
+            prototypes.append(_alone(as_met, number))
         else:
-            placed.append(Placed(thing, number))
+            placed.append(Placed(as_met, number))
     for group, numbers in groups.values():
-        to_world = matrices([things[number] for number in numbers])
+        to_world = matrices([shapes[number] for number in numbers])
         shared = []
-        for given in group.shapes:
-            shape = _met_as(given, to_world)
+        for member in group.shapes:
+            shape = _met_as(member, to_world)
             whole = Prototype((shape,), to_world, np.array(numbers, np.int32))
             if shape.kind in shape_records.ANALYTIC:
                 placed += _analytic(shape, whole, prototypes, warnings, moving)
@@ -177,7 +178,7 @@ def matrices(instances: Sequence[Shape]) -> Matrices:
             return stacked
     except (TypeError, ValueError, IndexError):
         pass
-    return np.stack([shapes.placement(instance) for instance in instances])  # names the wrong one
+    return np.stack([shapes.placement(instance) for instance in instances])
 
 
 def _copies(shape: Shape, whole: Prototype) -> list[Placed]:
@@ -267,7 +268,7 @@ def place(
 
 
 def _boxes(points: Points, linear: Matrices, rows: NDArray[Any]) -> NDArray[np.float32]:
-    """A box (2, 3) around points under each matrix, a little larger than what rays meet."""
+    """Return a box (2, 3) around points under each matrix, enlarged by ROUNDING."""
     boxes = np.empty((len(rows), 2, 3))
     step = max(1, POINTS // len(points))
     columns = np.ascontiguousarray(points.T, np.float64)
@@ -305,9 +306,9 @@ def hull_points(vertices: Points, cells: int = CELLS) -> Points:
 def primitive_rows(shape: Shape, times: Sequence[float] = ()) -> NDArray[np.int64] | None:
     """Return the caller's row for each primitive of a shape, (n,); None: kernels know it.
 
-    times: at which a shape that deforms has vertices [s]. It is the row in `faces` of a mesh, also
-    where triangles without an area are left out, or where a face is subdivided; of curves the
-    number of the strand. What a transform makes triangles of has one primitive, 0.
+    times: of a deforming shape's vertices [s]. The row is that in `faces` of a mesh, also if
+    triangles without an area are left out, or if a face is subdivided; of curves it is the number
+    of the strand. An analytic shape that its transform turns into triangles has a single row, 0.
     """
     rows = _ROWS.get(shape.kind, _of_triangles)(shape, times)
     same = (
@@ -327,7 +328,7 @@ def _of_mesh(shape: Mesh, times: Sequence[float]) -> NDArray[np.int64]:
 
 def _of_tubes(shape: Curves, times: Sequence[float]) -> NDArray[np.int64]:
     keyed = times if shape.deformation is not None else ()
-    alike = [triangles.at_time(shape, time) for time in keyed]
+    alike = [shape.at_time(time) for time in keyed]
     vertices, faces, _, _ = triangles.local(alike[0] if alike else shape, alike)
     strand = tubes.strands(alike[0] if alike else shape, where(shape), alike, len(vertices))
     return np.asarray(strand[faces[:, 0]][triangles.kept(shape, times)])
@@ -342,7 +343,7 @@ def _of_one(shape: Shape, times: Sequence[float]) -> NDArray[np.int64]:
 
 
 def _as_they_lie(shape: Shape, times: Sequence[float]) -> None:
-    """Each is one by itself."""
+    """Return None: the primitives are the rows."""
 
 
 _ROWS: dict[str, Callable[..., NDArray[np.int64] | None]] = {

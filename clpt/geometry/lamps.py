@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from clpt.errors import SceneError
 from clpt.geometry import analytic
 from clpt.geometry.shapes import where
 from clpt.scene import Scene
 from clpt.scene.lights import STRENGTHS, TEMPERATURE, Light, with_emission
-from clpt.scene.shapes import Group, Instance, Shape
+from clpt.scene.shapes import Group, Shape
 
 
 def plainly_lit(scene: Scene) -> Scene:
@@ -30,14 +30,14 @@ def plainly_lit(scene: Scene) -> Scene:
 
 def _lit(shape: Shape, groups: dict[int, Group]) -> Shape:
     """Return a shape with a plain emission; groups: what was made of each, by its id."""
-    if isinstance(shape, Instance):
-        group = shape.group
+    if (group := shape.group) is not None:
         if id(group) not in groups:
             shapes = tuple(_lit(shape, groups) for shape in group.shapes)
             same = _same(shapes, group.shapes)
             groups[id(group)] = group if same else dataclasses.replace(group, shapes=shapes)
         lit_group = groups[id(group)]
-        return shape if lit_group is group else dataclasses.replace(shape, group=lit_group)
+        placing: dict[str, Any] = {"group": lit_group}
+        return shape if lit_group is group else dataclasses.replace(shape, **placing)
     light = shape.emission
     if light is None or not any(_asked(light, name) for name in (TEMPERATURE, *STRENGTHS)):
         return shape

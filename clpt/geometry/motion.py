@@ -1,4 +1,4 @@
-"""Motion of a scene while its shutter is open, and boxes around the ways of what moves."""
+"""Motion of a scene while its shutter is open, and boxes around moving shapes."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from clpt.arrays import Boxes
 from clpt.errors import SceneError
 from clpt.geometry import shapes, triangles
 from clpt.scene import Scene
-from clpt.scene.cameras import Camera, Matrix, Orthographic
+from clpt.scene.cameras import Camera
 from clpt.scene.lights import Light
 from clpt.scene.motion import Keys, Shutter, arc, decomposed, rotation, slerp
 from clpt.scene.shapes import Cylinder, Group, Instance, Shape, Sphere
 
-LOOKS = 33  # even times at which it is looked what is around a light
+LOOKS = 33  # evenly spaced times that sample a light's surroundings
 TURN = 0.1  # [rad] of a rotation that a box is looked at again
-ROUNDING = 4e-6  # of its coordinates, by which a box is larger than what float32 makes of it
-EVEN = 1e-5  # relative difference of scales from which a motion stretches
+ROUNDING = 4e-6  # growth of a box over its coordinates, as float32 rounds them
+EVEN = 1e-5  # largest relative difference of scales of a motion that does not stretch
 
 ROUND = (Sphere, Cylinder)
 AT_ONCE = Shutter(0.0, 0.0)
@@ -35,8 +35,8 @@ class Motions:
     """The parts of a scene that move while its shutter is open.
 
     shapes, lamps: keys by index in the scene's shapes and lights; camera: its keys, or None;
-    deforming: for shapes and instances with points that move by themselves, by index, the times
-    between which they do so linearly, from when the shutter opens to when it closes.
+    deforming: for shapes and instances with deforming points, by index, the times of their keys
+    from the opening of the shutter to its closing; points move linearly between them.
     """
 
     shutter: Shutter
@@ -47,7 +47,7 @@ class Motions:
 
     @classmethod
     def of(cls, scene: Scene) -> Motions:
-        """Return the motions of a scene of which `at_rest` has made still what does not move."""
+        """Return the motions of a scene that `at_rest` has returned."""
         of_shapes = {i: s.motion for i, s in enumerate(scene.shapes) if s.motion is not None}
         of_lamps = {i: s.motion for i, s in enumerate(scene.lights) if s.motion is not None}
         shutter = scene.camera.shutter or AT_ONCE
@@ -69,7 +69,7 @@ class Motions:
         return any(keys is not None and not is_rigid(keys) for keys in every)
 
     def looks(self) -> tuple[float, ...]:
-        """Return times from when the shutter opens to when it closes; one if nothing moves."""
+        """Return times from the shutter's opening to its closing; a single time without motion."""
         if not self:
             return (self.shutter.open,)
         keys = [*self.shapes.values(), *self.lamps.values(), self.camera]
@@ -80,7 +80,7 @@ class Motions:
         return tuple(sorted({*inner, *even}))
 
     def halfway(self, keys: Keys | None, point: NDArray[Any]) -> NDArray[np.float64]:
-        """Return where a point (3,) is in the middle of the time in which the shutter is open."""
+        """Return a point (3,) at the middle of the exposure."""
         point = np.asarray(point, np.float64)
         if keys is None:
             return point
@@ -88,15 +88,15 @@ class Motions:
         return np.asarray(transforms.transform_points(matrix, point), np.float64)
 
     def swept(self, number: int, boxes: NDArray[Any]) -> Boxes:
-        """Return boxes (n, 2, 3) around those of one of the scene's shapes while it moves."""
+        """Return boxes (n, 2, 3) of a shape of the scene, grown to hold its motion."""
         return swept(self.shapes[number], corners(boxes), self.shutter)
 
 
 def at_rest(scene: Scene) -> Scene:
-    """Return a scene in which only that has keys that moves while the shutter is open.
+    """Return a scene whose keys all belong to objects that move while the shutter is open.
 
-    What else has some is put where it is when the shutter opens; a scene without keys is returned
-    as it is. Raises SceneError for keys on a shape of a group, and on lights that cannot move.
+    Other objects with keys get their transform at the opening; a scene without keys is returned as
+    it is. Raises SceneError for keys on a shape of a group, and on lights that cannot move.
     """
     changes: dict[str, Any] = {}
     owners = (*scene.shapes, *scene.lights, scene.camera)
@@ -124,7 +124,7 @@ def at_rest(scene: Scene) -> Scene:
     for name, parts in lists:
         if any(part.motion is not None for part in parts):
             changes[name] = [_rest(part, shutter) for part in parts]
-    camera = _rest(scene.camera, shutter)
+    camera = _camera_at_rest(scene.camera, shutter)
     if camera is not scene.camera:
         changes["camera"] = camera
     return replace(scene, **changes) if changes else scene
@@ -135,7 +135,7 @@ def _deforms(shape: Shape) -> bool:
 
 
 def _times(shape: Shape, shutter: Shutter) -> tuple[float, ...]:
-    """Return the times [s] between which all points of a shape or instance move linearly."""
+    """Return the times [s] of keys; all points of a shape or instance move linearly between."""
     deformations = [member.deformation for member in shape.members]
     times = {t for keys in deformations if keys is not None for t in keys.while_open(shutter)}
     return tuple(sorted(times))
@@ -148,20 +148,23 @@ def _undeformed(shapes_: Sequence[Shape], shutter: Shutter) -> list[Shape]:
     for shape in shapes_:
         if not _deforms(shape):
             still.append(shape)
-        elif isinstance(shape, Instance):
-            group = shape.group
+        elif (group := shape.group) is not None:
             if id(group) not in groups:
                 inner = tuple(_opening(member, shutter) for member in group.shapes)
                 groups[id(group)] = replace(group, shapes=inner)
-            still.append(replace(shape, group=groups[id(group)]))
+            placing: dict[str, Any] = {"group": groups[id(group)]}
+            still.append(replace(shape, **placing))
         else:
             still.append(_opening(shape, shutter))
     return still
 
 
 def _opening(shape: Any, shutter: Shutter) -> Any:
-    """A shape with its points where they are when the shutter opens; what stands still then has no
-    deformation. Raises SceneError for one that is not of the shape's points."""
+    """Return a shape with its points at the shutter's opening.
+
+    A shape whose points do not move then has no deformation. Raises SceneError for a deformation
+    that does not have the shape's points.
+    """
     deformation = shape.deformation
     if deformation is None:
         return shape
@@ -171,35 +174,40 @@ def _opening(shape: Any, shutter: Shutter) -> Any:
         message = "spheres that emit light cannot deform: leave one of the two out"
         raise SceneError(message, where=f"{shapes.where(shape)}.deformation")
     changes = {} if still else {"deformation": deformation}
-    return replace(triangles.at_time(shape, shutter.open), **changes)
+    return replace(shape.at_time(shutter.open), **changes)
 
 
-def _check(thing: Any, where: str) -> None:
-    if not isinstance(thing.motion, (Keys, type(None))):
-        raise SceneError(f"must be Keys, not {thing.motion!r}", where=f"{where}.motion")
+def _check(movable: Any, where: str) -> None:
+    if not isinstance(movable.motion, (Keys, type(None))):
+        raise SceneError(f"must be Keys, not {movable.motion!r}", where=f"{where}.motion")
 
 
-def _rest(thing: Any, shutter: Shutter) -> Any:
-    """A shape, light or camera without keys, if it does not move while the shutter is open."""
-    if thing.motion is None or _moves(thing.motion, shutter):
-        return thing
-    matrix = thing.motion.at(shutter.open)
-    angular = isinstance(thing, Camera) and not isinstance(thing, (Matrix, Orthographic))
-    if angular and not _keeps_lengths(matrix):  # which its `to_world` must
-        return replace(thing, motion=Keys((0.0, 1.0), (matrix, matrix)))
-    if isinstance(thing, Matrix):
-        return replace(thing, motion=None, view=thing.view @ transforms.inverse(matrix))
-    if isinstance(thing, ROUND) and not is_even(thing.motion):
-        still = replace(thing, motion=None)  # which an instance may stretch
-        return Instance(group=Group((still,), thing.kind), to_world=matrix, name=thing.name)
-    if hasattr(thing, "to_world"):
-        return replace(thing, motion=None, to_world=matrix @ np.asarray(thing.to_world))
+def _rest(movable: Any, shutter: Shutter) -> Any:
+    """Return a shape or light without keys, if it does not move while the shutter is open."""
+    if movable.motion is None or _moves(movable.motion, shutter):
+        return movable
+    matrix = movable.motion.at(shutter.open)
+    if isinstance(movable, ROUND) and not is_even(movable.motion):
+        still = replace(movable, motion=None)  # which an instance may stretch
+        return Instance(group=Group((still,), movable.kind), to_world=matrix, name=movable.name)
+    if hasattr(movable, "to_world"):
+        return replace(movable, motion=None, to_world=matrix @ np.asarray(movable.to_world))
     changes: dict[str, Any] = {"motion": None}
-    if hasattr(thing, "position"):
-        changes["position"] = tuple(transforms.transform_points(matrix, thing.position))
-    if hasattr(thing, "direction"):
-        changes["direction"] = tuple(transforms.transform_vectors(matrix, thing.direction))
-    return replace(thing, **changes)
+    if hasattr(movable, "position"):
+        changes["position"] = tuple(transforms.transform_points(matrix, movable.position))
+    if hasattr(movable, "direction"):
+        changes["direction"] = tuple(transforms.transform_vectors(matrix, movable.direction))
+    return replace(movable, **changes)
+
+
+def _camera_at_rest(camera: Camera, shutter: Shutter) -> Camera:
+    """Return a camera without keys, if it does not move while the shutter is open."""
+    if camera.motion is None or _moves(camera.motion, shutter):
+        return camera
+    matrix = camera.motion.at(shutter.open)
+    if camera.is_rigid and not _keeps_lengths(matrix):
+        return replace(camera, motion=Keys((0.0, 1.0), (matrix, matrix)))
+    return replace(camera.moved(matrix), motion=None)
 
 
 def _keeps_lengths(matrix: NDArray[np.float64]) -> bool:
@@ -246,10 +254,10 @@ def corners(boxes: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def swept(keys: Keys, points: NDArray[np.float64], shutter: Shutter) -> Boxes:
-    """Return boxes (n, 2, 3) around the hulls of points (n, p, 3) that move while it is open.
+    """Return boxes (n, 2, 3) around the hulls of points (n, p, 3) that move during the exposure.
 
-    Between two looks a point leaves their chord by at most h^2 / 8 of its second derivative, by
-    which the boxes are larger.
+    Between two looks a point leaves their chord by at most h^2 / 8 of its second derivative; the
+    boxes grow by this bound.
     """
     low = np.full((len(points), 3), np.inf)
     high = -low

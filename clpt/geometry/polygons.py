@@ -1,9 +1,9 @@
 """Polygons as triangles that keep their shape, whether they are convex or not.
 
-A fan around the first corner fits a polygon of one outline if none of its triangles is turned
-over: their signed areas add up to the polygon's, so they cover it once. That holds for all convex
-ones and is tested in bulk. Quadrilaterals that fail are split at their other diagonal; ears of the
-rest are clipped, by mapbox_earcut, in the plane of the polygon's vector area (Newell's normal).
+A fan around the first corner fits a simple polygon if none of its triangles is turned over: their
+signed areas add up to the polygon's, so they cover it once. The test holds for all convex polygons
+and runs in bulk. Quadrilaterals that fail are split at their other diagonal; ears of other polygons
+are clipped, by mapbox_earcut, in the plane of the polygon's vector area (Newell's normal).
 """
 
 from __future__ import annotations
@@ -31,9 +31,8 @@ def triangulate(
     """Return triangles (t, 3), as positions in `corners`, and the polygon of each, (t,).
 
     vertices: (n, 3); counts: (p,) how many corners each polygon has; corners: (sum of counts,)
-    their vertices, one polygon after the other. A polygon of n corners gives n - 2 triangles, one
-    of fewer than 3 none; triangles turn as their polygon does. A polygon whose corners name no
-    vertex, or one that is not finite, is a fan.
+    their vertices, polygon by polygon. A polygon of n corners gives n - 2 triangles, none if n < 3;
+    triangles turn as their polygon does. A polygon with a missing or non-finite vertex is a fan.
 
     Raises SceneError for a polygon of more than MOST_CORNERS corners that no fan fits, and where
     the load has no more time.
@@ -76,7 +75,7 @@ def _fans(counts: Integers, starts: Integers) -> tuple[NDArray[np.int32], NDArra
 def _outlines(
     points: NDArray[Any], corners: NDArray[Any], at: Integers
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return the places (k, 3) of corners, and whether each is one: there, and finite."""
+    """Return the positions (k, 3) of corners, and whether each is present and finite."""
     named = corners[at]
     there = (named >= 0) & (named < len(points))
     places = points[np.where(there, named, 0).astype(np.int64)].astype(np.float64)
@@ -163,7 +162,7 @@ def _clip(outline: Floats, normal: Floats) -> Integers | None:
 
 
 def _without_spikes(outline: Floats) -> Integers:
-    """Return the corners without repeated ones and without edges that go there and back."""
+    """Return the corners without repetitions and without edges that go there and back."""
     points = [tuple(point) for point in outline.tolist()]
     kept: list[int] = []
     for corner, point in enumerate(points):

@@ -1,6 +1,6 @@
 """Meshes that lowering makes finer: Loop subdivision, and displacement by an image.
 
-Vertices at one place count as one, so that nothing tears where texture coordinates have a seam.
+Coincident vertices count as the same vertex, so that seams of texture coordinates do not tear.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from clpt.errors import SceneError
 from clpt.files import budget
 from clpt.geometry.shapes import where
 from clpt.scene import subdivision
-from clpt.scene.pixels import pixels
 from clpt.scene.roles import REAL
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap
@@ -24,7 +23,7 @@ from clpt.scene.textures import Bitmap
 Parts = tuple[Any, Any, Any, Any]
 DEEPEST = 10
 MOST_TRIANGLES = 1 << 25
-PER_TRIANGLE = 350  # bytes of memory for each displaced one, while they are made
+PER_TRIANGLE = 350  # bytes of memory for each displaced triangle, while it is computed
 
 
 def is_refined(mesh: Mesh) -> bool:
@@ -33,10 +32,10 @@ def is_refined(mesh: Mesh) -> bool:
 
 
 def refined(mesh: Mesh, parts: Parts, name: str) -> Parts:
-    """Return vertices, faces, normals and uvs of a finer mesh, from those of its arrays.
+    """Return vertices, faces, normals and uvs of a finer mesh.
 
-    name: for messages. The mesh is one that `check` accepts. Raises SceneError for a surface that
-    is none, and for a mesh that gets too large.
+    name: for messages. `check` must accept the mesh. Raises SceneError for a surface that is not a
+    manifold, and for a mesh that gets too large.
     """
     vertices, faces, normals, uvs = parts
     points, faces = vertices.astype(np.float64), faces.astype(np.int64)
@@ -54,7 +53,7 @@ def refined(mesh: Mesh, parts: Parts, name: str) -> Parts:
 
 
 def check(mesh: Mesh) -> None:
-    """Raise SceneError for what cannot be subdivided or displaced."""
+    """Raise SceneError for a mesh that cannot be subdivided or displaced."""
     if mesh.subdivision == 0 and mesh.displacement is None:
         return
     name = where(mesh)
@@ -87,7 +86,7 @@ def _welded(points: Floats, faces: Integers) -> tuple[Floats, Integers, Integers
 
 
 def sources(mesh: Mesh, parts: Parts, count: int) -> Integers:
-    """Return from which face of a mesh each of the `count` faces of `refined` comes, (count,)."""
+    """Return the original face of each of the `count` faces of `refined`, (count,)."""
     vertices, faces = parts[0].astype(np.float64), parts[1].astype(np.int64)
     kept = np.arange(len(faces))
     if mesh.subdivision:
@@ -149,8 +148,8 @@ def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
         raise SceneError(message + "triangles; raise displacement_edge", where=name)
     budget.check(PER_TRIANGLE * len(faces) * 4**levels, f"{name}: its displacement")
     if normals is None:
-        places, welded, own = _welded(points, faces)
-        normals = _smooth(places, welded)[own]
+        places, welded, numbers = _welded(points, faces)
+        normals = _smooth(places, welded)[numbers]
     for _ in range(levels):
         budget.check_time()
         edges, faces = _halved(faces, len(points))
@@ -160,10 +159,10 @@ def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
     image = mesh.displacement
     assert image is not None
     moved = points + mesh.displacement_scale * heights(image, uvs)[:, None] * normals
-    _, welded, own = _welded(points, faces)
-    shares = np.bincount(own)
-    mean = np.stack([np.bincount(own, moved[:, i]) / shares for i in range(3)], axis=1)
-    return mean[own], faces, _smooth(mean, welded)[own], uvs
+    _, welded, numbers = _welded(points, faces)
+    shares = np.bincount(numbers)
+    mean = np.stack([np.bincount(numbers, moved[:, i]) / shares for i in range(3)], axis=1)
+    return mean[numbers], faces, _smooth(mean, welded)[numbers], uvs
 
 
 def _smooth(points: Floats, faces: Integers) -> Floats:
@@ -180,7 +179,7 @@ def _smooth(points: Floats, faces: Integers) -> Floats:
 
 def heights(image: Bitmap, uvs: Floats) -> Floats:
     """Return what an image says at uvs (n, 2), as textures/kinds/bitmap.cl reads numbers: (n,)."""
-    values = pixels(image, REAL)[..., 0].astype(np.float64)
+    values = image.pixels(REAL)[..., 0].astype(np.float64)
     to_uv = np.asarray(image.to_uv, np.float64)
     x, y = ((np.c_[uvs, np.ones(len(uvs))] @ to_uv.T)[:, :2] * [1.0, -1.0] + [0.0, 1.0]).T
     x, y = x * values.shape[1], y * values.shape[0]
@@ -197,7 +196,7 @@ def heights(image: Bitmap, uvs: Floats) -> Floats:
 
 
 def _texel(image: Bitmap, values: Floats, row: Floats, column: Floats) -> Floats:
-    """Values of texels, also of those that lie beyond the image."""
+    """Return values of texels; texels beyond the image follow its wrap modes."""
     height, width = values.shape
     y, down = _wrapped(row, height, image.wrap_v or image.wrap)
     x, along = _wrapped(column, width, image.wrap)

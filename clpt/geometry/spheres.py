@@ -1,8 +1,8 @@
-"""Many spheres in one shape, on their way to the device: all at once, not one by one.
+"""Many spheres in a single shape, as arrays on their way to the device.
 
-One row of `shapes` stands for all of them, one row of `geometry` says how they are turned, and the
-table `spheres` has four words for each: centre and radius in the world. Where spheres move by
-themselves there are so many rows for each key, and a word behind the row of `geometry` says where.
+All of them share a row of `shapes` and a row of `geometry` with their rotation; the table `spheres`
+has four words for each: centre and radius in the world. Spheres with deformation have these words
+for each key, and a word behind the row of `geometry` is their offset.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import Balls, Words, on_host, single
 from clpt.errors import SceneError
-from clpt.geometry import analytic, shapes, triangles
+from clpt.geometry import analytic, shapes
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape, Spheres
 
@@ -55,7 +55,7 @@ def keyed(shape: Spheres, times: Sequence[float]) -> Balls:
     at_all = []
     for time in times:
         try:
-            at_all.append(balls(triangles.at_time(shape, time)))
+            at_all.append(balls(shape.at_time(time)))
         except SceneError as error:
             where = f"{shapes.where(shape)}.deformation"
             raise SceneError(f"at {time:g} s: {error.message}", where=where) from None

@@ -18,24 +18,23 @@ from clpt.records import CURVE_SIZES
 from clpt.scene.shapes import Curves
 
 CONTROL, WORDS = 16, CURVE_SIZES["words"]  # words of a piece: its control points, and all
-BEND = np.pi / 6.0  # by which the control polygon of a piece may turn
+BEND = np.pi / 6.0  # most turn of a piece's control polygon
 SLENDER = 20.0  # times as large as the piece a box may be, before the piece is cut
 MOST_CUTS = 64  # of a cubic
 ROUNDS = 4  # of looking at whether pieces turn little, and cutting more
-MANY = 1 << 22  # pieces of a shape from which on cubics are cut less, as far as they bend little
+MANY = 1 << 22  # pieces of a shape; above this number, cubics that bend little are cut less
 CELL_BITS = 12  # of each axis, in the order of pieces
-KINK = 1e-3  # between pieces, from which on the gap is closed by a half sphere [rad]
+KINK = 1e-3  # least angle between pieces whose gap is closed by a half sphere [rad]
 MOST = (1 << 31) // WORDS - 1  # pieces: kernels count words by an int
 
 
 def pieces(shape: Curves, cut_as: Curves | None = None) -> Floats32:
     """Return the pieces of all strands in the world, (n, WORDS) float32.
 
-    A row has of the four control points of a Bezier cubic the x, then the y, the z, and the radii
-    [m]; where a half sphere closes the piece, the radius at that end is negated. Then an axis (3)
-    across the curve at its beginning, from which u is counted; v there, and by how much it grows;
-    three words that mean nothing. cut_as: the same curves under another transform, whose cubics are
-    cut into as many pieces.
+    A row has the four control points of a Bezier cubic: x, then y, z, and the radii [m]; if a half
+    sphere closes the piece, the radius at that end is negated. Then an axis (3) across the curve at
+    its beginning, the origin of u; v there, and the increase of v; three unused words. cut_as: the
+    same curves under another transform; their number of pieces is used.
 
     Raises SceneError for points that are no curves, or a transform that stretches.
     """
@@ -99,7 +98,7 @@ def _in_world(shape: Curves) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
 
 def _near_to_each_other(points: NDArray[np.float32]) -> NDArray[np.intp]:
-    """An order of points (n, 3) along a Z curve: rays that meet one soon meet its neighbours."""
+    """Return an order of points (n, 3) along a Z curve, so that neighbours are close in memory."""
     low, high = points.min(axis=0), points.max(axis=0)
     cells = (points - low) / np.where(high > low, high - low, 1.0) * ((1 << CELL_BITS) - 1)
     keys = np.zeros(len(points), np.uint64)
@@ -114,9 +113,9 @@ def _cuts(spans: NDArray[np.float64]) -> NDArray[np.int64]:
     least = np.maximum(np.ceil(_turn(spans) / BEND), 1.0).astype(np.int64)
     turning = np.flatnonzero(least > 1)
     for _ in range(ROUNDS):  # where a cubic turns most within little of its length
-        own = least[turning]
-        span = np.repeat(turning, own)
-        begin = (np.arange(len(span)) - np.repeat(np.cumsum(own) - own, own)) / least[span]
+        turns = least[turning]
+        span = np.repeat(turning, turns)
+        begin = (np.arange(len(span)) - np.repeat(np.cumsum(turns) - turns, turns)) / least[span]
         turn = _turn(_between(spans[span], begin, begin + 1.0 / least[span]))
         turning = np.unique(span[turn > 1.5 * BEND])
         turning = turning[least[turning] < MOST_CUTS]
@@ -124,10 +123,10 @@ def _cuts(spans: NDArray[np.float64]) -> NDArray[np.int64]:
     length = np.linalg.norm(np.diff(spans[..., :3], axis=1), axis=2)
     low, high = spans[..., :3].min(axis=1), spans[..., :3].max(axis=1)
     x, y, z = (high - low).T
-    own = spans[..., 3].mean(axis=1) * np.maximum(length.sum(axis=1), 1e-300)
+    turns = spans[..., 3].mean(axis=1) * np.maximum(length.sum(axis=1), 1e-300)
     slender = SLENDER
     while True:
-        wanted = np.ceil((x * y + y * z + z * x) / (slender * np.maximum(own, 1e-300)))
+        wanted = np.ceil((x * y + y * z + z * x) / (slender * np.maximum(turns, 1e-300)))
         cuts = np.clip(np.maximum(least, wanted), 1, MOST_CUTS).astype(np.int64)
         if cuts.sum() <= MANY or (wanted <= least).all():
             return cuts
@@ -137,7 +136,7 @@ def _cuts(spans: NDArray[np.float64]) -> NDArray[np.int64]:
 def _turn(spans: NDArray[np.float64]) -> NDArray[np.float64]:
     """By how much the control polygon of each cubic turns, (n,) [rad]."""
     edges = np.diff(spans[..., :3], axis=1)
-    for i, others in ((2, (1, 0)), (1, (2,)), (0, (1,))):  # of no length: as the next that has one
+    for i, others in ((2, (1, 0)), (1, (2,)), (0, (1,))):  # of no length: as the next
         for other in others:
             still = ~edges[:, i].any(axis=1)
             edges[still, i] = edges[still, other]

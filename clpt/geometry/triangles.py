@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -23,13 +23,10 @@ from clpt.scene.motion import Deformation
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Mesh, Shape
 
-POINTS = {  # what a deformation moves
-    "mesh": "vertices", "curves": "points", "tubes": "points", "spheres": "centers",
-}  # fmt: skip
 SUMMED = 1 << 20  # triangles whose normals are summed at a time
 
 FAR = 2.0**61  # from where on the product of two edges may be beyond float32
-LEAST_CROSS = 2.0**-75  # up to which a square is zero in float32
+LEAST_CROSS = 2.0**-75  # squares up to this are zero in float32
 PER_KEY = 32  # bytes of a vertex at each time: place, normal, uv
 CHUNK = 1 << 16  # rows that are looked at at a time: what is made of them stays in the cache
 
@@ -70,10 +67,7 @@ def triangulate(
     """
     vertices, faces, normals, uvs = _in_world(shape)
     solid = _solid(vertices, faces)
-    warnings_of = not isinstance(
-        shape, shapes.Curves | shapes.SdfGrid
-    )  # a tube may shrink to a line
-    if warnings_of and not solid.all() and flat is not None:
+    if not shape.flattens and not solid.all() and flat is not None:
         flat.append(Flat(where(shape), int(len(solid) - solid.sum()), len(solid)))
     faces = faces if solid.all() else faces[solid]
     return vertices, np.ascontiguousarray(faces), normals, uvs
@@ -99,7 +93,7 @@ def keyed(
     if shape.deformation is None:
         at_all = [_in_world(shape)] * count
     else:
-        alike = [at_time(shape, time) for time in times]
+        alike = [shape.at_time(time) for time in times]
         at_all = [_in_world(surface, alike) for surface in alike]
     vertices, faces, _, uvs = at_all[0]
     budget.check(PER_KEY * count * len(vertices), f"{where(shape)} at {count:,} times")
@@ -121,18 +115,9 @@ def keyed(
 
 def kept(shape: Shape, times: Sequence[float] = ()) -> NDArray[np.bool_]:
     """Return which of a shape's triangles `triangulate`, or at `times` [s] `keyed`, keeps, (m,)."""
-    alike = [shape] if shape.deformation is None else [at_time(shape, time) for time in times]
+    alike = [shape] if shape.deformation is None else [shape.at_time(time) for time in times]
     at_all = [_in_world(surface, alike if times else ()) for surface in alike]
     return np.asarray(np.any([_solid(surface[0], surface[1]) for surface in at_all], axis=0))
-
-
-def at_time(shape: Any, time: float) -> Any:
-    """Return a shape with a deformation as it is at a time [s], which does not deform."""
-    points, normals = shape.deformation.at(time)
-    changes: dict[str, Any] = {POINTS[shape.kind]: points, "deformation": None}
-    if isinstance(shape, Mesh):
-        changes |= {"normals": shape.normals if normals is None else normals, "tangents": None}
-    return replace(shape, **changes)
 
 
 def check_deformation(shape: Shape) -> None:
@@ -140,7 +125,7 @@ def check_deformation(shape: Shape) -> None:
     deformation, place = shape.deformation, f"{where(shape)}.deformation"
     if not isinstance(deformation, Deformation):
         raise SceneError(f"must be a Deformation, not {deformation!r}", where=place)
-    name = POINTS[shape.kind]
+    name = shape.deformed_field
     points = fields_of(shape)[name]
     if points is None:
         raise SceneError(f"a {shape.kind} that deforms needs {name} too", where=place)
@@ -164,7 +149,7 @@ def check_deformation(shape: Shape) -> None:
 
 
 def warnings_of(flat: Sequence[Flat]) -> list[str]:
-    """Return one warning about the triangles that were left out, or none."""
+    """Return a single warning about all triangles that were left out, if there are any."""
     if not flat:
         return []
     head = flat[0]
@@ -204,7 +189,7 @@ def per_face(name: str) -> bool:
 def attribute(shape: Shape, name: str) -> Points:
     """Return an attribute of a mesh, (n, 1 or 3) float32 per vertex, or per face of `triangulate`.
 
-    Raises SceneError for one that has another shape, or values that are not finite.
+    Raises SceneError for an array of another shape, or with values that are not finite.
     """
     by_face = per_face(name)
     if shape.kind in ONE_OF:
@@ -264,7 +249,7 @@ def _solid(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
 
 
 def _wide(vertices: NDArray[Any]) -> NDArray[Any]:
-    """Vertices of which no product is beyond their type: as float64 where they are far away."""
+    """Return vertices whose products do not overflow: as float64 if they are far away."""
     return vertices.astype(np.float64) if np.abs(vertices).max(initial=0.0) > FAR else vertices
 
 
@@ -292,7 +277,7 @@ def local(
 ) -> tuple[Points, Faces, Points | None, Points | None]:
     """Return vertices, faces, normals and uvs before the transform, as `triangulate` does.
 
-    alike: the shape at several times, at all of which the faces are the same.
+    alike: the shape at several times; its faces are the same at all times.
     """
     if isinstance(shape, shapes.Mesh):
         return _mesh(shape)

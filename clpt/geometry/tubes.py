@@ -21,13 +21,13 @@ from clpt.scene.shapes import Curves
 
 ERROR = 0.25  # of the radius: how far a tube's axis may be from its curve
 FINEST = 32  # most pieces of a cubic
-PIECES = 1 << 20  # from which on axes follow their curves less closely, down to one piece a cubic
-TRIANGLES = 1 << 23  # from which on tubes have fewer sides
+PIECES = 1 << 20  # above this number, axes follow their curves less closely
+TRIANGLES = 1 << 23  # above this number, tubes have fewer sides
 SIDES = (4, 16)  # least and most sides of a tube
-SIDES_OF_WORLD = np.eye(3)[::-1]  # z, y, x: on which of a strand u is a quarter
+SIDES_OF_WORLD = np.eye(3)[::-1]  # z, y, x: the side of a strand where u is a quarter
 THINNEST = 1e-4  # of the thickest, which a tube has where the radius is zero
 LEAST = {"linear": 2, "bspline": 4, "bezier": 4}  # points of a strand
-# From four control points of a uniform cubic B-spline to those of the same cubic's Bezier form.
+# From control points of a uniform cubic B-spline to control points of its Bezier form.
 TO_BEZIER = np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6.0
 
 
@@ -238,7 +238,7 @@ def _around(
     lower: Integers,
     sides: int,
 ) -> tuple[Any, Any, Any, Any]:
-    """Rings around the points of the axes, and facets from those of `lower` to the next ones."""
+    """Return rings around the axes' points, and facets from rings `lower` to the next rings."""
     u = np.arange(sides + 1) / sides
     wider = np.pi / sides / np.sin(np.pi / sides)  # perimeters are that of the circle
     cos, sin = (f(2.0 * np.pi * u)[:, None].astype(np.float32) for f in (np.cos, np.sin))

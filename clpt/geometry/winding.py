@@ -1,8 +1,8 @@
 """Insides of shapes: how often a shape winds around a point; boxes, areas and volumes.
 
-A closed boundary fills the whole sphere of directions around a point inside, 4 pi, and on balance
-nothing of it around a point outside. cached: keeps what a function made of what it was given, such
-as the triangles of a shape; None: nothing is kept.
+The solid angle of a closed boundary is 4 pi around a point inside, and 0 around a point outside.
+cached: keeps results of functions by their arguments, such as the triangles of a shape; None:
+nothing is kept.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from clpt.geometry.analytic import keeps_its_kind, tessellate
 from clpt.geometry.triangles import counted, triangulate
 from clpt.scene.shapes import Cylinder, Disk, Mesh, Shape, Sphere, Spheres
 
+Cache = Callable[..., Any]  # calls a function, or returns its earlier result
 Triangles = tuple[NDArray[np.float32], NDArray[np.uint32]]
 AROUND = 96  # corners of a disk's polygon
 CHUNK = 1 << 18  # triangles that are summed at a time
 
 
-def box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any], NDArray[Any]]:
+def box(shape: Shape, cached: Cache | None) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the lowest and the highest corner of a shape's box."""
     if isinstance(shape, Sphere) and keeps_its_kind(shape):
         return analytic.bounds(shape)
@@ -37,7 +38,7 @@ def box(shape: Shape, cached: Callable[..., Any] | None) -> tuple[NDArray[Any], 
     return vertices.min(axis=0), vertices.max(axis=0)
 
 
-def winding(shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | None) -> float:
+def winding(shape: Shape, p: NDArray[np.float64], cached: Cache | None) -> float:
     """Return how often a shape winds around a point.
 
     It is 1 inside of a shape that is closed and faces outward.
@@ -53,7 +54,7 @@ def winding(shape: Shape, p: NDArray[np.float64], cached: Callable[..., Any] | N
 
 
 def areas(
-    shape: Shape, cached: Callable[..., Any] | None, to_world: NDArray[np.float64] | None = None
+    shape: Shape, cached: Cache | None, to_world: NDArray[np.float64] | None = None
 ) -> NDArray[np.float64]:
     """Return the sum of a shape's areas along their normals, and of the areas alone (4,) [m^2].
 
@@ -70,7 +71,7 @@ def areas(
     return np.array([*n.sum(axis=0), np.linalg.norm(n, axis=1).sum()])
 
 
-def volume(shape: Shape, cached: Callable[..., Any] | None) -> float:
+def volume(shape: Shape, cached: Cache | None) -> float:
     """Return the volume of a shape [m^3], below 0 if it faces inward."""
     if isinstance(shape, Spheres):
         return (-1.0 if shape.flip_normals else 1.0) * 4.2 * float((balls(shape)[1] ** 3).sum())
@@ -102,7 +103,7 @@ def balls(shape: Spheres) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return rows[:, :3], np.abs(rows[:, 3])
 
 
-def triangles_of(shape: Shape, cached: Callable[..., Any] | None = None) -> Triangles:
+def triangles_of(shape: Shape, cached: Cache | None = None) -> Triangles:
     """Return the triangles of a shape in the world, or those that stand for it."""
     if isinstance(shape, Disk):
         shape = _fan(shape)
@@ -129,20 +130,20 @@ def _fan(disk: Disk) -> Mesh:
     )
 
 
-NEAR = 1e-6  # of its extent: vertices of several meshes that are one
+NEAR = 1e-6  # of the extent: largest distance of vertices of several meshes that coincide
 
 
 def snapped(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return points (n, 3), those that nearly coincide at one place of a lattice."""
+    """Return points (n, 3) on a lattice, so that nearly coincident points are equal."""
     step = NEAR * float(np.ptp(points, axis=0).max(initial=0.0)) or 1.0
     return np.round(points / step) * step
 
 
 def largest_hole(vertices: NDArray[Any], faces: NDArray[Any]) -> float:
-    """Return the area of the largest hole in triangles, over theirs; 0 of what is closed.
+    """Return the area of the largest hole in triangles, over their area; 0 if they are closed.
 
-    vertices (n, 3), faces (m, 3). An edge that is gone along as often one way as the other bounds
-    no hole; the others are the rims, and those that touch are of one hole.
+    vertices (n, 3), faces (m, 3). An edge bounds no hole if as many triangles traverse it in both
+    directions; connected other edges are the rim of a hole.
     """
     points, corners = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
     edges, balance = _unbalanced(corners)
@@ -161,7 +162,7 @@ def largest_hole(vertices: NDArray[Any], faces: NDArray[Any]) -> float:
 
 
 def _first_of_place(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The first point of those at the same place, of each (n,); told apart by a hash."""
+    """Return for each point the first equal point, (n,), by a hash."""
     words = np.ascontiguousarray(points + 0.0).view(np.uint64)  # + 0: no two zeros
     name = np.zeros(len(points), np.uint64)
     for k in range(3):
@@ -173,7 +174,7 @@ def _first_of_place(points: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _unbalanced(corners: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Edges (k, 2) that triangles go along more often one way, and by how much."""
+    """Return edges (k, 2) that triangles traverse more often in a direction; the excess (k,)."""
     start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
     low, high = np.minimum(start, end), np.maximum(start, end)
     name = low * (int(corners.max(initial=0)) + 1) + high

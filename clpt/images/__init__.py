@@ -6,17 +6,25 @@ its bytes stand in another file. What a file says of its numbers is heeded: colo
 """
 
 from clpt.choices import FOR_SCREENS, WRITABLE
-from clpt.images.arrays import from_array
-from clpt.images.brightness import auto_exposure, levels, raised, stops
-from clpt.images.exr import STOPS, matrix_of
+from clpt.images.exr import STOPS, matrix_of, read_channels, read_layers
 from clpt.images.exr_files import attributes, part_names, write_channels
-from clpt.images.layers import read_channels, read_layers
-from clpt.images.npy import write as write_npy
+from clpt.images.float_files import write_npy as write_npy
+from clpt.images.measures import auto_exposure, levels, raised, stops
+from clpt.images.picture_files import (
+    READERS,
+    STRAIGHT,
+    check_input,
+    check_output,
+    log_notes,
+    read,
+    read_stored,
+    write,
+    write_stored,
+)
 from clpt.images.pillow import decoded
 from clpt.images.pillow import texts as png_text
-from clpt.images.png_files import png
-from clpt.images.reading import READERS, STRAIGHT, check_input, log_notes, read, read_stored
-from clpt.images.stored import Stored
+from clpt.images.screen_files import png
+from clpt.images.stored import Stored, from_array
 from clpt.images.transfer import (
     linear_to_srgb,
     multiplied,
@@ -27,7 +35,6 @@ from clpt.images.transfer import (
     to_rec709,
     to_srgb8,
 )
-from clpt.images.writing import check_output, write, write_stored
 
 __all__ = [
     "FOR_SCREENS",

@@ -7,7 +7,8 @@ white in `chromaticities`, else of Rec. 709. Colours are multiplied by alpha, an
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +18,110 @@ from numpy.typing import ArrayLike, NDArray
 from clpt.arrays import Floats32, Matrix
 from clpt.errors import SceneError
 from clpt.images import exr_files
-from clpt.images.exr_channels import Choice, choose
+from clpt.images.checks import check_there, reading
 from clpt.images.exr_files import Header, Window, window
 from clpt.images.stored import Stored
 from clpt.spectra import spaces
 
+FAVOURED = ("combined", "beauty", "rgba", "rgb", "color", "colour")  # Blender's is the first
 STOPS = "displayExposure"  # attribute: by which pictures for screens are brightened
 HALF_MAX = 65504.0
 HALF_MIN = 2.0**-14  # from which on it has 11 bits
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The channels of a picture.
+
+    part: index of their part; names: in the order of the image; form: "rgb", "xyz", "grey",
+    "chroma" (luminance and chroma) or "numbers"; all but the last may have alpha; note: a warning
+    about the choice.
+    """
+
+    part: int
+    names: tuple[str, ...]
+    form: str
+    note: str = ""
+
+
+def choose(parts: Sequence[Sequence[str]]) -> Choice:
+    """Return the channels of the picture, by the names of the channels of each part.
+
+    A name is a layer, a dot and a letter; the letters of a picture are R, G, B and A, or Y, RY, BY
+    and A ("Technical Introduction to OpenEXR", Channel Names), here in small letters too. The rule:
+
+    1. of each part in turn, channels without a layer; X, Y and Z too, which are XYZ;
+    2. else of each part in turn, channels of a layer: of a layer whose last word is in FAVOURED,
+       else of the first layer;
+    3. else, of the first part: its only channel; X, Y and Z of a layer; else all, as numbers.
+
+    Deep parts have no names here, and are passed over.
+    """
+    layers = [_layers(names) for names in parts]
+    for number, found in enumerate(layers):
+        if made := _picture(number, found.get("", {}), whole=True):
+            return made
+    made, taken = None, ""
+    others: list[str] = []
+    for number, found in enumerate(layers):
+        named = {layer: _picture(number, letters) for layer, letters in found.items()}
+        pictures = {layer: picture for layer, picture in named.items() if picture}
+        others += pictures
+        if made is None and pictures:
+            layer = min(pictures, key=_rank)  # the first one of the lowest rank
+            made = pictures[layer]
+            taken = layer
+    if made is None:
+        number = next((i for i, names in enumerate(parts) if names), 0)
+        return _numbers(number, parts[number], layers[number])
+    if len(others) == 1 or _rank(taken) < len(FAVOURED):
+        return made
+    note = f"its picture is taken from the layer {taken!r}; others with colours are left out"
+    return Choice(made.part, made.names, made.form, note)
+
+
+def _layers(names: Sequence[str]) -> dict[str, dict[str, str]]:
+    """The names by layer and letter, which is a capital; the name with a capital comes first."""
+    made: dict[str, dict[str, str]] = {}
+    for name in sorted(names):
+        layer, _, letter = name.rpartition(".")
+        made.setdefault(layer, {}).setdefault(letter.upper(), name)
+    return made
+
+
+def _rank(layer: str) -> int:
+    word = layer.rpartition(".")[2].lower()
+    return next((i for i, one in enumerate(FAVOURED) if word == one), len(FAVOURED))
+
+
+def _picture(part: int, letters: Mapping[str, str], whole: bool = False) -> Choice | None:
+    """The picture that the letters of a layer make; whole: of no layer."""
+    alpha = ("A",) if "A" in letters else ()
+    for form, needed in _forms(letters, whole):
+        if letters.keys() >= set(needed):
+            return Choice(part, tuple(letters[one] for one in (*needed, *alpha)), form)
+    return None
+
+
+def _forms(letters: Mapping[str, str], whole: bool) -> Iterator[tuple[str, tuple[str, ...]]]:
+    yield "rgb", ("R", "G", "B")
+    yield "chroma", ("Y", "RY", "BY")
+    if whole:
+        yield "xyz", ("X", "Y", "Z")
+    if "X" not in letters:  # else it is a coordinate
+        yield "grey", ("Y",)
+
+
+def _numbers(part: int, names: Sequence[str], layers: Mapping[str, Mapping[str, str]]) -> Choice:
+    """The channels of a part without a picture."""
+    if len(names) == 1:
+        return Choice(part, tuple(names), "numbers")
+    for letters in layers.values():
+        if letters.keys() >= set("XYZ"):
+            return Choice(part, tuple(letters[one] for one in "XYZ"), "numbers")
+    every = tuple(sorted(names))
+    note = f"has no channels R, G and B, nor Y: {', '.join(every)} are taken as they stand"
+    return Choice(part, every, "numbers", note)
 
 
 def read(path: Path) -> Stored:
@@ -176,3 +273,19 @@ def _from_chroma(values: Floats32, weights: NDArray[np.float64]) -> Floats32:
     red, blue = (ry + 1.0) * y, (by + 1.0) * y
     green = (y - red * np.float32(weights[0]) - blue * np.float32(weights[2])) / weights[1]
     return np.stack([red, green.astype(np.float32), blue], axis=2)
+
+
+def read_layers(path: str | Path) -> dict[str, NDArray[np.float32]]:
+    """Every channel of an EXR file by name, each (h, w) float32. Raises SceneError."""
+    return {name: np.asarray(c, np.float32) for name, c in read_channels(path).items()}
+
+
+def read_channels(path: str | Path) -> dict[str, NDArray[Any]]:
+    """Every channel of an EXR file by name, (h, w) float16, float32 or uint32, as it is stored.
+
+    Of its data window, and of its first part. Raises SceneError.
+    """
+    path = Path(path)
+    check_there(path)
+    with reading(path):
+        return dict(exr_files.read_channels(path))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.files import budget, input_files, output_files
-from clpt.images import sizes
+from clpt.images import checks
 
 Channels = Mapping[str, NDArray[Any]]
 Header = Mapping[str, Any]
@@ -100,7 +100,7 @@ def check(path: Path, header: Header) -> None:
         raise SceneError(f"has deep pixels ({header['type'].name}); flatten it", file=path)
     for name in ("dataWindow", "displayWindow"):
         x0, y0, x1, y1 = window(header, name)
-        sizes.check_size(path, x1 - x0, y1 - y0)
+        checks.check_size(path, x1 - x0, y1 - y0)
 
 
 def read_channels(path: Path, chosen: Sequence[str] | None = None, part: int = 0) -> Channels:

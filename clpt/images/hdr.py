@@ -17,7 +17,7 @@ import numpy as np
 from clpt.arrays import Bytes, Floats32, Matrix
 from clpt.errors import SceneError
 from clpt.files import budget, output_files
-from clpt.images import sizes
+from clpt.images import checks
 from clpt.images.stored import Stored
 from clpt.spectra import spaces
 
@@ -56,7 +56,7 @@ def read(path: Path) -> Stored:
     with path.open("rb") as file:
         header = _parsed(path, file.read(HEADER_BYTES))
     rows, columns = header.size
-    sizes.check_size(path, *(header.size[::-1] if header.order[1] == "Y" else header.size))
+    checks.check_size(path, *(header.size[::-1] if header.order[1] == "Y" else header.size))
     budget.check(24 * rows * columns, "its pixels", path)
     data = path.read_bytes()
     rgbe, at = np.empty((rows, columns, 4), np.uint8), header.end

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.files import budget, input_files
-from clpt.images import png_files, sizes
+from clpt.images import checks, screen_files
 from clpt.images.stored import Stored
 
 if TYPE_CHECKING:  # else imported where it is used, for many pictures are EXR only
@@ -59,7 +59,7 @@ def decoded(
     Raises SceneError if it is not such an image or takes too much memory, else Pillow's errors.
     """
     with _opened(source, formats) as image:
-        (admit or partial(sizes.check_size, _file(source)))(image.width, image.height)
+        (admit or partial(checks.check_size, _file(source)))(image.width, image.height)
         _check_scans(source, image)
         with budget.lending(_bytes(image), "its pixels", _file(source)):
             made = _pixels(source, formats, image)
@@ -70,7 +70,7 @@ def decoded(
     if kind != "PNG":
         return replace(made, notes=notes, colour_notes=colour_notes)
     with BytesIO(source) if isinstance(source, bytes) else source.open("rb") as file:
-        said = png_files.profile(file)
+        said = screen_files.profile(file)
     return replace(
         made,
         gamma=said.gamma,

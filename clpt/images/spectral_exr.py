@@ -22,7 +22,7 @@ from clpt import images
 from clpt.arrays import Floats32, in_memory, on_host, single
 from clpt.errors import SceneError
 from clpt.images import exr, exr_files
-from clpt.images.failures import check_there, reading
+from clpt.images.checks import check_there, reading
 from clpt.spectra import Tabulated, cie
 from clpt.spectra.spectrum import d65
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats32
 from clpt.errors import SceneError
-from clpt.images.colour import tones
-from clpt.images.colour.view import View
+from clpt.images.colour import View, apply_tone
 from clpt.spectra.spaces import between
 
 HEX = r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})"
@@ -70,7 +69,7 @@ def to_codes(
 ) -> NDArray[np.uint8]:
     """Linear Rec. 709 (h, w, c), scaled by 2^exposure, as 8-bit codes of a display.
 
-    tone: see clpt.images.colour.tones, then sRGB; view: in the place of both. Raises
+    tone: see clpt.images.colour, then sRGB; view: in the place of both. Raises
     UnknownKindError.
     """
     if view is None and tone == "none":
@@ -78,7 +77,7 @@ def to_codes(
     colour = np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[..., :3]
     brought = colour * np.float32(2.0**exposure)
     if view is None:
-        shown = np.concatenate([tones.apply(brought, tone), image[..., 3:]], axis=2)
+        shown = np.concatenate([apply_tone(brought, tone), image[..., 3:]], axis=2)
         return to_srgb8(shown)
     codes = np.concatenate([view.codes(brought), np.clip(image[..., 3:], 0, 1)], axis=2)
     return np.round(codes * 255).astype(np.uint8)

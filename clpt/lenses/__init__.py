@@ -4,10 +4,9 @@ Lengths are in millimetres here, wavelengths in nm.
 """
 
 from clpt.lenses import paraxial
-from clpt.lenses.coatings import COATINGS
 from clpt.lenses.files import READERS, library, names, read
 from clpt.lenses.paraxial import Cardinal, cardinal
-from clpt.lenses.prescription import Coat, Prescription, Surface
+from clpt.lenses.prescription import COATINGS, Coat, Prescription, Surface
 
 __all__ = [
     "COATINGS",

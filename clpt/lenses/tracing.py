@@ -1,20 +1,30 @@
-"""Exact rays through a lens in float64, for pupils, spot diagrams and tests.
+"""Exact rays through a lens in float64: pupils that the film sees, spot diagrams, a focused lens.
 
 z counts from the first surface's vertex towards the film [mm]. Rays go in both directions.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats
+from clpt.errors import SceneError
 from clpt.lenses.glasses import LINE_D
+from clpt.lenses.paraxial import cardinal, film_distance, stop_radius
 from clpt.lenses.prescription import Prescription, Surface
 
 NEWTON_STEPS = 12
+ZONES = 64  # rings of the film
+COARSE, FINE = (32, 16), (48, 24)  # cells of a grid over half of the pupil
+ROUNDS = (COARSE, COARSE, FINE)
+WAVELENGTHS = (380.0, 480.0, LINE_D, 780.0)  # [nm], of rays through lenses that disperse
+RINGS = 24
+MARGIN = 1.05  # zones cover this multiple of the film's radius: filters reach beyond the film
 
 
 @dataclass
@@ -123,3 +133,190 @@ def refract(d: Floats, normal: Floats, ratio: float) -> tuple[Floats, NDArray[np
     beyond = side * np.sqrt(np.maximum(inside, 0.0))
     bent = ratio * d + (ratio * cosine - beyond)[:, None] * normal
     return bent, inside > 0.0
+
+
+def zones(lens: Prescription, distance: float, radius: float) -> Floats:
+    """Return an ellipse of the rear plane for each ring of the film, (ZONES, 3) [mm].
+
+    The rear plane touches the last surface. `distance`: from it to the film; radius: of the film
+    [mm]. A row has the ellipse's centre, on the radius towards the point on the film, its half axis
+    along that radius, and its half axis across. All light that reaches the ring comes through the
+    ellipse, at any wavelength; a ring without light has zeros.
+    """
+    places = np.linspace(0.0, radius, ZONES + 1)
+    waves = WAVELENGTHS if lens.disperses else (LINE_D,)
+    low, high = _start(lens, distance, places)
+    inside: NDArray[np.bool_] = np.zeros((len(places), 1), np.bool_)
+    for cells in ROUNDS:
+        x, y, step = _grid(low, high, cells)
+        inside = np.zeros(x.shape, np.bool_)
+        for wavelength in waves:
+            inside = inside | _seen(lens, distance, places, x, y, wavelength)
+        any_ = np.asarray(inside.any(axis=1))
+        far = np.asarray(np.where(inside, x, -np.inf).max(axis=1)) + step[:, 0]
+        near = np.asarray(np.where(inside, x, np.inf).min(axis=1)) - step[:, 0]
+        top = np.where(inside, y, 0.0).max(axis=1) + step[:, 1]
+        low = np.where(any_[:, None], np.stack([near, np.zeros(len(near))], 1), low)
+        high = np.where(any_[:, None], np.stack([far, top], 1), high)
+    rows = np.zeros((ZONES, 3))
+    for i in range(ZONES):
+        both = inside[i : i + 2]
+        if not both.any():
+            continue
+        lit = [i + j for j in (0, 1) if both[j].any()]
+        first, last = min(low[j, 0] for j in lit), max(high[j, 0] for j in lit)
+        across, middle, along = max(high[j, 1] for j in lit), (first + last) / 2, (last - first) / 2
+        most = 0.0
+        for j in lit:
+            # The far corner of each cell that passes light.
+            u = (np.abs(x[j][inside[j]] - middle) + 0.5 * step[j, 0]) / along
+            v = (y[j][inside[j]] + 0.5 * step[j, 1]) / across
+            most = max(most, float(np.max(u * u + v * v)))
+        rows[i] = middle, along * math.sqrt(most), across * math.sqrt(most)
+    return rows
+
+
+def _start(lens: Prescription, distance: float, places: Floats) -> tuple[Floats, Floats]:
+    """Return the first search region (n, 2): the last surface, or a smaller exit pupil."""
+    size = lens.surfaces[-1].semi_diameter
+    low, high = np.full((len(places), 2), -size), np.full((len(places), 2), size)
+    low[:, 1] = 0.0
+    optics = cardinal(lens)
+    away = distance - optics.exit  # of the pupil, from the film
+    if math.isfinite(away) and away > 0.0:
+        share = distance / away
+        middle, reach = places * (1.0 - share), 2.0 * optics.exit_radius * share
+        if reach < 0.25 * size:
+            low[:, 0], high[:, 0], high[:, 1] = middle - reach, middle + reach, reach
+    return low, high
+
+
+def _grid(low: Floats, high: Floats, cells: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
+    """Return centres of cells, x and y (n, m), and their size (n, 2)."""
+    step = (high - low) / np.array(cells)
+    i, j = (each.ravel() for each in np.meshgrid(*(np.arange(c) + 0.5 for c in cells)))
+    return low[:, :1] + step[:, :1] * i, low[:, 1:] + step[:, 1:] * j, step
+
+
+def _seen(
+    lens: Prescription, distance: float, places: Floats, x: Floats, y: Floats, wavelength: float
+) -> NDArray[np.bool_]:
+    o = np.zeros((*x.shape, 3))
+    o[..., 0], o[..., 2] = places[:, None], lens.length + distance
+    d = np.stack([x - o[..., 0], y, np.full(x.shape, -distance)], axis=-1)
+    rays = trace(lens, Rays.of(o.reshape(-1, 3), d.reshape(-1, 3)), wavelength, backwards=True)
+    return rays.alive.reshape(x.shape)
+
+
+def axis_solid_angle(lens: Prescription, distance: float) -> float:
+    """Return the projected solid angle [sr] of the light at the centre of the film.
+
+    pi sin^2 of the steepest ray that passes, at the line d; the stop is round.
+    """
+    low, high = 0.0, lens.surfaces[-1].semi_diameter
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        o = np.array([[0.0, 0.0, lens.length + distance]])
+        rays = trace(lens, Rays.of(o, np.array([[middle, 0.0, -distance]])), backwards=True)
+        low, high = (middle, high) if rays.alive[0] else (low, middle)
+    return math.pi * low * low / (low * low + distance * distance)
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Points (n, 2) where a far point's light meets the film [mm], each of the same power.
+
+    through: part of the light into the entrance pupil that reaches the film.
+    """
+
+    points: Floats
+    through: float
+
+    @property
+    def radius(self) -> float:
+        """Root mean square distance from the centroid [mm]."""
+        return float(np.sqrt(np.mean(np.sum((self.points - self.points.mean(axis=0)) ** 2, 1))))
+
+
+def pupil_points(rings: int = RINGS) -> Floats:
+    """Return points (n, 2) evenly over the unit disk: 6 i + 3 on the ring i."""
+    circles = []
+    for i in range(rings):
+        turns = 2.0 * math.pi * (np.arange(6 * i + 3) + 0.5) / (6 * i + 3)
+        circles.append((i + 0.5) / rings * np.stack([np.cos(turns), np.sin(turns)], 1))
+    return np.concatenate(circles)
+
+
+def bundle(lens: Prescription, angle: float, wide: float = 1.0, rings: int = RINGS) -> Rays:
+    """Return parallel rays to the entrance pupil, from a point at an angle [degrees] in y.
+
+    wide: the bundle's radius in the pupil's paraxial radii: wide lenses' pupils grow off the axis.
+    """
+    optics = cardinal(lens)
+    slope = math.tan(math.radians(angle))
+    disk = wide * optics.entrance_radius * pupil_points(rings)
+    o = np.column_stack([disk, np.full(len(disk), optics.entrance)])
+    d = np.array([[0.0, slope, 1.0]])
+    # From a plane perpendicular to the rays, in front of all glass.
+    far = optics.entrance + lens.length + 10.0 * optics.entrance_radius
+    rays = Rays.of(o, d)
+    rays.o -= rays.d * (far / rays.d[:, 2:])
+    return rays
+
+
+def spot(
+    lens: Prescription, angle: float, wavelength: float = LINE_D, distance: float | None = None
+) -> Spot:
+    """Return the spot of a far point at an angle [degrees] and a wavelength [nm].
+
+    distance: from the last surface to the film [mm]; None: the paraxial focus at the line d.
+    """
+    away = cardinal(lens).back_focus if distance is None else distance
+    rays = trace(lens, bundle(lens, angle), wavelength)
+    at = (lens.length + away - rays.o[:, 2]) / rays.d[:, 2]
+    points = (rays.o + at[:, None] * rays.d)[rays.alive, :2]
+    return Spot(points, float(rays.alive.mean()))
+
+
+@dataclass(frozen=True)
+class FocusedLens:
+    """A lens at an f-number, focused on a distance.
+
+    back: from the film to the last surface [mm]; zones: ellipses of the rear plane by rings of the
+    film, see `clpt.lenses.tracing.zones`; solid_angle: projected, of the pupil that the film's
+    middle sees [sr]; film_radius: that the zones cover [mm].
+    """
+
+    prescription: Prescription
+    back: float
+    zones: Floats
+    solid_angle: float
+    film_radius: float
+
+
+@lru_cache(maxsize=64)
+def focused_lens(
+    lens: Prescription, f_number: float, focus: float, shift: float, film_radius: float
+) -> FocusedLens:
+    """Return a lens before its film.
+
+    f_number: 0 for the widest stop; focus: distance of the sharp plane from the film [mm]; shift:
+    of the film away from the lens [mm]; film_radius: that the zones cover [mm]. Raises SceneError
+    for an f-number, a focus or a shift that the lens cannot have.
+    """
+    try:
+        stopped = lens if f_number == 0.0 else lens.with_stop(stop_radius(lens, f_number))
+    except SceneError as error:
+        raise SceneError(error.message, where="lens.f_number") from None
+    try:
+        back = film_distance(lens, focus) + shift
+    except SceneError as error:
+        raise SceneError(error.message, where="lens.focus_distance") from None
+    if not back > 0.0:
+        raise SceneError(
+            f"the film would stand {-back:.4g} mm inside of the lens", where="lens.film_shift"
+        )
+    angle = axis_solid_angle(stopped, back)
+    if not angle > 0.0:
+        raise SceneError("no light comes through to the middle of the film", where="lens")
+    return FocusedLens(stopped, back, zones(stopped, back, film_radius), angle, film_radius)

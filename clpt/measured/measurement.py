@@ -6,6 +6,8 @@ Dupuy and Jakob's laboratory publishes them as tensor files (.bsdf).
 from __future__ import annotations
 
 import math
+import struct
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,8 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import in_memory
 from clpt.errors import SceneError
-from clpt.measured import tensor_file
+from clpt.files import input_files, output_files
 
+MAGIC, VERSION = b"tensor_file\0", (1, 0)
+TYPES = (
+    "u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f2", "<f4", "<f8",
+)  # fmt: skip
+MOST_FIELDS, MOST_AXES = 256, 16
+ALIGNED = 8  # [bytes] values begin at multiples
 REDUCTIONS = (1, 2, 4)  # symmetric parts of the azimuths; a file stores the first
 AXES = {
     "ndf": "(rows, columns)", "sigma": "(rows, columns)",
@@ -27,6 +35,71 @@ MOST_VALUES = 1 << 28
 FILE_TABLES = ("phi_i", "theta_i", "ndf", "sigma", "vndf", "luminance")
 
 
+def read_tensors(path: str | Path) -> dict[str, np.ndarray]:
+    """Return the arrays of a tensor file by their names. Raises SceneError.
+
+    Tensor files are named arrays, as Dupuy and Jakob publish measurements: "tensor_file" and a zero
+    byte, two bytes of version (1, 0), the number of fields (u32); for each field its name (u16
+    length, then the letters), the number of axes (u16), the type (u8), the offset of its values
+    (u64) and its shape (u64 an axis). Numbers are little-endian. All of them are checked.
+    """
+    path = Path(path)
+    try:
+        return _fields(input_files.read_bytes(path))
+    except SceneError as error:
+        raise SceneError(error.message, file=path) from None
+    except struct.error:
+        raise SceneError("is damaged: it ends within its list of fields", file=path) from None
+
+
+def write_tensors(path: str | Path, fields: Mapping[str, np.ndarray]) -> None:
+    """Write arrays by their names. Raises OSError."""
+    head, at = [MAGIC, struct.pack("<BBI", *VERSION, len(fields))], len(MAGIC) + 6
+    arrays = {name.encode(): np.ascontiguousarray(values) for name, values in fields.items()}
+    at += sum(13 + len(name) + 8 * values.ndim for name, values in arrays.items())
+    body = []
+    for name, values in arrays.items():
+        at += (pad := -at % ALIGNED)
+        shape = struct.pack(f"<{values.ndim}Q", *values.shape)
+        kind = TYPES.index(values.dtype.newbyteorder("<").str.replace("|", "")) + 1
+        head.append(struct.pack("<H", len(name)) + name)
+        head.append(struct.pack("<HBQ", values.ndim, kind, at) + shape)
+        body += [bytes(pad), values.astype(TYPES[kind - 1], copy=False).tobytes()]
+        at += values.nbytes
+    output_files.write(path, b"".join(head + body))
+
+
+def _fields(data: bytes) -> dict[str, np.ndarray]:
+    if not data.startswith(MAGIC):
+        raise SceneError("is no tensor file: it does not begin with tensor_file")
+    at = len(MAGIC)
+    *version, count = struct.unpack_from("<BBI", data, at)
+    if tuple(version) != VERSION:
+        shown = ".".join(map(str, version))
+        raise SceneError(f"is a tensor file of version {shown}; 1.0 is read")
+    if count > MOST_FIELDS:
+        raise SceneError(f"is damaged: it cannot have {count:,} fields")
+    at += 6
+    fields: dict[str, np.ndarray] = {}
+    for _ in range(count):
+        (length,) = struct.unpack_from("<H", data, at)
+        name = data[at + 2 : at + 2 + length].decode("utf8", "replace")
+        at += 2 + length
+        axes, kind, offset = struct.unpack_from("<HBQ", data, at)
+        if axes > MOST_AXES:
+            raise SceneError(f"is damaged: the field {name!r} cannot have {axes} axes")
+        shape = struct.unpack_from(f"<{axes}Q", data, at + 11)
+        at += 11 + 8 * axes
+        if not 1 <= kind <= len(TYPES):
+            raise SceneError(f"is damaged: the field {name!r} is of an unknown type ({kind})")
+        dtype, size = np.dtype(TYPES[kind - 1]), math.prod(shape)
+        # also an empty field must have a shape that NumPy can hold
+        if max(offset + size * dtype.itemsize, *shape, 0) > len(data):
+            raise SceneError(f"is damaged: the field {name!r} goes beyond its end")
+        fields[name] = np.frombuffer(data, dtype, size, offset).reshape(shape)
+    return fields
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Measurement:
     """A reflection in the adaptive coordinates of Dupuy and Jakob 2018, as their files store it.
@@ -34,7 +107,7 @@ class Measurement:
     The viewer is at `phi_i`, `theta_i` [rad]; with a single azimuth the material is isotropic. The
     halfway direction lies at (sqrt(2 theta / pi), (phi + pi) / 2 pi) in the unit square, x over
     columns; an isotropic material's phi counts from the viewer's. `vndf` is a density over this
-    square: `clpt.measured.warp` takes points of a second square to halfway directions. `spectra`
+    square: `clpt.measured.fit` takes points of a second square to halfway directions. `spectra`
     and `luminance` are tables over the second square: the reflected light f cos(theta) [1/sr],
     divided by ndf / (4 sigma) if `jacobian`, and the density that samples it.
 
@@ -120,7 +193,7 @@ def _table(name: str, values: ArrayLike) -> NDArray[Any]:
 
 def read(path: str | Path) -> Measurement:
     """Read a measured material. Raises SceneError that names the wrong field."""
-    fields = tensor_file.read(path)
+    fields = read_tensors(path)
     try:
         return _measurement(fields)
     except SceneError as error:
@@ -160,6 +233,6 @@ def write(path: str | Path, measurement: Measurement) -> None:
         "spectra" if spectral else "rgb": measurement.spectra,
     }
     try:
-        tensor_file.write(path, fields)
+        write_tensors(path, fields)
     except OSError as error:
         raise SceneError(f"cannot be written: {error.strerror}", file=Path(path)) from None

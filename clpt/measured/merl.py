@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from clpt.arrays import Floats, in_memory
 from clpt.errors import SceneError
 from clpt.files import input_files, output_files
-from clpt.measured.fit import Reflection, area, direction, grid, spherical
-from clpt.measured.warp import sample, warp
+from clpt.measured.fit import Reflection, area, direction, grid, sample, spherical, warp
 
 STEPS = (90, 90, 180)  # of the published files
 SCALES = np.array([1.0, 1.15, 1.66]) / 1500.0  # of the numbers in a file [1/sr]

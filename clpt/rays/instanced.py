@@ -176,6 +176,6 @@ class InstancedAccel(Queries):
                 '#include "core/math.cl"',
                 "typedef struct { global const uint *instances; } Scene;",
                 INSTANCE.row_text(many=True),
-                f'#include "tracing/instances_{self.layout}.cl"\n',
+                f'#include "tracing/instances.cl#{self.layout}"\n',
             ]
         )

@@ -39,13 +39,13 @@ _HITS: batch.Columns = {
     "primitive": (0, np.int32),
     "barycentrics": (2, np.float32),
 }
-_SEQUENTIAL, _INTERLEAVED = "bvh/query.cl", "bvh/query_interleaved.cl"
+_SEQUENTIAL, _INTERLEAVED = "bvh/query.cl#sequential", "bvh/query.cl#interleaved"
 _PROGRAMS = {  # by kernel: its program, and whether it finds all hits of a ray
     "query_closest": (_SEQUENTIAL, False),
     "query_occluded": (_SEQUENTIAL, False),
-    "query_count": ("bvh/query_all_hits.cl", True),
-    "query_all_hits": ("bvh/query_all_hits.cl", True),
-    "place_instances": ("bvh/place.cl", False),
+    "query_count": ("bvh/query.cl#all_hits", True),
+    "query_all_hits": ("bvh/query.cl#all_hits", True),
+    "place_instances": ("bvh/place.cl#instances", False),
 }
 _RAY_ARRAYS = ("origins", "directions", "t_mins", "t_maxs")
 _Self = TypeVar("_Self", bound="Queries")

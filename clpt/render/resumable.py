@@ -1,22 +1,29 @@
-"""Renderers whose film can be saved, merged with others, and gone on with in another process."""
+"""Renderers whose film can be saved, merged, continued elsewhere, and shown on its device."""
 
 from __future__ import annotations
 
 import dataclasses
 import logging
-from collections.abc import Mapping
-from functools import partial
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
+import pyopencl as cl
+from numpy.typing import DTypeLike, NDArray
+from pyopencl.array import Array
+
+from clpt import device as dev
+from clpt import images
 from clpt.errors import MemoryBudgetError, SceneError
+from clpt.images.colour import View
 from clpt.render.film import film_file
+from clpt.render.film.resolve import Resolve, Screen
 from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.film.state import FilmState
 from clpt.render.film_renderer import FilmRenderer
-from clpt.render.makers.contents import Contents
-from clpt.render.makers.locking import synchronized
+from clpt.render.makers.contents import Contents, synchronized
 from clpt.render.makers.maker import Held
+from clpt.render.makers.planning import Changes
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene.fingerprint import Plain
 from clpt.version import VERSION
@@ -25,9 +32,17 @@ log = logging.getLogger(__name__)
 
 
 class ResumableRenderer(FilmRenderer):
-    """Base of renderers: their film is saved, merged, and gone on with."""
+    """Base of renderers: their film is saved, merged, continued, and shown on its device.
+
+    _make_widget: makes the widget of notebooks, see `clpt/__init__`.
+    """
+
+    _make_widget: ClassVar[Callable[..., Any]]
 
     _held: tuple[Held, dict[str, Any]] | SavedFilm | None = None
+    _resolve: Resolve | None = None  # built for the first picture that is resolved
+
+    # ---- the film, saved and merged
 
     @synchronized
     def film_state(self) -> FilmState:
@@ -37,10 +52,11 @@ class ResumableRenderer(FilmRenderer):
 
     @synchronized
     def merge(self, state: FilmState) -> None:
-        """Add the samples of another film of the same scene to this one, and wait.
+        """Add the samples of another film of the same scene to this film, and wait.
 
-        The picture is then that of one renderer that took them all, to the bit. To go on where a
-        state was taken, merge it into a new renderer. `self.samples` is then after the last one.
+        The picture is then equal to the bit to the picture of a renderer that took all samples. To
+        continue a state, merge it into a new renderer. `self.samples` is then the number after the
+        last sample.
 
         Raises SceneError if the film has another form, or a sample is in both: nothing has changed.
         """
@@ -49,9 +65,9 @@ class ResumableRenderer(FilmRenderer):
         self._put("merge", merged, after)
 
     def _put(
-        self, what: str, film: FilmState, after: Contents, counts: Counts | None = None
+        self, name: str, film: FilmState, after: Contents, counts: Counts | None = None
     ) -> None:
-        """Let the film be another one; after: what it then holds; counts: where it goes on."""
+        """Replace the film; after: its contents; counts: of a film that is continued."""
 
         def put(_: BaseException | None = None) -> Contents:
             self._maker.put(film, counts)
@@ -59,15 +75,15 @@ class ResumableRenderer(FilmRenderer):
                 self._held, self._seconds_rendered = None, 0.0
             return after
 
-        with self._change(what, put):
+        with self._change(name, put):
             self._contents = put()
 
     def save_state(self, path: str | Path) -> None:
-        """Write the film to a file, from which `load_state` goes on, in another process too.
+        """Write the film to a file for `load_state`, also in another process.
 
-        path: of the file; the former one is replaced.
+        path: of the file; a former file is replaced.
 
-        Raises SceneError for a file that cannot be written: the former one is then as it was.
+        Raises SceneError for a file that cannot be written: the former file is then unchanged.
         """
         saved = self.saved_film()
         try:
@@ -109,9 +125,9 @@ class ResumableRenderer(FilmRenderer):
 
         What is "auto" may depend on how many samples are wanted, which the film did not know.
         """
-        way = self._maker.home.other_way(origin)
-        if way is not None:
-            self._maker.follow(way, partial(self._apply, what="load_state"))
+        integrator = self._maker.home.other_integrator(origin)
+        if integrator is not None:
+            self._write(self._maker.plan(Changes(integrator=integrator)), "load_state")
 
     @synchronized
     def _origin(self) -> Origin:
@@ -189,4 +205,71 @@ class ResumableRenderer(FilmRenderer):
     def close(self) -> None:
         """Give the device's memory back, and what is held; see `FilmRenderer.close`."""
         super().close()
-        self._held = None
+        self._held = self._resolve = None
+
+    # ---- the picture on the device and for screens
+
+    @property
+    @synchronized
+    def film(self) -> dev.DeviceArray:
+        """The picture so far on the device, (h, w, 4) float32, valid when its `events` have ended.
+
+        Red, green and blue, linear in the film's output space, equal to `colours` within an ulp of
+        the largest sum; last, the number of samples of the pixel. Always the same memory, on the
+        renderer's queue; steps wait for `events` that readers add, as its `get_async` does.
+        """
+        return self._wavefront.film.picture
+
+    @synchronized
+    def resolve(
+        self,
+        into: Array | cl.MemoryObject | None = None,
+        *,
+        dtype: DTypeLike | None = None,
+        exposure: float = 0.0,
+        tone: str = "none",
+        srgb: bool | None = None,
+        flip: bool = False,
+        view: View | None = None,
+        wait_for: dev.Events = None,
+    ) -> Any:
+        """Enqueue a picture (h, w, 4) for a screen, opaque, from the film as it then is.
+
+        into: the caller's Array or Buffer, or 2D Image of 8-bit or float RGBA, as OpenGL shares
+        them; None makes an Array. dtype: uint8 (the default, the bytes of a .png) or float32.
+        exposure [stops] over the film's `display_exposure`; tone: none, reinhard, aces, agx or
+        neutral, see clpt.images.colour; srgb: whether the sRGB transfer is applied, by
+        default to uint8 only; colours become Rec. 709. view: of OpenColorIO, in the place of tone
+        and
+        transfer: a table of it, right to 1/512 for 98 of 100 colours. flip: the first row is the
+        lowest. wait_for: events of the caller that come first.
+
+        Returns the Array, whose `events` hold the event of the picture; for an Image the event.
+        Raises DeviceError if the picture does not fit, UnknownKindError for names.
+        """
+        wavefront = self._wavefront
+        picture = wavefront.film.picture
+        if self._resolve is None or self._resolve.stream is not wavefront.stream:
+            self._resolve = Resolve(wavefront.device, wavefront.stream)
+        film = self.scene.film
+        screen = Screen(exposure + film.display_exposure, tone, srgb, view, film.output_space)
+        return self._resolve(picture, into, screen, dtype=dtype, flip=flip, wait_for=wait_for)
+
+    def widget(self, **options: Any) -> Any:
+        """Return a widget for notebooks: the scene, rendered while it is watched and steered.
+
+        It is rendered by another renderer, with these options, in a thread of its own; see
+        clpt.view.widget.Widget. Raises ClptError where clpt[notebook] is not installed.
+        """
+        return type(self)._make_widget(self.scene, self.device, **options)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """`image()`, for numpy.asarray(renderer): a copy, which waits."""
+        if copy is not None and not copy:
+            raise ValueError("a picture on a device becomes an array of numpy only by a copy")
+        image = self.image()
+        return image if dtype is None else image.astype(dtype, copy=False)
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture so far as PNG, which a notebook shows of a renderer; waits."""
+        return images.png(self.resolve().get()[..., :3])

@@ -11,7 +11,7 @@ import numpy as np
 
 from clpt.scene.lights import Area
 from clpt.scene.materials import Mask, Material, NormalMap, Null, TwoSided
-from clpt.scene.params import Texture
+from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap, Product
 from clpt.scene.values import Textured, TexturedNumber
 from clpt.spectra import RGBUnbounded

@@ -9,7 +9,8 @@ from functools import cache
 from clpt import spectra
 from clpt.errors import SceneError
 from clpt.scene.integrators import Film
-from clpt.scene.params import Kind, Texture, fields_of, params, place_of
+from clpt.scene.params import Kind, fields_of, params, place_of
+from clpt.scene.texture_values import is_texture
 from clpt.spectra import Spectrum
 from clpt.spectra.spectrum import extremes
 
@@ -20,7 +21,7 @@ def check_indices(kinds: Iterable[Kind], film: Film) -> None:
         values = fields_of(kind)
         for name in _indices(type(kind)):
             value = values[name]
-            if not isinstance(value, Texture):
+            if not is_texture(value):
                 check_index(value, film, place_of(kind, name))
 
 

@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
-from clpt.scene import roles
+from clpt.scene import insides, roles
 from clpt.scene.energy import check_reradiation
 from clpt.scene.params import (
     Kind,
     Shorthand,
-    Texture,
     choice,
     coefficient,
     factor,
@@ -35,6 +34,7 @@ from clpt.scene.params import (
 )
 from clpt.scene.roles import ORDERS, Param
 from clpt.scene.scatterer import Scatterer
+from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap
 from clpt.scene.values import IndexLike, SpectrumLike, Textured, TexturedNumber
 from clpt.spectra import Constant, Reradiation, Spectrum
@@ -90,6 +90,17 @@ METAL = Shorthand(
 )
 ROUGH, ROUGH_EVENLY = _roughness(("alpha_u", "alpha_v")), _roughness(("alpha",))
 ANISOTROPY = _renamed("anisotropy", "anisotropic", "another word for `anisotropic`, as in glTF")
+TRANSMISSION_COLOR = Shorthand(
+    {
+        "transmission_color": Param(
+            roles.REFLECTANCE, "what is let through, or with a depth its colour there",
+            low=0.0, high=1.0, textured=True,
+        ),
+        "transmission_depth": Param(roles.REAL, "where light has it; 0: at once", "m", 0.0),
+    },
+    ("transmission_tint", "absorption"),
+    insides.spelled,
+)  # fmt: skip
 TRANSMISSION = _renamed("transmission", "spec_trans", "another word for `spec_trans`, as in glTF")
 
 
@@ -125,11 +136,34 @@ class Material(Scatterer):
     """
 
     bounds_body: ClassVar[bool] = False  # its shapes enclose bodies, which may have a priority
+    is_composite: ClassVar[bool] = False  # it consists of other materials, and has no kernel file
 
     name: str = host("", "for messages and for references in scene files")
 
     # of a kind without such parameters
     absorption = cast(SpectrumLike, CLEAR)
+
+    @property
+    def is_sheet(self) -> bool:
+        """Whether its surface has no inside."""
+        return False
+
+    @property
+    def absorbs_inside(self) -> bool:
+        return self.absorption != CLEAR
+
+    @property
+    def least_alpha(self) -> float:
+        """The least roughness alpha of its specular lobes; 1 without such lobes, or by a texture.
+
+        A coat over a diffuse base does not count.
+        """
+        return 1.0
+
+    @property
+    def shared_parts(self) -> dict[str, Material]:
+        """The materials that it consists of, by their parameters."""
+        return {name: v for name, v in fields_of(self).items() if isinstance(v, Material)}
 
     @property
     def inside_index(self) -> IndexLike:
@@ -142,6 +176,18 @@ class Material(Scatterer):
 def _factor(of: str, *, linear: bool = False) -> Any:
     """Declare a factor on light that a material sends out, which is 1 in physics."""
     return reflectance(1.0, f"factor on {of}; 1 is physical", linear=linear)
+
+
+def _least(*alphas: object) -> float:
+    """Return the least number among alphas, 1 without numbers."""
+    return min((a for a in alphas if isinstance(a, (int, float))), default=1.0)
+
+
+def _alpha_of(roughness: object, *shares: object) -> float:
+    """Return the alpha of a roughness; 1 for a texture, and where all specular shares are 0."""
+    if not isinstance(roughness, (int, float)) or all(share == 0.0 for share in shares):
+        return 1.0
+    return roughness**2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -297,6 +343,10 @@ class RoughDielectric(Material):
     def transmits(self) -> bool:
         return True
 
+    @property
+    def least_alpha(self) -> float:
+        return _least(self.alpha_u, self.alpha_v)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Conductor(Material):
@@ -333,6 +383,10 @@ class RoughConductor(Material):
     alpha_v: TexturedNumber = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
     specular_reflectance: Textured = _factor("reflection", linear=True)
     layers: tuple[Layer, ...] = layers(FILMS)
+
+    @property
+    def least_alpha(self) -> float:
+        return _least(self.alpha_u, self.alpha_v)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -405,6 +459,10 @@ class CoatedConductor(Material):
     )
     specular_reflectance: Textured = _factor("the metal's reflection")
 
+    @property
+    def least_alpha(self) -> float:
+        return _least(self.alpha_u, self.alpha_v)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Principled(Material):
@@ -452,6 +510,10 @@ class Principled(Material):
     def uses_tangents(self) -> bool:
         return self.anisotropic != 0.0
 
+    @property
+    def least_alpha(self) -> float:
+        return _alpha_of(self.roughness, self.metallic, self.spec_trans)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PrincipledThin(Material):
@@ -498,6 +560,10 @@ class PrincipledThin(Material):
     @property
     def uses_tangents(self) -> bool:
         return self.anisotropic != 0.0
+
+    @property
+    def least_alpha(self) -> float:
+        return _alpha_of(self.roughness, self.spec_trans)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -603,6 +669,106 @@ class GltfSurface(Material):
     @property
     def uses_tangents(self) -> bool:
         return self.anisotropy != 0.0 or self.clearcoat_apart != 0.0
+
+    @property
+    def least_alpha(self) -> float:
+        return _alpha_of(self.roughness, self.metallic, self.transmission)
+
+    @property
+    def is_sheet(self) -> bool:
+        return self.thin
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Openpbr(Material):
+    """OpenPBR Surface 1.1, see docs/materials.md; front side.
+
+    Both sides where light goes through; `thin_walled`: a sheet, both sides of which are alike. The
+    parameters are those of the specification; `specular_ior` counts as at least the coat's.
+    """
+
+    shorthands = (TRANSMISSION_COLOR,)
+    if TYPE_CHECKING:  # arguments only: they stand for others
+        transmission_color: InitVar[Textured | None] = None
+        transmission_depth: InitVar[float | None] = None
+
+    uses_lobe_sample = True
+    refracts = True
+    chromatic = True
+    needs_wavelengths = True
+
+    base_weight: TexturedNumber = _share(1.0, "factor on the base's colour")
+    base_color: Textured = reflectance(0.8, "colour of the base, and of metal head-on")
+    base_metalness: TexturedNumber = _share(0.0, "share of the metal", lobe=True)
+    base_diffuse_roughness: TexturedNumber = _share(0.0, "of diffuse reflection")
+    specular_weight: TexturedNumber = real(
+        1.0, "factor on the dielectric's reflection head-on, by its index; on metal at most 1",
+        low=0.0, high=25.0, textured=True,
+    )  # fmt: skip
+    specular_color: Textured = reflectance(
+        1.0, "factor on the dielectric's reflection; on metal at 82 degrees"
+    )
+    specular_roughness: TexturedNumber = _share(0.3, "of facets; its square is their alpha")
+    specular_roughness_anisotropy: TexturedNumber = _share(
+        0.0, "how much rougher the tangent's direction is", lobe=True
+    )
+    specular_ior: IndexLike = index(1.5, "index of the dielectric")
+    transmission_weight: TexturedNumber = _share(
+        0.0, "share of what enters the dielectric that is let through", lobe=True
+    )
+    transmission_tint: Textured = reflectance(1.0, "factor on what is let through, at the surface")
+    absorption: SpectrumLike = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
+    subsurface_weight: TexturedNumber = _share(
+        0.0, "share of the rest that is scattered below the surface", lobe=True
+    )
+    subsurface_color: Textured = reflectance(0.8, "albedo of what is scattered there")
+    subsurface_scatter_anisotropy: TexturedNumber = real(
+        0.0, "thin-walled: 1: all of it goes through, -1: none", "", -1.0, 1.0, textured=True
+    )
+    subsurface_inside: bool = flag(
+        False, "whether it goes into a body, which the shape's `interior` scatters"
+    )
+    coat_weight: TexturedNumber = _share(0.0, "share of the surface that has a coat", lobe=True)
+    coat_color: Textured = reflectance(1.0, "what is left of light that goes in and out head-on")
+    coat_roughness: TexturedNumber = _share(
+        0.0, "of the coat's facets; it makes those below rougher"
+    )
+    coat_roughness_anisotropy: TexturedNumber = _share(0.0, "how much rougher along the tangent")
+    coat_ior: TexturedNumber = real(1.6, "index of the coat", low=1.0, high=3.0, textured=True)
+    coat_darkening: TexturedNumber = _share(
+        1.0, "how much of the darkening by reflections within the coat is kept"
+    )
+    fuzz_weight: TexturedNumber = _share(0.0, "share of the surface that has fibres", lobe=True)
+    fuzz_color: Textured = reflectance(1.0, "factor on the fibres' light")
+    fuzz_roughness: TexturedNumber = _share(0.5, "how much fibres lean; at least 0.1")
+    thin_film_weight: TexturedNumber = _share(0.0, "share of the facets that has a film", lobe=True)
+    thin_film_thickness: TexturedNumber = real(
+        0.5, "thickness of the film", "um", 0.0, 100.0, textured=True
+    )
+    thin_film_ior: float = real(1.4, "index of the film", low=1.0, high=5.0)
+    thin_walled: bool = flag(False, "whether light goes straight through, as there is no volume")
+
+    @property
+    def inside_index(self) -> IndexLike:
+        return Constant(1.0) if self.thin_walled else self.specular_ior
+
+    @property
+    def transmits(self) -> bool:
+        below = self.thin_walled or self.subsurface_inside
+        return self.transmission_weight != 0.0 or (below and self.subsurface_weight != 0.0)
+
+    @property
+    def uses_tangents(self) -> bool:
+        stretched = self.coat_weight != 0.0 and self.coat_roughness_anisotropy != 0.0
+        return self.specular_roughness_anisotropy != 0.0 or stretched
+
+    @property
+    def least_alpha(self) -> float:
+        return _alpha_of(self.specular_roughness, self.base_metalness, self.transmission_weight)
+
+    @property
+    def is_sheet(self) -> bool:
+        return self.thin_walled
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -750,48 +916,79 @@ class Null(Material):
     is_null = True
 
 
+NO_SURFACE = Null()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TwoSided(Material):
     """Gives materials with only a front to both sides of a surface."""
+
+    is_composite = True
+    two_sided = True
 
     front: Material = host(Diffuse(), "material of the front", form="material")
     back: Material | None = host(
         None, "material of the back; the front's when None", form="material"
     )
 
+    def shading(self, front: bool) -> Material:
+        return self.front if front or self.back is None else self.back
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mask(Material):
     """Lets light through where `opacity` is below 1."""
+
+    is_composite = True
 
     material: Material = host(Diffuse(), "what is there where it is opaque", form="material")
     opacity: TexturedNumber = real(
         0.5, "share of light that meets the material", "", 0.0, 1.0, textured=True
     )
 
+    @property
+    def mixture(self) -> tuple[Any, Scatterer, Scatterer]:
+        return self.opacity, NO_SURFACE, self.material
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Blend(Material):
     """A linear mixture of two materials."""
 
+    is_composite = True
+
     first: Material = host(Diffuse(), "material where the weight is 0", form="material")
     second: Material = host(Diffuse(), "material where the weight is 1", form="material")
     weight: TexturedNumber = real(0.5, "share of the second", "", 0.0, 1.0, textured=True)
+
+    @property
+    def mixture(self) -> tuple[Any, Scatterer, Scatterer]:
+        return self.weight, self.first, self.second
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NormalMapped(Material):
     """Base of the maps that bend the shading normal. Their flags and defaults are Mitsuba 3's."""
 
+    is_composite = True
+    perturbs_normals = True
+    reversible = False
+    slot: ClassVar[str] = ""  # a map of each slot may be around a leaf
+
     material: Material = host(Diffuse(), "what is shaded with the bent normal", form="material")
     scale: float = real(1.0, "factor on what the map bends")
     flip_invalid: bool = flag(True, "turn a normal round that faces away from the viewer")
     shadowing: bool = flag(True, "soften the edge where the bent surface turns dark")
 
+    def shading(self, front: bool) -> Material:
+        return self.material
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NormalMap(NormalMapped):
     """Takes the shading normal from an image, relative to that of the surface."""
+
+    slot = "normal"
 
     map: Bitmap | None = host(
         None,
@@ -812,6 +1009,8 @@ class NormalMap(NormalMapped):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BumpMap(NormalMapped):
     """Bends the shading normal as if the surface were raised by a height."""
+
+    slot = "bump"
 
     height: TexturedNumber = real(0.0, "what it is raised by", "m", textured=True)
 
@@ -834,6 +1033,7 @@ LEAVES = (
     PrincipledThin,
     DiffuseTransmission,
     GltfSurface,
+    Openpbr,
     Grating,
     Fluorescent,
     Hair,
@@ -841,20 +1041,12 @@ LEAVES = (
     Merl,
     Null,
 )
-COMPOSITES = (TwoSided, Mask, Blend, NormalMap, BumpMap)
-KINDS = LEAVES + COMPOSITES
-
-
-def inner(material: Material) -> Iterator[tuple[str, Material]]:
-    """Yield the materials in a material's parameters, each with the parameter's name."""
-    for name, part in fields_of(material).items():
-        if isinstance(part, Material):
-            yield name, part
+KINDS = (*LEAVES, TwoSided, Mask, Blend, NormalMap, BumpMap)
 
 
 def parts(material: Material) -> Iterator[Material]:
     """Yield a material and all materials inside it; nothing for another object."""
     if isinstance(material, Material):
         yield material
-        for _, part in inner(material):
+        for part in material.shared_parts.values():
             yield from parts(part)

@@ -279,8 +279,10 @@ class Kind(metaclass=KindType):
     # Groups of parameters. Where all parameters of a group are above 0, its struct has the
     # `luminance` of `base_color`, and its kernel file includes core/luminance.cl.
     tints: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    is_texture: ClassVar[bool] = False  # its values vary over a surface or in space
     is_tree: ClassVar[bool] = True  # its parts become a single kernel text, each at every use
     _size: ClassVar[tuple[int, int]] = (1, 1)  # of an object: its parts, and how deep they lie
+    has_textures: ClassVar[bool] = False  # of an object: a parameter that kernels read is a texture
 
     def __init_subclass__(cls) -> None:
         if "kind" not in vars(cls):  # a class may take the kernels of another kind
@@ -288,14 +290,17 @@ class Kind(metaclass=KindType):
         cls.__repr__ = Kind.__repr__  # type: ignore[method-assign]  # `dataclass` leaves it then
 
     def __post_init__(self) -> None:
-        parts, depth = 1, 0
+        parts, depth, textured = 1, 0, False
         for name, param in params(type(self)).items():
             value = _checked(getattr(self, name), param, f"{self.kind}.{name}")
             object.__setattr__(self, name, value)
             for inner in value if isinstance(value, tuple) else (value,):
                 if isinstance(inner, Kind):
+                    seen = param.role.place != "host"  # by kernels
+                    textured |= seen and (inner.is_texture or inner.has_textures)
                     parts, depth = parts + inner._size[0], max(depth, inner._size[1])
         object.__setattr__(self, "_size", (parts, depth + 1))
+        object.__setattr__(self, "has_textures", textured)
         if self.is_tree and (parts > MOST_PARTS or depth >= MOST_NESTED):
             message = f"has more than {MOST_PARTS} parts, shared ones counted at each use"
             if parts <= MOST_PARTS:
@@ -312,11 +317,6 @@ class Kind(metaclass=KindType):
         texts = {name: shown(value) for name, value in fields_of(self).items()}
         changed = (f"{n}={text}" for n, text in texts.items() if text != usual.get(n, "None"))
         return f"{type(self).__name__}({', '.join(changed)})"
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Texture(Kind):
-    """Base of all textures."""
 
 
 @cache
@@ -396,7 +396,7 @@ def interior_params(cls: type[Kind]) -> Mapping[str, Param]:
 
 
 def _checked(value: object, param: Param, where: str) -> Any:
-    if isinstance(value, Texture) and param.role.place != "host":
+    if isinstance(value, Kind) and value.is_texture and param.role.place != "host":
         if not param.textured:
             raise SceneError("cannot be a texture", where=where)
         return value

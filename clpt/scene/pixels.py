@@ -1,49 +1,33 @@
-"""The numbers of a bitmap's image."""
+"""The numbers of images: reading, channels, wrapping and averages."""
 
 from __future__ import annotations
 
-import dataclasses
-from pathlib import Path
+import os
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import images, spectra
-from clpt.arrays import Floats32, on_host
+from clpt import spectra
+from clpt.arrays import Floats
 from clpt.images import spectral_exr
 from clpt.images.spectral_exr import SpectralImage
-from clpt.scene.roles import EMISSION, REAL, Role
-from clpt.scene.textures import Bitmap
 
 
-def spectral_image(texture: object, role: Role) -> SpectralImage | None:
-    """Return a texture's image if it is a bitmap of spectra, in the role of a parameter."""
-    if not isinstance(texture, Bitmap):
-        return None
-    return spectral_exr.find(texture.image, emissive=role is EMISSION, where="bitmap.image")
+def image_file(image: object) -> str | None:
+    """Return the path of an image file, None for an image in memory."""
+    return os.fspath(image) if isinstance(image, (str, os.PathLike)) else None
 
 
-def pixels(texture: Bitmap, role: Role, side: int | None = None) -> Floats32:
-    """Return a bitmap's image, (h, w, 1 or 3) float32, top row first; for REAL (h, w, 1).
-
-    role: it chooses the colour of spectra; side: about how many texels along each side are
-    enough; the others are left out. Raises SceneError if it cannot be read
-    or is no image.
-    """
-    spectral = spectral_image(texture, role)
-    image = texture.image if spectral is None else spectral.to_rgb()
-    if isinstance(image, (str, Path)):
-        stored = images.read_stored(image)
-        some = dataclasses.replace(stored, values=_thinned(stored.values, side))
-        image = some.decoded(not texture.raw)
-    stored = images.from_array(_thinned(np.asarray(on_host(image)), side), "bitmap.image")
-    plain = stored.decoded(not texture.raw)
-    return np.nan_to_num(channel(plain, texture.channel) if role is REAL else plain[..., :3])
+def check_image(image: object, where: str, *, emissive: bool) -> None:
+    """Raise SceneError for spectra of light in memory unless `emissive`, and the reverse."""
+    if isinstance(image, SpectralImage):
+        spectral_exr.find(image, emissive=emissive, where=where)
 
 
-def _thinned(image: NDArray[Any], side: int | None) -> NDArray[Any]:
-    """Return every so many texels of an image (h, w, ...), about `side` along each side."""
+def thinned(image: NDArray[Any], side: int | None) -> NDArray[Any]:
+    """Return evenly spaced texels of an image (h, w, ...), about `side` along each side."""
     if side is None or image.ndim < 2:
         return image
     down, across = (max(1, size // side) for size in image.shape[:2])
@@ -51,7 +35,7 @@ def _thinned(image: NDArray[Any], side: int | None) -> NDArray[Any]:
 
 
 def channel(image: NDArray[Any], name: str) -> NDArray[Any]:
-    """The channel (h, w, 1) that stands for a number, of (h, w, 1, 3 or 4); a is 1 if missing."""
+    """Return a channel (h, w, 1) of an image (h, w, 1, 3 or 4); a missing alpha is 1."""
     count = image.shape[2]
     if name == "a":
         return image[..., 3:] if count == 4 else np.ones_like(image[..., :1])
@@ -60,3 +44,44 @@ def channel(image: NDArray[Any], name: str) -> NDArray[Any]:
     if name == "luminance":
         return spectra.luminance(image[..., :3])[..., None]
     return image[..., "rgb".index(name), None]
+
+
+def averaged(image: Floats, uv: Floats, area: Floats, wraps: Sequence[str]) -> Floats:
+    """Return means of an image (h, w) around uv (m, k, 2), from copies of half the size each.
+
+    area (m,): of a lookup, in uv; wraps: of u and v, see `clpt.scene.textures.WRAPS`.
+    """
+    texels = area * image.size
+    steps = np.ceil(0.5 * np.log2(np.maximum(texels, 1.0))).astype(np.int64)
+    values = np.empty(uv.shape[:2])
+    for step in range(int(steps.max(initial=0)) + 1):
+        at_step = steps == step
+        if at_step.any():
+            values[at_step] = _nearest(image, uv[at_step], wraps)
+        image = _halved(image)
+    return values
+
+
+def _halved(image: Floats) -> Floats:
+    """Return an image of half the size; an odd last row or column is taken twice."""
+    height, width = image.shape
+    even = np.pad(image, ((0, height % 2 * (height > 1)), (0, width % 2 * (width > 1))), "edge")
+    if height > 1:
+        even = 0.5 * (even[::2] + even[1::2])
+    return even if width == 1 else 0.5 * (even[:, ::2] + even[:, 1::2])
+
+
+def _nearest(image: Floats, uv: Floats, wraps: Sequence[str]) -> Floats:
+    """Return texels (m, k) at uv (m, k, 2); v = 0 is the bottom row."""
+    inside = np.ones(uv.shape[:2], bool)
+    at = []
+    for axis, (wrap, size) in enumerate(zip(wraps, image.shape[::-1], strict=True)):
+        x = uv[..., axis] if axis == 0 else 1.0 - uv[..., axis]
+        if wrap == "zero":
+            inside &= (x >= 0.0) & (x <= 1.0)
+        elif wrap == "repeat":
+            x = x % 1.0
+        elif wrap == "mirror":
+            x = 1.0 - np.abs(x % 2.0 - 1.0)
+        at.append(np.clip(np.floor(x * size), 0, size - 1).astype(np.int64))
+    return np.where(inside, image[at[1], at[0]], 0.0)

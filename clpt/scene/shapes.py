@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
 from clpt.scene import trimeshes
-from clpt.scene.lights import ON_SHAPES, Light
+from clpt.scene.lights import ON_SHAPES, PoweredLamp
 from clpt.scene.materials import Diffuse, Material
 from clpt.scene.media import Medium
 from clpt.scene.motion import Deformation, Keys
@@ -20,6 +21,7 @@ from clpt.scene.params import Kind, choice, host
 from clpt.scene.textures import Bitmap
 from clpt.scene.values import Matrix4, OnDevice, Vector3
 
+ShapeKind = TypeVar("ShapeKind", bound="Shape")
 SMOOTH = "smooth"  # normals of a mesh: the means of the triangles around a vertex, by their areas
 NO_ATTRIBUTES: Mapping[str, Any] = MappingProxyType({})
 BASES = ("linear", "bspline", "bezier")
@@ -31,19 +33,40 @@ class Shape(Kind):
 
     is_tree = False  # it holds trees side by side
     is_open: ClassVar[bool] = False  # no shape of this kind encloses a volume by itself
+    deformed_field: ClassVar[str] = ""  # the parameter that a deformation replaces by its points
+    flattens: ClassVar[bool] = False  # its triangles may have no area, as of a tube of radius 0
     # of a kind without such parameters
+    group = cast("Group | None", None)
     attributes = NO_ATTRIBUTES
+    vertices = cast(Any, None)
+    faces = cast(Any, None)
+    radii = cast(Any, None)
     normals = cast(Any, None)
     tangents = cast(Any, None)
     deformation = cast("Deformation | None", None)
+    displacement = cast("Bitmap | None", None)
 
     @property
     def members(self) -> tuple[Shape, ...]:
-        """The shape, or those that an instance places."""
+        """The shape, or the shapes that an instance places."""
         return (self,)
 
+    @property
+    def shared_parts(self) -> dict[str, Any]:
+        """The parts that other shapes may share, by their parameters."""
+        return {"material": self.material}
+
+    def at_time(self: ShapeKind, time: float) -> ShapeKind:
+        """Return the shape with the points of its deformation at a time [s], without deformation.
+
+        Its `deformation` must not be None.
+        """
+        points, _ = cast(Deformation, self.deformation).at(time)
+        changes: dict[str, Any] = {self.deformed_field: points, "deformation": None}
+        return dataclasses.replace(self, **changes)
+
     material: Material = host(Diffuse(), "of the surface", form="material")
-    emission: Light | None = host(None, "an `area` light, or None", form="area_light")
+    emission: PoweredLamp | None = host(None, "an `area` light, or None", form="area_light")
     interior: Medium | None = host(None, "medium behind its front, or None", form="medium")
     exterior: Medium | None = host(None, "medium before its front, or None", form="medium")
     priority: int = host(0, "where bodies overlap, that of the highest fills the place")
@@ -77,6 +100,8 @@ def check_faces(faces: NDArray[Any], vertices: int, where: str) -> None:
 class Mesh(Shape):
     """Triangles, counter-clockwise seen from the front."""
 
+    deformed_field = "vertices"
+
     vertices: Any = host(None, "(n, 3) float32", "m", form="rows3")
     faces: Any = host(None, "(m, 3) uint32", form="triangles")
     normals: Any = host(
@@ -105,6 +130,13 @@ class Mesh(Shape):
     )
     displacement_scale: float = host(1.0, "factor on them", "m")
     displacement_edge: float = host(0.05, "longest edge of what is displaced, in the world", "m")
+
+    def at_time(self, time: float) -> Mesh:
+        """Return the mesh with the vertices and normals of its deformation at a time [s]."""
+        _, normals = cast(Deformation, self.deformation).at(time)
+        still = super().at_time(time)
+        normals = self.normals if normals is None else normals
+        return dataclasses.replace(still, normals=normals, tangents=None)
 
     def check(self) -> None:
         """Raise SceneError for faces of vertices that are not there, as far as the host knows."""
@@ -166,6 +198,8 @@ class Spheres(Shape):
     A `mesh_attribute` texture reads the attributes: the first row is the first sphere's.
     """
 
+    deformed_field = "centers"
+
     centers: Any = host(
         None, "(n, 3) float32 before `to_world`; (n, 4): with the radii", "m", form="rows3"
     )
@@ -224,6 +258,8 @@ class Curves(Shape):
     """
 
     is_open = True
+    deformed_field = "points"
+    flattens = True
 
     points: Any = host(None, "(n, 4) of all strands: x y z and the radius", "m", form="rows4")
     lengths: Any = host(
@@ -252,6 +288,8 @@ class SdfGrid(Shape):
     uv are 0 everywhere: a texture is constant over it.
     """
 
+    flattens = True
+
     values: ArrayLike = host(
         _ball(), "(nx, ny, nz) float32, below 0 inside; default: a ball", form="grid"
     )
@@ -271,6 +309,10 @@ class Group:
     shapes: tuple[Shape, ...] = ()
     name: str = ""
 
+    @property
+    def shared_parts(self) -> dict[str, Any]:
+        return {"shapes": self.shapes}
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "shapes", tuple(self.shapes))
         for i, shape in enumerate(self.shapes):
@@ -287,12 +329,16 @@ class Instance(Shape):
     group: Group = host(None, "what is placed: a name in the scene's `groups`", form="group")
     # The surfaces are those of the group's shapes.
     material: Material = field(default=cast(Material, None), init=False, repr=False)
-    emission: Light | None = field(default=None, init=False, repr=False)
+    emission: PoweredLamp | None = field(default=None, init=False, repr=False)
     flip_normals: bool = field(default=False, init=False, repr=False)
 
     @property
     def members(self) -> tuple[Shape, ...]:
         return self.group.shapes
+
+    @property
+    def shared_parts(self) -> dict[str, Any]:
+        return {"group": self.group}
 
     def check(self) -> None:
         """Raise SceneError unless `group` is a group."""

@@ -2,15 +2,48 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import reduce
+from typing import Any
 
 import numpy as np
 
+from clpt import images
+from clpt.arrays import Floats, Floats32, on_host
 from clpt.errors import SceneError
-from clpt.scene.params import Kind, choice, factor, fields_of, host, real, reflectance
-from clpt.scene.params import Texture as Texture
+from clpt.images import spectral_exr
+from clpt.images.spectral_exr import SpectralImage
+from clpt.scene.params import (
+    Kind,
+    choice,
+    factor,
+    fields_of,
+    host,
+    params,
+    real,
+    reflectance,
+)
+from clpt.scene.pixels import averaged, channel, check_image, image_file, thinned
+from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role
+from clpt.scene.texture_values import (
+    Attributes,
+    Look,
+    Operation,
+    Use,
+    brightness_at,
+    channel_factors,
+    constant_number,
+    folded,
+    is_texture,
+    mean,
+    scaled_primary,
+    separated,
+)
+from clpt.scene.texture_values import Texture as Texture
 from clpt.scene.values import ImageLike, Matrix4, Textured, TexturedNumber
+from clpt.spectra import Constant, RGBIlluminant, Spectrum
 
 ATTRIBUTES = ("vertex_", "face_")  # prefixes of the names of attributes
 PATTERNS = ("fbm", "wrinkled", "windy")
@@ -34,6 +67,23 @@ class Placed(Texture):
         _matrix(self, "to_uv", 3)
         _matrix(self, "to_texture", 4)
 
+    @property
+    def attributes(self) -> tuple[str, ...]:  # type: ignore[override]
+        return SECOND_UV if self.mapping == "uv1" else ()
+
+    @property
+    def affine(self) -> Floats:
+        """The uv transform (3, 3) with a last row of 0 0 1."""
+        return np.asarray(self.to_uv / self.to_uv[2, 2])
+
+    def check_use(self, *, emissive: bool) -> None:
+        last = self.to_uv[2]
+        if not np.allclose(last[:2], 0.0) or np.isclose(last[2], 0.0):
+            raise SceneError("its last row must be 0 0 1", where=f"{self.kind}.to_uv")
+        if self.mapping not in ("uv", "uv1"):
+            _check_affine(self, self.to_texture)
+        super().check_use(emissive=emissive)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solid(Texture):
@@ -43,6 +93,10 @@ class Solid(Texture):
 
     def check(self) -> None:
         _matrix(self, "to_texture", 4)
+
+    def check_use(self, *, emissive: bool) -> None:
+        _check_affine(self, self.to_texture)
+        super().check_use(emissive=emissive)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,6 +129,71 @@ class Bitmap(Placed):
         "luminance", "what a number is taken from; a is never decoded", ("luminance", *"rgba")
     )
 
+    @property
+    def wraps(self) -> tuple[str, str]:
+        """The wraps of u and of v."""
+        return self.wrap, self.wrap_v or self.wrap
+
+    @property
+    def image_key(self) -> Any:
+        """A key that is equal for the same images: a file's name, or an object's id."""
+        return image_file(self.image) or id(self.image)
+
+    @property
+    def identity(self) -> Any:
+        sampling = self.raw, self.filter, self.wrap, self.wrap_v, self.channel
+        to_texture = np.asarray(self.to_texture).tobytes()
+        return self.image_key, *sampling, self.to_uv.tobytes(), self.mapping, to_texture
+
+    def spectral(self, role: Role) -> SpectralImage | None:
+        """Return its image of spectra in a role, None for an image of colours."""
+        emissive = role is EMISSION
+        return spectral_exr.find(self.image, emissive=emissive, where="bitmap.image")
+
+    def pixels(self, role: Role, side: int | None = None) -> Floats32:
+        """Return its image (h, w, 1 or 3) float32, top row first; for REAL (h, w, 1).
+
+        role: it chooses the colour of spectra; side: about how many texels along each side are
+        enough; the others are left out. Raises SceneError for an image that cannot be read.
+        """
+        spectral = self.spectral(role)
+        image: Any = self.image if spectral is None else spectral.to_rgb()
+        if image_file(image) is not None:
+            stored = images.read_stored(image)
+            some = dataclasses.replace(stored, values=thinned(stored.values, side))
+            image = some.decoded(not self.raw)
+        stored = images.from_array(thinned(np.asarray(on_host(image)), side), "bitmap.image")
+        plain = stored.decoded(not self.raw)
+        return np.nan_to_num(channel(plain, self.channel) if role is REAL else plain[..., :3])
+
+    def channel_factors(self, channel: int) -> list[Any]:
+        return [dataclasses.replace(self, channel="rgb"[channel])]
+
+    def mean(self, look: Look) -> float:
+        return float(look.levels(self).mean())
+
+    def brightness_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
+        linear, offset = self.affine[:2, :2], self.affine[:2, 2]
+        area = area * abs(np.linalg.det(linear))
+        return averaged(look.levels(self), uv @ linear.T + offset, area, self.wraps)
+
+    def clamped_at_poles(self) -> Texture:
+        """Return it with `wrap_v` "clamp", unless it has a `wrap_v` or `to_uv` moves it along v."""
+        corners = self.to_uv[1] @ np.array([[0, 0, 1, 1], [0, 1, 0, 1], [1, 1, 1, 1]])
+        inside = bool((np.abs(corners - 0.5) <= 0.5 + 1e-6).all())
+        return dataclasses.replace(self, wrap_v="clamp") if inside and not self.wrap_v else self
+
+    def normalized(self) -> tuple[float, Texture]:
+        if self.spectral(REFLECTANCE) is not None:
+            return 1.0, self
+        values = self.pixels(REFLECTANCE)
+        scale = max(float(values.max()), 0.0) or 1.0
+        return scale, dataclasses.replace(self, image=values / np.float32(scale), raw=True)
+
+    def check_use(self, *, emissive: bool) -> None:
+        check_image(self.image, "bitmap.image", emissive=emissive)
+        super().check_use(emissive=emissive)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Checkerboard(Placed):
@@ -84,6 +203,28 @@ class Checkerboard(Placed):
         0.4, "colour where both or neither coordinate is below a half", limited=False
     )
     color1: Textured = reflectance(0.2, "colour elsewhere", limited=False)
+
+    @property
+    def combines(self) -> bool:
+        return is_texture(self.color0) or is_texture(self.color1)
+
+    def folded(self, role: Role) -> Any:
+        if not self.combines:
+            return self
+        pattern = Checkerboard(color0=0.0, color1=1.0, to_uv=self.to_uv)
+        return Mix(first=self.color0, second=self.color1, amount=pattern).folded(role)
+
+    def mean(self, look: Look) -> float:
+        return 0.5 * (mean(self.color0, look) + mean(self.color1, look))
+
+    def brightness_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
+        cells = uv @ self.affine[:2, :2].T + self.affine[:2, 2]
+        same = np.equal(*np.moveaxis(cells % 1.0 < 0.5, -1, 0))
+        first, second = (
+            brightness_at(colour, look, uv, area, attributes)
+            for colour in (self.color0, self.color1)
+        )
+        return np.where(same, first, second)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,6 +237,66 @@ class Product(Texture):
         False, "True: colours are multiplied as linear Rec. 709, and the product made a spectrum"
     )
 
+    @property
+    def factor_name(self) -> str:
+        """The constant if only the second is a texture, else the second: light times a factor."""
+        return "first" if is_texture(self.second) and not is_texture(self.first) else "second"
+
+    @property
+    def combines(self) -> bool:
+        return True
+
+    def operation(self, use: Use, role: Role) -> Operation | None:
+        second: Use = "factor" if use == "own" and role is EMISSION else use
+        return "multiply", ((self.first, use), (self.second, second))
+
+    def folded(self, role: Role) -> Any:
+        a, b = folded(self.first, role), folded(self.second, role)
+        if not is_texture(a) and is_texture(b):
+            a, b = b, a  # light comes from the texture, and the constant is its factor
+        x, y = constant_number(a, role), constant_number(b, role)
+        if x is not None and y is not None:
+            return RGBIlluminant(*[x * y] * 3) if role is EMISSION else Constant(x * y)
+        if y == 1.0 and is_texture(a):
+            return a
+        if x == 1.0 and role is not EMISSION:
+            return b
+        return Product(first=a, second=b, rgb=self.rgb)
+
+    def separated(self, role: Role) -> Any:
+        """Return the sum of three products: a primary spectrum times its channel each.
+
+        A program adds by mixing halves: the first two products, then their sum with the third. So
+        the first two are times four, the third times two.
+        """
+        light = role is EMISSION
+        if not self.rgb:
+            second = separated(self.second, REFLECTANCE if light else role)
+            return dataclasses.replace(self, first=separated(self.first, role), second=second)
+        red, green, blue = (
+            _scaled(scaled_primary(i, times, light), self.channel_factors(i))
+            for i, times in enumerate((4, 4, 2))
+        )
+        return Mix(first=Mix(first=red, second=green, amount=0.5), second=blue, amount=0.5)
+
+    def channel_factors(self, channel: int) -> list[Any]:
+        return [*channel_factors(self.first, channel), *channel_factors(self.second, channel)]
+
+    def mean(self, look: Look) -> float:
+        return mean(self.first, look) * mean(self.second, look)
+
+    def brightness_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
+        first = brightness_at(self.first, look, uv, area, attributes)
+        return first * brightness_at(self.second, look, uv, area, attributes)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Scaled(Product):
+    """A spectrum times a number."""
+
+    def operation(self, use: Use, role: Role) -> Operation | None:
+        return "multiply", ((self.first, use), (self.second, "real"))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mix(Texture):
@@ -104,6 +305,47 @@ class Mix(Texture):
     first: Textured = factor(0.0, "where the amount is 0")
     second: Textured = factor(1.0, "where it is 1")
     amount: TexturedNumber = real(0.5, "share of the second", textured=True)
+
+    @property
+    def combines(self) -> bool:
+        return True
+
+    def operation(self, use: Use, role: Role) -> Operation | None:
+        return "mix", ((self.first, use), (self.second, use), (self.amount, "real"))
+
+    def folded(self, role: Role) -> Any:
+        first, second = folded(self.first, role), folded(self.second, role)
+        amount = folded(self.amount, REAL)
+        a, b = constant_number(first, role), constant_number(second, role)
+        t = constant_number(amount, REAL)
+        if t in (0.0, 1.0):
+            end, number = (second, b) if t else (first, a)
+            return end if role is not REAL or number is None else Constant(number)
+        if a is not None and b is not None and t is not None and role is not EMISSION:
+            return Constant(a + (b - a) * t)
+        return Mix(first=first, second=second, amount=amount if t is None else t)
+
+    def separated(self, role: Role) -> Any:
+        ends = {"first": separated(self.first, role), "second": separated(self.second, role)}
+        return dataclasses.replace(self, **ends)
+
+    def channel_factors(self, channel: int) -> list[Any]:
+        first, second = (
+            reduce(lambda a, b: Product(first=a, second=b), channel_factors(end, channel))
+            for end in (self.first, self.second)
+        )
+        return [Mix(first=first, second=second, amount=self.amount)]
+
+    def mean(self, look: Look) -> float:
+        share = mean(self.amount, look)
+        return (1.0 - share) * mean(self.first, look) + share * mean(self.second, look)
+
+    def brightness_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
+        share, first, second = (
+            brightness_at(value, look, uv, area, attributes)
+            for value in (self.amount, self.first, self.second)
+        )
+        return (1.0 - share) * first + share * second
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,6 +361,19 @@ class MeshAttribute(Texture):
         if not str(self.name).startswith(ATTRIBUTES):
             message = f"must begin with {' or '.join(ATTRIBUTES)}, not {self.name!r}"
             raise SceneError(message, where=f"{self.kind}.name")
+
+    @property
+    def attributes(self) -> tuple[str, ...]:  # type: ignore[override]
+        return (self.name,)
+
+    def channel_factors(self, channel: int) -> list[Any]:
+        return [dataclasses.replace(self, channel="rgb"[channel])]
+
+    def brightness_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
+        if self.name not in attributes:
+            return super().brightness_at(look, uv, area, attributes)
+        means = attributes[self.name].mean(axis=1, dtype=np.float64)
+        return np.broadcast_to(np.maximum(means, 0.0)[:, None], uv.shape[:2])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -178,15 +433,39 @@ def _octaves(texture: Noise | Marble) -> None:
         raise SceneError(message, where=f"{texture.kind}.octaves")
 
 
+def _check_affine(texture: Texture, to_texture: Matrix4) -> None:
+    if not np.allclose(np.asarray(to_texture)[3], [0.0, 0.0, 0.0, 1.0]):
+        raise SceneError("its last row must be 0 0 0 1", where=f"{texture.kind}.to_texture")
+
+
+def _scaled(spectrum: Spectrum, factors: list[Any]) -> Any:
+    """Return a spectrum times textures and numbers; the numbers become their product."""
+    number = float(np.prod([f for f in factors if not is_texture(f)]))
+    textures: list[Any] = [f for f in factors if is_texture(f)]
+    product: Any = spectrum
+    for part in (*textures, *([number] if number != 1.0 else [])):
+        product = _Scaled(first=product, second=part)
+    return product
+
+
+# ---- textures in other kinds
+
+
+def check_textures(kind: Kind) -> None:
+    """Raise SceneError for a texture that its parameter cannot use, see `Texture.check_use`."""
+    values = fields_of(kind)
+    for name, param in params(type(kind)).items():
+        value = values[name]
+        if is_texture(value):
+            value.check_use(emissive=param.role is EMISSION)
+        for part in value if isinstance(value, tuple) else ():
+            if isinstance(part, Kind):
+                check_textures(part)
+
+
 def attributes_in(value: object) -> set[str]:
     """Return the names of the attributes of meshes that the textures in a kind read."""
-    names: set[str] = set()
-    for texture in textures_in(value):
-        if isinstance(texture, MeshAttribute):
-            names.add(texture.name)
-        elif isinstance(texture, Placed) and texture.mapping == "uv1":
-            names |= set(SECOND_UV)
-    return names
+    return {name for texture in textures_in(value) for name in texture.attributes}
 
 
 def placed_in(value: object) -> Placed | None:

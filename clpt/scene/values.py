@@ -13,7 +13,7 @@ from typing import Any, Protocol, TypeAlias
 from numpy.typing import NDArray
 
 from clpt.images.spectral_exr import SpectralImage
-from clpt.scene.params import Texture
+from clpt.scene.texture_values import Texture
 from clpt.spectra import Spectrum
 
 

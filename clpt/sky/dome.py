@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from clpt.arrays import Floats
 from clpt.records import SKY_SIZES
 from clpt.scene.lights import Sky
-from clpt.sky import atmosphere, skylight
+from clpt.sky import skylight
 from clpt.spectra.air import EARTH, LAMBDAS, SUNLIGHT, Atmosphere
 
 ROWS, COLUMNS = 48, 96  # of cells from the horizon to the zenith, or to the nadir; around
@@ -107,7 +107,7 @@ def _disc(air: Atmosphere, elevation: float, at: float, high: float) -> Floats:
     cosine = np.linspace(0.0, 1.0, SUN_COLUMNS)
     power = -0.023 + 292.0 / LAMBDAS
     dark = np.maximum(cosine, 1e-6)[:, None] ** power * (0.5 * power + 1.0)
-    way, _ = atmosphere.sun_columns(
+    way, _ = skylight.sun_columns(
         np.full(SUN_ROWS, EARTH + high), np.sin(np.maximum(rows, at + 1e-6))
     )
     passed = np.exp(-(way.T @ air.depths(LAMBDAS)))

@@ -4,7 +4,8 @@ Light scattered once is integrated along each ray. All higher orders are a field
 spherical harmonics up to DEGREE, at heights and sun angles around the observer. Air needs no higher
 degree, haze hardly. The field is computed in orders of scattering, along rays from these points.
 The ground is diffuse. Lengths are in km, radiance is per irradiance of the sun above the air
-[1/sr]. docs/sky.md and tests/sky compare it with random walks of light.
+[1/sr]. `clpt.spectra.air` has the air's constituents. Rays are straight. docs/sky.md
+and tests/sky compare it with random walks of light.
 """
 
 from __future__ import annotations
@@ -12,13 +13,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats
-from clpt.sky import atmosphere
-from clpt.sky.atmosphere import TOP
 from clpt.spectra.air import DEPOLARISED, EARTH, LAMBDAS, Atmosphere, densities
 
+TOP = EARTH + 100.0  # radius of the top of the air
+NODES = 32  # of a column to the top
 DEGREE = 5  # of the harmonics
 HEIGHTS = np.array([0, 0.5, 1.5, 3, 6, 10, 16, 23, 32, 45, 60, 99.0])  # [km]
 AROUND, BETWEEN = 15.0, 2.5  # sun angles [degrees]: range on either side of the observer's, step
@@ -30,6 +31,56 @@ HAZY = 12.0  # the field has haze below this height [km]
 CORNERS = ((0, 0), (0, 1), (1, 0), (1, 1))  # of a cell
 PIECE = 4096  # points per block
 ORDERS, ENOUGH = 24, 1e-3  # most orders; the last order's share of the light that ends them
+
+
+def to_top(radius: Floats, cosine: Floats) -> Floats:
+    """Return distances to the top [km] of rays from a radius, with a cosine to the vertical."""
+    square = np.maximum(TOP**2 - radius**2 * (1.0 - cosine**2), 0.0)
+    return np.maximum(np.sqrt(square) - radius * cosine, 0.0)
+
+
+def columns(radius: ArrayLike, cosine: ArrayLike) -> Floats:
+    """Return columns (3, ...) from a radius [km] to the top, over the vertical columns at the sea.
+
+    cosine: to the vertical, 0 to 1.
+    """
+    r, mu = np.broadcast_arrays(np.asarray(radius, np.float64), np.asarray(cosine, np.float64))
+    x, w = np.polynomial.legendre.leggauss(NODES)
+    x, w = 0.5 + 0.5 * x, 0.5 * w
+    far, total = to_top(r, mu), np.zeros((3, *r.shape))
+    for u, weight in zip(x, w, strict=True):
+        t = far * u**3
+        height = np.sqrt(r * r + t * t + 2.0 * r * mu * t) - EARTH
+        total += densities(height) * (weight * 3.0 * u * u * far)
+    return total
+
+
+def sun_columns(radius: ArrayLike, cosine: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return columns (3, ...) toward the sun, and whether the earth leaves it visible.
+
+    cosine: of the sun's direction to the vertical, -1 to 1.
+    """
+    r, mu = np.broadcast_arrays(np.asarray(radius, np.float64), np.asarray(cosine, np.float64))
+    nearest = r * np.sqrt(np.maximum(1.0 - mu * mu, 0.0))
+    seen = (mu >= 0.0) | (nearest > EARTH)
+    depths = columns(r, np.abs(mu))
+    past = (mu < 0.0) & seen
+    if past.any():
+        depths[:, past] = 2.0 * columns(nearest[past], np.zeros(int(past.sum()))) - depths[:, past]
+    return depths, seen
+
+
+def rayleigh_phase(cosine: ArrayLike) -> Floats:
+    """Phase function of air [1/sr] (Chandrasekhar 1960, with its depolarisation)."""
+    square = np.asarray(cosine, np.float64) ** 2
+    g = DEPOLARISED
+    return 3.0 / (16.0 * np.pi * (1.0 + 2.0 * g)) * ((1.0 + 3.0 * g) + (1.0 - g) * square)
+
+
+def aerosol_phase(cosine: ArrayLike, g: float) -> Floats:
+    """Henyey and Greenstein's phase function [1/sr]."""
+    below = 1.0 + g * g - 2.0 * g * np.asarray(cosine, np.float64)
+    return (1.0 - g * g) / (4.0 * np.pi * below**1.5)
 
 
 class Air(NamedTuple):
@@ -81,7 +132,7 @@ def rays(radius: Floats, mu: Floats, count: int, after: Floats | None = None) ->
     hits = down & (lowest < EARTH)
     turn = np.where(down, -radius * mu, 0.0)
     ground = np.where(hits, turn - np.sqrt(np.maximum(EARTH**2 - lowest**2, 0.0)), -1.0)
-    end = np.where(down, turn + np.sqrt(TOP**2 - lowest**2), atmosphere.to_top(radius, mu))
+    end = np.where(down, turn + np.sqrt(TOP**2 - lowest**2), to_top(radius, mu))
     low = np.where(hits, np.maximum(ground, 0.0), turn)
     low = low if after is None else np.maximum(low, after)
     x, w = np.polynomial.legendre.leggauss(count)
@@ -95,12 +146,12 @@ def rays(radius: Floats, mu: Floats, count: int, after: Floats | None = None) ->
     )
     ray, at = np.nonzero(weight > 0.0)
     t, weight = t[ray, at], weight[ray, at]
-    start = atmosphere.columns(radius, np.abs(mu))
+    start = columns(radius, np.abs(mu))
     r, cosine = _along(radius[ray], mu[ray], t)
-    there = atmosphere.columns(r, np.abs(cosine))
+    there = columns(r, np.abs(cosine))
     middle = np.zeros_like(start)
     passing = down & ~hits
-    middle[:, passing] = 2.0 * atmosphere.columns(lowest[passing], np.zeros(int(passing.sum())))
+    middle[:, passing] = 2.0 * columns(lowest[passing], np.zeros(int(passing.sum())))
     rising = cosine >= 0.0
     depths = np.where(
         down[ray],
@@ -108,7 +159,7 @@ def rays(radius: Floats, mu: Floats, count: int, after: Floats | None = None) ->
         start[:, ray] - there,
     )
     slope = np.sqrt(np.maximum(1.0 - (lowest / EARTH) ** 2, 0.0))
-    below = np.where(hits, atmosphere.columns(np.full_like(slope, EARTH), slope) - start, 0.0)
+    below = np.where(hits, columns(np.full_like(slope, EARTH), slope) - start, 0.0)
     return Rays(ray, t, weight, np.maximum(depths, 0.0), ground, np.maximum(below, 0.0))
 
 
@@ -177,7 +228,7 @@ def places(radius: Floats, sun: Floats, mu: Floats, turn: Floats, t: Floats) -> 
 
 def once(a: Air, way: Rays, at: Places, count: int) -> Floats:
     """Return sunlight scattered once into rays, (count, n) [1/sr]."""
-    toward, seen = atmosphere.sun_columns(at.height + EARTH, at.sun)
+    toward, seen = sun_columns(at.height + EARTH, at.sun)
     out = np.zeros((count, a.extinct.shape[1]))
     kept = np.flatnonzero(seen)
     if not len(kept):
@@ -185,8 +236,8 @@ def once(a: Air, way: Rays, at: Places, count: int) -> Floats:
     depth = (way.columns + toward)[:, kept].T @ a.extinct
     dense = densities(at.height[kept]) * way.weight[kept]
     angle = at.angle[kept]
-    haze = atmosphere.aerosol_phase(angle, a.asymmetry)
-    phases = dense[:2] * np.stack([atmosphere.rayleigh_phase(angle), haze])
+    haze = aerosol_phase(angle, a.asymmetry)
+    phases = dense[:2] * np.stack([rayleigh_phase(angle), haze])
     _add(out, way.ray[kept], np.exp(-depth) * (phases.T @ a.scatter))
     return out
 
@@ -282,7 +333,7 @@ class Field(NamedTuple):
             return out
         at = places(r[hit], sun[hit], mu[hit], turn[hit], way.ground[hit])
         cosine = np.maximum(at.sun, 0.0)
-        toward = atmosphere.columns(np.full(len(cosine), EARTH), cosine)
+        toward = columns(np.full(len(cosine), EARTH), cosine)
         direct = np.exp(-(toward.T @ a.extinct)) * cosine[:, None]
         s, y = _between(self.angles, np.arccos(at.sun))
         around = self.ground[s] * (1.0 - y)[:, None] + self.ground[s + 1] * y[:, None]

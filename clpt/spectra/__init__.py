@@ -3,7 +3,6 @@
 Wavelengths are in nm throughout. A scene holds `Spectrum` objects; `on_grid` fills device tables.
 """
 
-from clpt.spectra.bispectral import read_bispectral, read_reradiation
 from clpt.spectra.cie import (
     CIE_Y_INTEGRAL,
     LAMBDA_MAX,
@@ -17,6 +16,7 @@ from clpt.spectra.cie import (
     wavelength_pdf,
     xyz_to_rgb,
 )
+from clpt.spectra.dispersion import glass, glasses, index, metal, metals
 from clpt.spectra.emission import (
     LED,
     LUMENS,
@@ -31,8 +31,13 @@ from clpt.spectra.emission import (
     watts,
 )
 from clpt.spectra.files import read_absorption, read_index, read_refractive_index, read_table
-from clpt.spectra.named import glass, glasses, index, metal, metals
-from clpt.spectra.reradiation import Donaldson, Fluorophore, Reradiation
+from clpt.spectra.reradiation import (
+    Donaldson,
+    Fluorophore,
+    Reradiation,
+    read_bispectral,
+    read_reradiation,
+)
 from clpt.spectra.sensors import Sensor, observer, read_sensor
 from clpt.spectra.spectrum import (
     RGB,

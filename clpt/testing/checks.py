@@ -14,8 +14,7 @@ from clpt.records import LOBE_BITS
 from clpt.scene import roles
 from clpt.scene.materials import Material
 from clpt.scene.params import device_params
-from clpt.testing.probe import Probe
-from clpt.testing.rounding import CONTRACTED, contracts
+from clpt.testing.probe import CONTRACTED, Probe, contracts
 from clpt.testing.settings import directions, pairs, settings, tilted
 
 TRANSMIT, DELTA, DISPERSE = (LOBE_BITS[name] for name in ("transmit", "delta", "disperse"))

@@ -12,8 +12,9 @@ from clpt.render.records import custom_materials
 from clpt.render.records.materials import ORDERS_WORDS
 from clpt.scene import roles
 from clpt.scene.materials import LEAVES, Material
-from clpt.scene.params import Texture, device_params, fields_of
+from clpt.scene.params import device_params, fields_of
 from clpt.scene.roles import Param, Role, Spectral
+from clpt.scene.textures import Texture
 from clpt.testing import checks
 from clpt.testing.probe import LAMBDAS, Probe
 from clpt.testing.settings import settings, white

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,16 @@ COMPONENTS = {"rgb": 3, "spectral": 4}
 LAMBDAS = (532.0, 590.0, 655.0, 441.0)  # [nm], for kinds with `needs_wavelengths`, and layers
 NOTHING = np.zeros(0)
 RESULTS = ("wi", "weight", "sampled_pdf", "eta", "lobe", "eval", "pdf", "eval_again", "pdf_again")
+CONTRACTED = {"rtol": 1e-3, "atol": 5e-5}  # for values about 1; twice NVIDIA's difference
+
+_TEXT = """
+kernel void probe(global const float *in, global float *out, uint n)
+{
+    uint at = get_global_id(0);
+    float product = in[at] * in[at];
+    out[at] = product - in[n + at];
+}
+"""
 
 
 def root_text(mode: str, files: tuple[str, ...] = ()) -> str:
@@ -205,7 +215,7 @@ class Probe:
         if "layers" not in device_params(self.cls):
             return ["", ""]
         if not count:
-            return ['#include "materials/boundary_bare.cl"', "    m.layers = layers_none();"]
+            return ['#include "materials/boundary.cl#bare"', "    m.layers = layers_none();"]
         if self.mode == "spectral":
             lambdas = ", ".join(f"(real)({v}f)" for v in LAMBDAS)
             return [
@@ -214,14 +224,14 @@ class Probe:
                 "inline Layer layer_at(Layers l, integer i)\n{\n    i *= 4;\n"
                 "    Layer r = {spectrum_of(gather(l.at, i)), spectrum_of(gather(l.at, i + 1)),\n"
                 "               gather(l.at, i + 2), gather(l.at, i + 3)};\n    return r;\n}\n"
-                '#include "materials/boundary_film.cl"',
+                '#include "materials/boundary.cl#film"',
                 f"    Layers layers = {{in + {rows} * n, {count}, {{{lambdas}}}}};\n"
                 "    m.layers = layers;",
             ]
         return [
             "typedef struct { global const float *spectra; } Tables;\n"
             "typedef struct { Tables scene; integer count, table, rows; real profile; } Layers;\n"
-            f'#define FILM_COSINES {FILM_COSINES}\n#include "materials/boundary_table.cl"',
+            f'#define FILM_COSINES {FILM_COSINES}\n#include "materials/boundary.cl#table"',
             f"    Layers layers = {{{{in + {rows} * n}}, {count}, 0, 1, 1.0f}};\n"
             "    m.layers = layers;",
         ]
@@ -280,3 +290,15 @@ class Probe:
                 "",
             ]
         )
+
+
+@cache
+def contracts(on: device.Device) -> bool:
+    """Return whether the device's compiler joins a product and a later sum to an fma.
+
+    Whether it joins them depends on the remaining program. So two programs may round the same
+    expression differently: lanes of two widths agree to CONTRACTED. On other devices they agree to
+    the bit.
+    """
+    streams = np.array([[1 + 2.0**-12], [1 + 2.0**-11]])  # a number, and its square as rounded
+    return bool(run(on, {"probe.cl": _TEXT}, 1, streams, 1)[0, 0] != 0.0)

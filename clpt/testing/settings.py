@@ -26,6 +26,13 @@ TESTED_RANGES: dict[str, dict[str, Any]] = {
     "longitudinal_roughness": {"low": 0.3},
     "azimuthal_roughness": {"low": 0.3},
     "iridescence_thickness": {"low": 200.0, "high": 600.0},
+    "specular_roughness": {"low": 0.5},
+    "specular_roughness_anisotropy": {"high": 0.6},
+    "coat_roughness": {"low": 0.5},
+    "coat_roughness_anisotropy": {"high": 0.6},
+    "fuzz_roughness": {"low": 0.4},
+    "specular_weight": {"high": 1.0},
+    "thin_film_thickness": {"low": 0.2, "high": 0.6},
 }
 
 

@@ -14,7 +14,7 @@ from clpt import spectra
 from clpt.errors import SceneError
 from clpt.formats.native import forms
 from clpt.formats.native.cursor import Cursor
-from clpt.images.colour.tones import TONES
+from clpt.images.colour import TONES
 from clpt.render.edit.scene_edit import Successors, edit_scene
 from clpt.scene import Scene
 from clpt.scene.materials import LEAVES, Material, parts
@@ -23,7 +23,7 @@ from clpt.scene.roles import INDEX, MEASUREMENT, MERL, SPECTRA, Param
 from clpt.scene.shapes import Group, Instance, Shape
 from clpt.scene.textures import Texture
 from clpt.spectra.sensors import OBSERVERS
-from clpt.view.commands import OF_VIEW, CommandError
+from clpt.view.messages import OF_VIEW, CommandError
 from clpt.view.target import Change
 
 # Controls of the page by the names of roles; others cannot be edited there.

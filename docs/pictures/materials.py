@@ -29,6 +29,7 @@ from clpt.scene.materials import (
     Merl,
     NormalMap,
     Null,
+    Openpbr,
     OrenNayar,
     Phong,
     Plastic,
@@ -332,6 +333,16 @@ MATERIALS = {
         GltfSurface(base_color=BLUE, metallic=0.6, roughness=0.6, clearcoat=1.0),
         GltfSurface(base_color=(0.2, 0.02, 0.04), sheen_color=(0.9, 0.4, 0.4), sheen_roughness=0.4),
         GltfSurface(base_color=0.3, metallic=1.0, roughness=0.25, iridescence=1.0),
+        mode="spectral",
+    ),
+    "openpbr": three(
+        "Lacquer with `coat_color` and `coat_darkening`; `fuzz_weight` 1; `thin_film_weight` 1 on"
+        " metal.",
+        Openpbr(base_color=(0.5, 0.27, 0.12), coat_weight=1.0, coat_color=(0.95, 0.6, 0.3)),
+        Openpbr(base_color=(0.02, 0.05, 0.2), specular_weight=0.0, fuzz_weight=1.0,
+                fuzz_color=(0.6, 0.7, 1.0)),
+        Openpbr(base_color=0.4, base_metalness=1.0, specular_roughness=0.25, thin_film_weight=1.0,
+                thin_film_thickness=0.35),
         mode="spectral",
     ),
     "grating": three(

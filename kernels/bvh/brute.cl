@@ -4,7 +4,7 @@
  * e2 = v2 - v0, n = cross(e1, e2), prim, tag, plane, side as of TriHit. A record is read once and tested against
  * all lanes of the work-item.
  */
-#include "bvh/hit.cl"
+#include "bvh/ray.cl"
 #include "core/lanes.cl"
 
 #define BRUTE_EDGE 2e-6f

@@ -7,8 +7,8 @@
  * other from its first split on, so that neighbours share cache lines and pages. No counter is shared, so two
  * builds give the same tree.
  */
-#include "bvh/no_vectorize.cl"
-#include "bvh/items.cl"
+#include "bvh/hints.cl"
+#include "bvh/node.cl"
 #include "bvh/node.cl"
 
 #define BUILD_BINS 8

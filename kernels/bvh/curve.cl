@@ -7,9 +7,9 @@
  * A key is Morton's code above the item's index. An item represents a run for the build of a tree: its name is
  * the run's first item, and its area is replaced by the number of items.
  */
-#include "bvh/fetch.cl"
-#include "bvh/no_vectorize.cl"
-#include "bvh/items.cl"
+#include "bvh/hints.cl"
+#include "bvh/hints.cl"
+#include "bvh/node.cl"
 
 #include "generated/curve_keys.cl"
 #define CURVE_AHEAD 16 /* items */

@@ -3,7 +3,7 @@
  * A triangle with a corner that is not finite, or beyond what trees hold, is stored as a point, which
  * nothing hits.
  */
-#include "bvh/hit.cl"
+#include "bvh/ray.cl"
 
 #include "generated/tree_reaches.cl"
 

@@ -1,6 +1,6 @@
 /* Items from triangles and boxes, and traversals' records from items; bvh/leaves.cl has the records. */
-#include "bvh/no_vectorize.cl"
-#include "bvh/items.cl"
+#include "bvh/hints.cl"
+#include "bvh/node.cl"
 #include "bvh/leaves.cl"
 
 /* A work-item handles `run` neighbours and writes their bounds to `extents`. */

@@ -9,8 +9,8 @@
  * pair's other half changes its node: no memory becomes free. The count of an inner node is the number of levels
  * below it, until bvh/collapse.cl replaces it.
  */
-#include "bvh/items.cl"
-#include "bvh/no_vectorize.cl"
+#include "bvh/node.cl"
+#include "bvh/hints.cl"
 #include "bvh/node.cl"
 
 #define REINSERT_STACK (2 * BVH_DEPTH + 2)

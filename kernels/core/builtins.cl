@@ -1,5 +1,5 @@
 /* The built-in functions of OpenCL C that clpt's texts call, in place of a compiler's header of 18,000
- * lines: see clpt/device/declarations.py. Source: The OpenCL C Specification 1.2, 6.12.
+ * lines: see clpt/device/building.py. Source: The OpenCL C Specification 1.2, 6.12.
  * Types and constants come from the compiler. */
 #define PURE __attribute__((overloadable, const))
 #define CALLED __attribute__((overloadable))

@@ -102,6 +102,13 @@ inline real atan2_r(real y, real x)
     return sel(y < 0.0f, -r, r);
 }
 
+/* The azimuth of (x, y) over 2 pi, in [0, 1). */
+inline real turn_of(real y, real x)
+{
+    real turn = atan2_r(y, x) * INV_2PI;
+    return turn + sel(turn < 0.0f, (real)(1.0f), (real)(0.0f));
+}
+
 /* The error function, |error| < 7e-7 (Abramowitz and Stegun 7.1.26). */
 inline real erf_r(real x)
 {
@@ -121,6 +128,18 @@ inline real erfinv_r(real x)
     real q = 2.83297682f + b * (1.00167406f + b * (0.00943887047f + b * (-0.0076224613f + b * (0.00573950773f
              + b * (-0.00367342844f + b * (0.00134934322f + b * (0.000100950558f - b * 0.000200214257f)))))));
     return x * sel(w < 5.0f, p, q);
+}
+
+/* exp(-x) I0(x), the modified Bessel function of order 0, for x >= 0; relative error below 3e-7
+ * (Abramowitz and Stegun 9.8.1 and 9.8.2). */
+inline real bessel_i0_scaled(real x)
+{
+    real t = x * (1.0f / 3.75f), q = t * t, s = 1.0f / max_r(t, (real)(1.0f));
+    real low = 1.0f + q * (3.5156229f + q * (3.0899424f + q * (1.2067492f +
+                      q * (0.2659732f + q * (0.0360768f + q * 0.0045813f)))));
+    real high = 0.39894228f + s * (0.01328592f + s * (0.00225319f + s * (-0.00157565f + s * (0.00916281f
+              + s * (-0.02057706f + s * (0.02635537f + s * (-0.01647633f + s * 0.00392377f)))))));
+    return sel(t < 1.0f, low * exp_r(-x), high / sqrt(max_r(x, (real)(1.0f))));
 }
 
 /* a / b for a from 0 to 2^28, b > 0 and a quotient up to 2^20; an integer division would run lane by lane. The quotient

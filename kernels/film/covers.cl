@@ -1,6 +1,6 @@
 /* How much a sample covers of what is behind the picture: 1, less the share of light that comes through from there, as
  * a mean over the wavelengths. Black smoke covers too. */
-#include "lights/sky_dimmed.cl"
+#include "lights/sky.cl#dimmed"
 
 /* start: the throughput with which the path began, which a lens weighs. */
 inline real path_covers(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas, Spectrum start)

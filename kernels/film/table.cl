@@ -1,4 +1,4 @@
-/* A table of colours over a cube of linear Rec. 709, as clpt/images/colour/view.py bakes it: red changes first.
+/* A table of colours over a cube of linear Rec. 709, as clpt/images/colour.py bakes it: red changes first.
  * Each axis is asinh(v / NEAR) from LOWEST to HIGHEST; between points the tetrahedron that holds a colour
  * decides (Kasson et al. 1993, "Tetrahedral interpolation technique for color space conversion"). */
 

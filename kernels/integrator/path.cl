@@ -2,7 +2,7 @@
  * Light is found both by meeting it and by choosing it; the two are weighted by the power heuristic (Veach 1997,
  * 9.2.4), and against paths from lights where there are some (transport/mis_ratio.cl). Steps that a scene or a material
  * does not have do nothing. */
-#include "lights/met_light.cl"
+#include "lights/light.cl#met"
 #include "generated/ghosts.cl"
 #include "generated/light_layers.cl"
 #include "generated/layers.cl"

@@ -1,19 +1,20 @@
-/* Choosing a light in proportion to what it may send to a point, by a tree over all lights (Conty Estevez
- * and Kulla 2018). Behind the rows in `lights` lie a word for every row, two bits of which say at each level which node
- * of a group leads to it, and then the groups: see clpt/render/lights/tree.py. */
+/* Sampling a light in proportion to an estimate of its light at a point, by a tree over all lights (Conty Estevez and
+ * Kulla 2018). Behind the rows in `lights` lies a word for every row: two bits for each level, the node of a group that
+ * leads to the row. The groups follow: see clpt/render/lights/tree.py. */
 #define LIGHT_TREE_SLACK 1e-3f /* of a cosine, so that rounding hides no light */
-#define LIGHT_TREE_DARK 1e-5f  /* of a cosine: rounding, behind what is flat */
-/* For lights of a node are not where its centre is: the share of the square of its radius that adds to that of the
- * distance; by how much of the square of its sine as seen from p that of the cosine at the lights grows; and the share
- * of the cosine at p of what rises above its horizon. All were measured, see bench/notes/lights.md. */
+#define LIGHT_TREE_DARK 1e-5f  /* of a cosine: rounding, behind flat lights */
+/* Corrections for the extent of a node: the share of its squared radius that is added to the squared distance; the
+ * share of its squared sine, as seen from p, that is added to the squared cosine at the lights; and the least cosine at
+ * p over that of the highest point of the node. All were measured, see bench/notes/lights.md. */
 #define LIGHT_TREE_NEAR 0.33f
 #define LIGHT_TREE_AROUND 0.1f
 #define LIGHT_TREE_RISING 0.25f
-/* The least importance of lights at places over that of those that shine on the whole scene, and the other way round,
- * where both may send light: what is in the way is not known. */
+/* The least importance of local lights over that of lights on the whole scene, and vice versa, if both may send light:
+ * occlusion is unknown. */
 #define LIGHT_TREE_LEAST 0.05f
 
-/* In which lanes lights of a node may shine on p by their cones, `from` their centre; among them all may. */
+/* The lanes where p may lie in a cone of a node's lights. from: from the node's centre to p. Inside the node every
+ * point may. */
 inline mask light_tree_in_cone(LightNode n, vec3 from)
 {
     real d2 = dot3(from, from), inverse = 1.0f / sqrt(max_r(d2, (real)(1e-20f)));
@@ -23,10 +24,10 @@ inline mask light_tree_in_cone(LightNode n, vec3 from)
     return within | (n.radius * inverse >= 1.0f);
 }
 
-/* What the lights below a node may send to p, all surfaces there shading them: their power, times the mean of their
- * cosines (tree_nodes.py), over the squared distance; and times what p reflects, which of a dull surface is the cosine
- * there if light from one hemisphere only matters. No light is lost: 0 means that there is none. lift: 1 where light
- * from both sides matters, else 0. Lights that shine on the whole scene count as much everywhere. */
+/* Estimate of the light of a node at p: power, times the mean cosine at the lights (tree_nodes.py), over the squared
+ * distance, times the reflectance at p, which is the cosine for a diffuse surface if only a single hemisphere matters.
+ * It is 0 only where no light arrives. lift: 1 where light from both sides matters, else 0. Lights on the whole scene
+ * have the same importance everywhere. */
 inline real light_tree_importance(LightNode n, vec3 p, Receiver receiver, real lift)
 {
     vec3 from = sub3(p, n.center);
@@ -47,7 +48,7 @@ inline real light_tree_importance(LightNode n, vec3 p, Receiver receiver, real l
     return sel(n.radius < 0.0f, n.power, importance);
 }
 
-/* The importance of the nodes of a group, and where each leads; their sum. */
+/* The importance and the child of each node of a group; returns the sum of the importance. */
 inline real light_tree_group(Scene scene, integer group, vec3 p, Receiver receiver, real value[LIGHT_TREE_WIDTH],
                              integer child[LIGHT_TREE_WIDTH])
 {
@@ -55,7 +56,7 @@ inline real light_tree_group(Scene scene, integer group, vec3 p, Receiver receiv
     global const uint *nodes = scene.lights + (words + LIGHT_TREE_LINE - 1) / LIGHT_TREE_LINE * LIGHT_TREE_LINE;
     integer at = group * (LIGHT_TREE_WIDTH * LIGHT_NODE_WORDS);
     real lift = sel(hemisphere_given(receiver.hemisphere), (real)(0.0f), (real)(1.0f)), sum = 0.0f;
-    mask placed = mask_of(0), everywhere = mask_of(0); /* of the root's group: the first node and the middle one */
+    mask placed = mask_of(0), everywhere = mask_of(0); /* of the root's group: the first and the middle node */
     for (int i = 0; i < LIGHT_TREE_WIDTH; i++) {
         LightNode n = light_node_row(nodes + i * LIGHT_NODE_WORDS, at);
         value[i] = light_tree_importance(n, p, receiver, lift);
@@ -71,8 +72,8 @@ inline real light_tree_group(Scene scene, integer group, vec3 p, Receiver receiv
     return sum;
 }
 
-/* A row, and its chance at p, for a surface that does with light what `receiver` says: 0 where no light reaches p. What
- * is left of *u is uniform in [0, 1) again. other: see light_bits. */
+/* Samples a row, with its probability at p for a surface with `receiver`: 0 where no light reaches p. *u is rescaled to
+ * a new random number. other: see light_bits. */
 inline integer light_tree_pick(Scene scene, vec3 p, Receiver receiver, real *u, real other, real *pmf)
 {
     integer at = 0, child[LIGHT_TREE_WIDTH];
@@ -80,7 +81,7 @@ inline integer light_tree_pick(Scene scene, vec3 p, Receiver receiver, real *u, 
     mask open = at >= 0;
     *pmf = 1.0f;
 #if !FEW_LIGHTS
-    real grain = UNIT_GRAIN; /* of *u: grows as its bits are spent */
+    real grain = UNIT_GRAIN; /* of *u: grows as its bits are used up */
 #endif
     while (any(open)) {
         real sum = light_tree_group(scene, max_i(at, (integer)(0)), p, receiver, value, child);
@@ -111,7 +112,7 @@ inline integer light_tree_pick(Scene scene, vec3 p, Receiver receiver, real *u, 
     return -1 - at;
 }
 
-/* The chance of a row at p. */
+/* The probability of a row at p. */
 inline real light_tree_pmf(Scene scene, integer row, vec3 p, Receiver receiver)
 {
     int trails = scene.settings->light_count * LIGHT_ROW_WORDS;
@@ -134,3 +135,6 @@ inline real light_tree_pmf(Scene scene, integer row, vec3 p, Receiver receiver)
     }
     return pmf;
 }
+
+#define light_choose light_tree_pick
+#define light_pmf(scene, row, l, p, receiver) light_tree_pmf(scene, row, p, receiver)

@@ -1,12 +1,12 @@
-/* Light from all around, which paths find that have left the scene. */
-#include "lights/met_light.cl"
+/* Light of infinite lights for paths that have left the scene. */
+#include "lights/light.cl#met"
 #include "generated/light_layers.cl"
-#include "lights/sky_dimmed.cl"
+#include "lights/sky.cl#dimmed"
 
 typedef struct {
     mask seen;
-    vec3 from, d; /* where d was chosen */
-    Receiver receiver; /* by what of it */
+    vec3 from, d; /* the origin where d was sampled */
+    Receiver receiver; /* the receiver there */
     real pdf, mis_ratio;
 } SkyView;
 
@@ -16,14 +16,14 @@ inline SkyView sky_view(Scene scene, Slab path, uint at, PathEnd end)
     v.seen = end.missed & ((end.depth > 0) | mask_of(scene.settings->hide_lights + scene.settings->alpha == 0));
     v.seen = v.seen & !left_to_flare(end.state, end.depth);
     v.pdf = load_path_pdf(path, at);
-    v.d = sel3(v.seen, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f)); /* a slot without a pixel has none */
+    v.d = sel3(v.seen, load_path_d(path, at), v3(0.0f, 0.0f, 1.0f)); /* a slot without a pixel has no direction */
     v.from = madd3(v.d, -load_path_null_distance(path, at), load_path_o(path, at));
     v.receiver = path_receiver(path, at);
     v.mis_ratio = path_mis_ratio(path, at, end.depth);
     return v;
 }
 
-/* `radiance` of paths, with what those that left the scene find there. */
+/* `radiance` of paths, plus the light of infinite lights for paths that left the scene. */
 inline Spectrum sky_gather(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas, Spectrum radiance)
 {
     SkyView v = sky_view(scene, path, at, end);
@@ -36,12 +36,45 @@ inline Spectrum sky_gather(Scene scene, Slab path, uint at, PathEnd end, Wavelen
     return radiance;
 }
 
-/* To begin paths takes longer, as light is gathered there: lanes wait for others. */
+/* Beginning paths takes longer, as they gather light: lanes wait for others. */
 inline int sky_due(PathEnd end) { return path_end_of_half(end); }
 
-/* Twin, in a scene without light from all around. */
+/* Twin, in a scene without infinite lights. */
 inline Spectrum sky_gather(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas, Spectrum radiance)
 {
     return radiance;
 }
 inline int sky_due(PathEnd end) { return any(end.ended); }
+
+/* Step dimmed: the transmittance of the medium around the scene for infinite lights. */
+
+/* `light` of infinity at the origin of the paths' last rays. */
+inline Spectrum sky_dimmed(Scene scene, Slab path, uint at, mask seen, Wavelengths lambdas, Spectrum light)
+{
+#if USES_ABSORPTION
+    integer medium = sel_i(seen, medium_left(load_path_medium(path, at)), (integer)(0));
+    light = spectrum_mul(light, medium_transmittance(scene, medium, (real)(FAR), lambdas));
+#endif
+    return light;
+}
+
+/* Step layers: adds the light of each infinite light to its light layer, for paths that left the scene. */
+#include "generated/light_layer_args.cl"
+
+inline void sky_layers(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas LIGHT_LAYER_ARGS)
+{
+    SkyView v = sky_view(scene, path, at, end);
+    if (!any(v.seen)) return;
+    Spectrum beta = sky_dimmed(scene, path, at, v.seen, lambdas, load_path_beta(path, at));
+    for (int row = 0; row < scene.settings->infinite_count; row++) {
+        real w;
+        Spectrum radiance = infinite_met(scene, row, v.from, v.receiver, v.d, v.pdf, v.mis_ratio, lambdas, &w);
+        Spectrum light = spectrum_mul(beta, spectrum_scale(radiance, w));
+        light_layers_add(scene, path, at, v.seen, end.depth, (integer)(row), light LIGHT_LAYER_PASSED);
+    }
+}
+
+/* Twin, where the film has no light layers or the scene no infinite lights. */
+#include "generated/light_layer_args.cl"
+
+inline void sky_layers(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas LIGHT_LAYER_ARGS) {}

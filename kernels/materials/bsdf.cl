@@ -29,7 +29,7 @@ typedef struct {
     real p, p_back;  /* those of BsdfPair, of wo and wi: spectra/hero.cl sets them */
 } BsdfSample;
 
-/* What a material has for a pair of directions, see materials/pair.cl. */
+/* The values of a material for a pair of directions. */
 typedef struct {
     Spectrum f;      /* f |cos| */
     real pdf;        /* of wi, as hero_pdf has it */
@@ -42,6 +42,22 @@ typedef struct {
     BsdfSample sample;
 } BsdfAnswer;
 
+/* Of two lobes with albedos a and b: the factor 1 / max(1, a + b), per wavelength. */
+inline Spectrum two_lobes_scale(Spectrum a, Spectrum b)
+{
+    Spectrum r;
+#define C(c) r.c = 1.0f / max_r(a.c + b.c, (real)(1.0f));
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+/* The probability of sampling the second of them. */
+inline real two_lobes_probability(Spectrum a, Spectrum b)
+{
+    real first = spectrum_mean(a), second = spectrum_mean(b);
+    return sel(second + first > 0.0f, second / max_r(second + first, (real)(1e-20f)), (real)(0.5f));
+}
+
 inline BsdfSample bsdf_nothing(void)
 {
     BsdfSample s;
@@ -52,3 +68,67 @@ inline BsdfSample bsdf_nothing(void)
     s.lobe = LOBE_REFLECT;
     return s;
 }
+
+/* Step pair: what a vertex asks of its material for a pair of directions. */
+inline BsdfPair bsdf_pair(Bsdf m, vec3 wo, vec3 wi, Spectrum ratio)
+{
+    BsdfPair pair;
+    pair.f = bsdf_eval(m, wo, wi);
+    pair.pdf = hero_pdf(m, wo, wi, ratio);
+    pair.p = mis_pdf(m, wo, wi);
+    pair.p_back = mis_pdf(m, wi, wo);
+    return pair;
+}
+
+/* Sets the densities for MIS weights against paths from the other end. */
+inline void pair_of_sample(Bsdf m, vec3 wo, BsdfSample *s)
+{
+    s->p = mis_pdf(m, wo, s->wi);
+    s->p_back = mis_pdf(m, s->wi, wo);
+}
+
+/* Before a vertex takes the pair of wo and `wi`, or of wi and wo where light is carried (`adjoint`), and a sample. */
+#define bsdf_ask(scene, scatter, wi, adjoint)
+
+/* Step pair_apart: in place of `pair`, where a material's functions are a part of their own, see `apart`. */
+#define bsdf_pair(m, wo, wi, ratio) ((m).answer.pair)
+#define bsdf_sample(m, wo, u) ((m).answer.sample)
+#define pair_of_sample(m, wo, s)
+#define bsdf_ask(scene, scatter, wi, adjoint) (scatter).bsdf.answer = apart_asked(scene, scatter, wi, adjoint)
+
+inline BsdfAnswer apart_asked(Scene scene, Scattering scatter, vec3 wi, uint adjoint)
+{
+    vec2 uv = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_BSDF);
+    vec3 u = v3(uv.x, uv.y, scatter.choice.y);
+    Bsdf m = scatter.bsdf;
+    return apart_answer(scene, m.row, m.point, m.lambdas, scatter.wo, wi, u, adjoint);
+}
+
+/* Step apart: a material whose functions are a part of their own in the loop of a CPU, as several kinds share a vertex.
+ * It is of the kind `scene.kind` in all LANES paths. A vertex asks it once (`bsdf_ask`), so that its parameters are
+ * loaded once, and what a pair of directions and a sample have in common is computed once. */
+typedef struct {
+    integer row;
+    TexturePoint point;
+    Wavelengths lambdas;
+    BsdfAnswer answer;
+} Bsdf;
+
+inline Bsdf bsdf_load(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)
+{
+    Bsdf m;
+    m.row = row;
+    m.point = point;
+    m.lambdas = lambdas;
+    return m;
+}
+#define bsdf_albedo_in(scene, m) apart_albedo(scene, (m).row, (m).point, (m).lambdas)
+
+/* Step mis_pdf: the density of a direction, averaged over the hero wavelengths: equal for camera and light paths. */
+inline real mis_pdf(Bsdf m, vec3 wo, vec3 wi) { return spectrum_mean(bsdf_pdfs(m, wo, wi)); }
+
+/* Twin, where all wavelengths have the same density. */
+inline real mis_pdf(Bsdf m, vec3 wo, vec3 wi) { return bsdf_pdf(m, wo, wi); }
+
+/* Step no_mis_pdf: in place of `mis_pdf`, without light paths. */
+#define mis_pdf(m, wo, wi) ((real)(0.0f))

@@ -54,8 +54,8 @@ inline real lamellar_share(int n, real waves, real fill)
     return n == 0 ? 1.0f - fill * (1.0f - fill) * contrast : contrast * sqr(fill * sinc_r((float)n * fill));
 }
 
-/* The wavelengths at which a dispersive event is evaluated. `share`: the weights of the components where all keep the
- * direction; `alone`: where the direction is the hero's. */
+/* The wavelengths of a dispersive event. `share`: the weights of the components where all keep the direction; `alone`:
+ * where the direction is the hero's. */
 typedef struct {
     Spectrum lambdas, share, alone;
     real pdf;

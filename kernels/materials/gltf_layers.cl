@@ -3,7 +3,7 @@
  * roughness is what files give, its square alpha. The albedos are fitted to quadrature. */
 #include "materials/fresnel.cl"
 #include "materials/microfacet.cl"
-#include "materials/refracting_facet.cl"
+#include "materials/microfacet.cl#refracting"
 
 /* Directional albedo of GGX facets with separable Smith masking, in parts: what a facet's reflectance
  * f0 + (f90 - f0) (1 - cos)^5 adds up to is f0 a + f90 b. */

@@ -1,7 +1,7 @@
 /* The shading frame of a surface, perturbed by a normal map (Cohen et al. 1998) or a bump map (Blinn 1978) of its
  * material. NORMAL_MAP_WORDS words before a material's row describe them: flags, the scale of the normal map, the
  * scale of the bump map, then reals of two words each: x, y and z of the normal, 0 to 1,
- * and the height; then `to_uv` of shapes/map_frame.cl, four words each, of the normal map, of a coat's normals and
+ * and the height; then `to_uv` of shapes/surface_point.cl, four words each, of the normal map, of a coat's normals and
  * of directions of anisotropy. normal_map_real is generated.
  *
  * A normal that faces away from the viewer is turned about the normal of the surface (Schuessler et al. 2017).
@@ -125,3 +125,42 @@ inline MapFrame shading_map_frame(Scene scene, integer row, Surface s, Frame bas
 }
 inline mask shading_frame_turns(Scene scene, integer row) { return mask_of(0); }
 inline real shading_frame_share(ShadingFrame f, vec3 w) { return 1.0f; }
+
+/* Step anisotropy: a material that is rougher along a direction, which is told beside u and v of a map. */
+/* The material, whose direction is counted in the frame where it is shaded, from the first axis to the second. The
+ * material tells it on the surface itself, from u to v, which is the other way round where uv are mirrored, and on a
+ * back. */
+inline Bsdf anisotropy_turned(Scene scene, integer row, Bsdf m, Surface s, Frame shaded)
+{
+    Frame base = surface_frame(s);
+    MapFrame own = shading_map_frame(scene, row, s, base, 2);
+    real sine, cosine, turns = m.anisotropy_rotation * (1.0f / 360.0f);
+    sincos_2pi(turns - floor(turns), &sine, &cosine);
+    vec3 along = to_world(base, map_frame_vector(own, v3(cosine, sine, (real)(0.0f))));
+    m.anisotropy_rotation = 360.0f * INV_2PI * atan2_r(dot3(along, shaded.t), dot3(along, shaded.s));
+    return m;
+}
+
+/* Twin, where a material is equally rough in all directions, or knows no turn. */
+inline Bsdf anisotropy_turned(Scene scene, integer row, Bsdf m, Surface s, Frame shaded) { return m; }
+
+/* Step coat_normal: a coat whose normal is told by a map of its own. */
+/* The material, whose coat's normal is told by u and v of its map and the surface's normal, in the frame where it is
+ * shaded. */
+inline Bsdf coat_normal_turned(Scene scene, integer row, Bsdf m, Surface s, Frame shaded)
+{
+    Frame base = surface_frame(s);
+    real scale = m.clearcoat_normal_scale, x = (2.0f * m.clearcoat_normal_x - 1.0f) * scale;
+    real y = (2.0f * m.clearcoat_normal_y - 1.0f) * scale;
+    MapFrame own = shading_map_frame(scene, row, s, base, 1);
+    vec3 n = map_frame_vector(own, v3(x, y, 2.0f * m.clearcoat_normal_z - 1.0f));
+    n = to_frame(shaded, to_world(base, normalize3(n)));
+    m.clearcoat_normal_x = 0.5f * n.x + 0.5f;
+    m.clearcoat_normal_y = 0.5f * n.y + 0.5f;
+    m.clearcoat_normal_z = 0.5f * n.z + 0.5f;
+    m.clearcoat_normal_scale = 1.0f;
+    return m;
+}
+
+/* Twin, where a material has no coat with a normal of its own. */
+inline Bsdf coat_normal_turned(Scene scene, integer row, Bsdf m, Surface s, Frame shaded) { return m; }

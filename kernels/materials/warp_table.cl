@@ -28,8 +28,8 @@ inline integer warp_count(global const float *values, integer first, int i)
 }
 
 /* The index of the last number up to x among the n - 1 ascending numbers from `first` + `cells`, and the position of
- * x before the next, [0, 1]. Before them lies, for equal cells between the first and the last, the number at which a
- * cell begins; a cell holds a single number at most. Without a loop compilers see that functions of a pair of
+ * x before the next, [0, 1]. Before them lie the first numbers of equal cells between the first and the last number; a
+ * cell holds a single number at most. Without a loop compilers see that functions of a pair of
  * directions share this. */
 inline integer warp_node(global const float *values, integer first, integer cells, integer n, real x, real *along)
 {

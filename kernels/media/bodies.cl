@@ -3,7 +3,7 @@
  * priority. The bodies around a point are the four bytes of a word, in any order, 0 for an empty byte; a fifth body
  * is lost. `media` holds two words for each shape, the number of its body first. Behind them follow two words for
  * each number: the name of the medium, and where the index stands in `materials`, 0 without an index. For number 0
- * the first word is the material word of a null surface. media/light_media.cl says what stands before. */
+ * the first word is the material word of a null surface. media/medium.cl says what stands before. */
 
 /* The bodies where a shadow ray begins, at the camera and at a light. */
 inline integer camera_through(Scene scene) { return (integer)(scene.settings->camera_bodies); }
@@ -65,3 +65,71 @@ inline integer bodies_beyond(BodyBoundary b, mask inward)
 /* Twin, where bodies do not overlap: a shadow ray begins with the name of its medium. */
 inline integer camera_through(Scene scene) { return (integer)(scene.settings->camera_medium); }
 inline integer light_through(Scene scene, integer row) { return light_medium(scene, row); }
+
+/* Step between: the exterior index of a dielectric among overlapping bodies: the index of the body of highest priority
+ * there. */
+inline void bsdf_between_bodies(Scene scene, mask active, Vertex v, Bsdf *m)
+{
+    integer index = body_word(scene, v.media.bodies.next, 1);
+    mask known = active & (v.media.bodies.next != 0) & (index != 0);
+    if (any(known)) {
+        Spectrum outside = body_index(scene, sel_i(known, index, (integer)(0)), texture_point_nowhere(), v.lambdas);
+        m->ext_ior = spectrum_sel(known, outside, m->ext_ior);
+    }
+}
+
+/* Twin, where a material keeps its own exterior index. */
+inline void bsdf_between_bodies(Scene scene, mask active, Vertex v, Bsdf *m) {}
+
+/* Step vertex: the media around a vertex of a path among overlapping bodies. */
+typedef struct {
+    integer medium;      /* incident: the ray travelled in it */
+    integer inside;      /* interior: behind the surface */
+    integer outside;     /* exterior: before the surface */
+    BodyBoundary bodies;
+} VertexMedia;
+
+inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask active, integer row, mask front)
+{
+    VertexMedia m;
+    integer bodies = sel_i(active, load_path_bodies(path, at), (integer)(0));
+    integer shape_row = BSDF_IS_PHASE ? (integer)(0) : sel_i(active, load_hit_shape(hit, at), (integer)(0));
+    m.bodies = body_boundary(scene, shape_row, bodies, front);
+    if (BSDF_IS_PHASE) {
+        m.bodies.body = 0;
+        m.bodies.others = bodies;
+    }
+    m.inside = body_medium(scene, bodies_top(bodies_beyond(m.bodies, mask_of(1))));
+    m.outside = body_medium(scene, bodies_top(m.bodies.others));
+    m.medium = sel_i(active, load_path_medium(path, at), (integer)(0));
+    return m;
+}
+
+/* Step shadow: boundaries along a shadow ray among bodies: the word of bodies tells its medium. */
+inline integer shadow_medium(Scene scene, integer bodies, mask active, integer medium)
+{
+    return body_medium(scene, bodies_top(sel_i(active, bodies, (integer)(0))));
+}
+
+/* The transmittance of a surface: 1 where a body of higher priority hides it. *bodies become the bodies beyond. */
+inline Passage shadow_passage(Scene scene, integer row, integer *bodies, mask front, int surfaces, Passage own)
+{
+    BodyBoundary boundary = body_boundary(scene, row, *bodies, front);
+    *bodies = bodies_beyond(boundary, front);
+    return passage_sel(boundary.hidden & mask_of(surfaces < MOST_NULL_SURFACES), passage_of(1.0f), own);
+}
+
+#define shadow_medium_beyond(scene, row, bodies, active, front, medium) shadow_medium(scene, bodies, active, medium)
+
+/* Twin, where bodies do not overlap: the interiors and exteriors of shapes tell its medium. */
+inline integer shadow_medium(Scene scene, integer bodies, mask active, integer medium) { return medium; }
+inline Passage shadow_passage(Scene scene, integer row, integer *bodies, mask front, int surfaces, Passage own)
+{
+    return own;
+}
+
+inline integer shadow_medium_beyond(Scene scene, integer row, integer bodies, mask active, mask front, integer medium)
+{
+    ShapeMedia sides = shape_media(scene, row);
+    return sel_i(active, medium_beyond(medium, sides.inside, sides.outside, front, front), medium);
+}

@@ -4,6 +4,8 @@
  * Where some grids emit, a flight gathers emission at a random point of each segment between collisions and brick
  * boundaries: the point is uniform, and weighed by the transmittance to it. Next-event estimation samples the same
  * light (lights/kinds/emissive_brick.cl); MIS combines both. */
+
+/* Step. */
 /* The end of a flight, and its weight; `ratio` as in spectra/hero.cl. */
 typedef struct {
     mask collides, endless; /* endless: after MOST_NULL_COLLISIONS its weight is 0 */
@@ -69,3 +71,191 @@ inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 
     f.weight = spectrum_sel(f.endless, spectrum_of(0.0f), f.weight);
     return f;
 }
+
+/* Step weigh: weights of flights through grids over all wavelengths of a path. */
+
+/* Transmittance of a thickness [majorant density times m] at each wavelength, over the largest of them. */
+inline Spectrum grid_passes(Medium m, real thickness)
+{
+    real least = m.sigma_t.x;
+#define C(c) least = min_r(least, m.sigma_t.c);
+    SPECTRUM_EACH(C)
+#undef C
+    return spectrum_exp(spectrum_scale(spectrum_sub(m.sigma_t, spectrum_of(least)), -thickness));
+}
+
+/* Updates weight and ratio after a thickness since the last collision. value: the factor of the throughput; pdf: of the
+ * event; both at each wavelength, without the transmittance, whose common factor cancels. */
+inline void grid_weigh(Medium m, real thickness, Spectrum value, Spectrum pdf, mask active, GridFlight *f)
+{
+    Spectrum passes = grid_passes(m, thickness);
+    Spectrum pdfs = spectrum_mul(f->ratio, spectrum_mul(pdf, passes));
+    real mean = spectrum_mean(pdfs), inverse = sel(mean > 1e-30f, 1.0f / mean, (real)(0.0f));
+    Spectrum weight = spectrum_scale(spectrum_mul(value, passes), inverse);
+    f->ratio = spectrum_sel(active, spectrum_scale(pdfs, inverse), f->ratio);
+    f->weight = spectrum_sel(active, spectrum_mul(f->weight, weight), f->weight);
+}
+
+/* The random number that chooses a wavelength. */
+inline real grid_hero(natural bits) { return unit_interval(hash_natural(bits ^ 0x51ed270bu)); }
+
+/* Updates flights that reach the end of the ray. */
+inline void grid_weigh_end(Medium m, real thickness, mask active, GridFlight *f)
+{
+    grid_weigh(m, thickness, spectrum_of(1.0f), spectrum_of(1.0f), active, f);
+}
+
+/* Twin, where extinction is the same at all wavelengths. */
+inline void grid_weigh(Medium m, real thickness, Spectrum value, Spectrum pdf, mask active, GridFlight *f)
+{
+    Spectrum weight = spectrum_scale(value, 1.0f / max_r(pdf.x, (real)(1e-30f)));
+    f->weight = spectrum_sel(active, spectrum_mul(f->weight, weight), f->weight);
+}
+inline real grid_hero(natural bits) { return (real)(0.0f); }
+inline void grid_weigh_end(Medium m, real thickness, mask active, GridFlight *f) {}
+
+/* Step gather: emission that flights gather in grids. */
+#include "generated/brick_weight.cl"
+
+/* Adds the emission of a brick from w.t to `to`; passed: see grid_flight. */
+inline void grid_gather(Scene scene, integer name, Medium m, GridWalk w, GridBrick b, real to, real passed, mask dims,
+                        natural bits, mask active, GridFlight *f, Wavelengths lambdas, GridOrigin origin)
+{
+    integer row = grid_light_row(scene, name, w, active);
+    active = active & (row != 0) & (to > w.t);
+    if (!any(active)) return;
+    real way = to - w.t, part = unit_interval(hash_natural(bits ^ 0x3c6ef372u)) * way;
+    w.t = sel(active, w.t + part, w.t);
+    Spectrum light = grid_emission(scene, name, m, w, b, active, hash_natural(bits ^ 0xdaa66d2bu), lambdas);
+    GridFlight here = *f;
+    grid_weigh(m, passed + sel(dims, (real)(0.0f), b.most * part), spectrum_of(1.0f), spectrum_of(1.0f), active, &here);
+    real w_met = brick_weight(scene, row, active, origin, w.t);
+    light = spectrum_scale(spectrum_mul(here.weight, light), way * w_met);
+    f->light = spectrum_sel(active, spectrum_add(f->light, light), f->light);
+}
+
+/* Twin, where no grid emits. */
+inline void grid_gather(Scene scene, integer name, Medium m, GridWalk w, GridBrick b, real to, real passed, mask dims,
+                        natural bits, mask active, GridFlight *f, Wavelengths lambdas, GridOrigin origin) {}
+
+/* Step collision: collisions in grids whose colours differ from point to point, and that are no mixtures. Real and
+ * null collisions are weighed over a path's wavelengths, as distances are: the choice by the hero wavelength alone
+ * leaves noise of colour. */
+
+/* A collision where the density is `density`: *more decides whether it is real or a null collision. The weight of the
+ * flight follows. own: the medium there; passed: see grid_flight. Returns the lanes with a real collision. */
+inline mask grid_collide(Scene scene, integer name, Medium m, Medium own, GridWalk w, real density, real passed,
+                         real most, mask dims, mask meets, natural *more, Wavelengths lambdas, GridFlight *f)
+{
+    Spectrum scatters = spectrum_scale(own.sigma_s, density);
+    Spectrum lacks = spectrum_sub(m.sigma_t, spectrum_scale(own.sigma_t, density));
+    Spectrum share = spectrum_div(m.sigma_t, spectrum_add(spectrum_add(scatters, lacks), spectrum_of(1e-30f)));
+    Spectrum met = spectrum_mul(f->ratio, grid_passes(m, passed)); /* density at each wavelength */
+    real all = spectrum_mean(spectrum_mul(met, m.sigma_t));
+    real chance = spectrum_mean(spectrum_mul(met, spectrum_mul(share, scatters))) / max_r(all, (real)(1e-30f));
+    *more = hash_natural(*more ^ 0x2f6e2b1u);
+    mask real_one = meets & (unit_interval(*more) < chance);
+    Spectrum value = spectrum_sel(real_one, scatters, lacks);
+    Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(own.sigma_t, density / most));
+    Spectrum pdf = spectrum_sel(dims, spectrum_of(1.0f), spectrum_mul(share, value));
+    grid_weigh(m, passed, spectrum_sel(dims, kept, value), pdf, meets, f);
+    return real_one;
+}
+
+/* Twin, where colours do not differ between points. */
+inline mask grid_collide(Scene scene, integer name, Medium m, Medium own, GridWalk w, real density, real passed,
+                         real most, mask dims, mask meets, natural *more, Wavelengths lambdas, GridFlight *f)
+{
+    Spectrum scatters = spectrum_scale(own.sigma_s, density);
+    Spectrum lacks = GRIDS_VARY ? spectrum_sub(m.sigma_t, spectrum_scale(own.sigma_t, density))
+                                : spectrum_scale(m.sigma_t, 1.0f - density);
+    real chance = spectrum_mean(spectrum_mul(f->ratio, spectrum_div(scatters,
+        spectrum_add(spectrum_add(scatters, lacks), spectrum_of(1e-30f)))));
+    *more = hash_natural(*more ^ 0x2f6e2b1u);
+    mask real_one = meets & (unit_interval(*more) < chance);
+    chance = 1.0f / max_r(sel(real_one, chance, 1.0f - chance), (real)(1e-30f));
+    Spectrum value = spectrum_scale(spectrum_sel(real_one, scatters, lacks), chance);
+    Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(own.sigma_t, density / most));
+    value = spectrum_sel(dims, kept, value);
+    grid_weigh(m, passed, value, spectrum_sel(dims, spectrum_of(1.0f), m.sigma_t), meets, f);
+    return real_one;
+}
+
+/* Step collision_mixed: collisions in mixtures. */
+
+/* The part of a mixture that light collides with at the point that `bits` choose: its phase function, and its
+ * scattering where the density of the bricks is 1. The probability of a part is its share of the scattering at the hero
+ * wavelength, which `ratio` and `hero` choose. Other media are returned unchanged. */
+inline Medium grid_part_met(Scene scene, integer name, Medium m, GridWalk w, natural bits, Spectrum ratio, real hero,
+                            mask active, Wavelengths lambdas)
+{
+    integer shares = grid_shares(scene, name, w, active, bits);
+    real sum = 0.0f, u = unit_interval(hash_natural(bits ^ 0x3c6ef372u));
+    for (int i = 0; any(shares != 0) && i < GRIDS_MIXED; i++) {
+        Medium part = grid_part(scene, name, i, shares, lambdas);
+        real own = spectrum_pick(part.sigma_s, ratio, hero);
+        sum += own;
+        real chance = own / max_r(sum, (real)(1e-30f)), rest = max_r(1.0f - chance, (real)(1e-30f));
+        mask taken = (shares != 0) & (u < chance);
+        /* u is rescaled to a new random number. */
+        u = sel(taken, u / max_r(chance, (real)(1e-30f)), (u - chance) / rest);
+        u = clamp_r(u, (real)(0.0f), (real)(0.99999994f));
+        m.sigma_s = spectrum_sel(taken, part.sigma_s, m.sigma_s);
+        m.phase = sel_i(taken, part.phase, m.phase);
+    }
+    return m;
+}
+
+/* A collision where the density is `density`: *more decides whether it is real or a null collision. The weight of the
+ * flight follows. own: the medium there; passed: see grid_flight. Returns the lanes with a real collision. */
+inline mask grid_collide(Scene scene, integer name, Medium m, Medium own, GridWalk w, real density, real passed,
+                         real most, mask dims, mask meets, natural *more, Wavelengths lambdas, GridFlight *f)
+{
+    Spectrum scatters = spectrum_scale(own.sigma_s, density);
+    Spectrum lacks = GRIDS_VARY ? spectrum_sub(m.sigma_t, spectrum_scale(own.sigma_t, density))
+                                : spectrum_scale(m.sigma_t, 1.0f - density);
+    /* The hero wavelength chooses the event; it is weighed over all wavelengths, as distances are. */
+    grid_weigh(m, passed, spectrum_of(1.0f), spectrum_sel(dims, spectrum_of(1.0f), m.sigma_t), meets, f);
+    Spectrum whole = spectrum_add(spectrum_add(scatters, lacks), spectrum_of(1e-30f));
+    real hero = unit_interval(hash_natural(*more ^ 0x1b873593u));
+    real chance = spectrum_pick(spectrum_div(scatters, whole), f->ratio, hero);
+    natural corner = *more;
+    *more = hash_natural(*more ^ 0x2f6e2b1u);
+    mask real_one = meets & (unit_interval(*more) < chance);
+    Medium part = grid_part_met(scene, name, own, w, corner, f->ratio, hero, real_one, lambdas);
+    f->phase = sel_i(real_one, part.phase, f->phase);
+    Spectrum value = spectrum_sel(real_one, spectrum_scale(part.sigma_s, density), lacks);
+    Spectrum kept = spectrum_sub(spectrum_of(1.0f), spectrum_scale(own.sigma_t, density / most));
+    Spectrum pdf = spectrum_sel(dims, spectrum_of(1.0f), spectrum_div(value, whole));
+    grid_weigh(m, (real)(0.0f), spectrum_sel(dims, kept, value), pdf, meets, f);
+    return real_one;
+}
+
+/* Step origin: the origin and density of a flight's direction, for the MIS weights of emission from grids. */
+inline void grid_origin_load(Slab path, uint at, FlightRay r, GridOrigin *origin)
+{
+    origin->pdf = load_path_pdf(path, at);
+    origin->before = load_path_null_distance(path, at) - r.ray_offset;
+    origin->from = madd3(r.d, -origin->before, r.o);
+    origin->receiver = path_receiver(path, at);
+}
+
+/* Twin, where no grid emits. */
+inline void grid_origin_load(Slab path, uint at, FlightRay r, GridOrigin *origin) {}
+
+/* Step brick_weight: the MIS weight of emission that a flight gathers in a brick at distance t, against next-event
+ * estimation; row: 1 + the brick's row of `lights`. */
+inline real brick_weight(Scene scene, integer row, mask active, GridOrigin origin, real t)
+{
+    mask sought = active & (row > 0) & (origin.pdf >= 0.0f);
+    real w_met = 1.0f;
+    if (any(sought)) {
+        integer one = sel_i(sought, row - 1, (integer)(0));
+        real pdf = brick_light_pdf(scene, one, origin.from, origin.receiver, origin.before + t);
+        w_met = sel(sought, mis_weight(origin.pdf, pdf), w_met);
+    }
+    return w_met;
+}
+
+/* Twin, where no brick is a light. */
+inline real brick_weight(Scene scene, integer row, mask active, GridOrigin origin, real t) { return (real)(1.0f); }

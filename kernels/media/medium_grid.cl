@@ -40,25 +40,35 @@ inline natural grid_key(Scene scene, natural pixel_key, integer sample, integer 
 
 #include "generated/grid_numbers.cl"
 
+/* The lattice of a medium, whose words begin at `at`, and the ray from o along d there. */
+inline void grid_enter(Scene scene, integer name, integer at, vec3 o, vec3 d, GridWalk *w)
+{
+    w->first = gather_i(scene.materials, at);
+    w->nx = max_i(gather_i(scene.materials, at + 1), (integer)(1));
+    w->ny = max_i(gather_i(scene.materials, at + 2), (integer)(1));
+    w->nz = gather_i(scene.materials, at + 3);
+    w->packed = grid_packed(name);
+#define AXIS(a, n)                                                            \
+    vec4 row_##a = row4(scene.materials, at + 4 + 4 * n);                     \
+    w->o.a = row_##a.x * o.x + row_##a.y * o.y + row_##a.z * o.z + row_##a.w; \
+    w->d.a = row_##a.x * d.x + row_##a.y * d.y + row_##a.z * d.z;             \
+    w->inverse.a = 1.0f / sel(fabs(w->d.a) > 1e-20f, w->d.a, (real)(1e-20f));
+    AXIS(x, 0)
+    AXIS(y, 1)
+    AXIS(z, 2)
+#undef AXIS
+}
+
 /* Begins a walk where the ray from o along d, t metres long, enters the box; returns the rays that do. */
 inline mask grid_begin(Scene scene, integer name, vec3 o, vec3 d, real t, mask active, GridWalk *w)
 {
     integer at = sel_i(active, MEDIUM_ROW(name) + 2 * MEDIUM_SCATTERING, (integer)(0));
-    w->first = gather_i(scene.materials, at);
-    w->nx = gather_i(scene.materials, at + 1);
-    w->ny = gather_i(scene.materials, at + 2);
-    w->nz = gather_i(scene.materials, at + 3);
-    w->packed = grid_packed(name);
+    grid_enter(scene, name, at, o, d, w);
     real lo = 0.0f, hi = t;
-#define AXIS(a, n)                                                            \
-    vec4 row_##a = row4(scene.materials, at + 4 + 4 * n);                     \
-    real top_##a = gather_w(scene.materials, at + 16 + n);                    \
-    w->o.a = row_##a.x * o.x + row_##a.y * o.y + row_##a.z * o.z + row_##a.w; \
-    w->d.a = row_##a.x * d.x + row_##a.y * d.y + row_##a.z * d.z;             \
-    w->inverse.a = 1.0f / sel(fabs(w->d.a) > 1e-20f, w->d.a, (real)(1e-20f)); \
-    real from_##a = (0.5f - w->o.a) * w->inverse.a;                           \
-    real to_##a = (top_##a - w->o.a) * w->inverse.a;                          \
-    lo = max_r(lo, min_r(from_##a, to_##a));                                  \
+#define AXIS(a, n)                                                                              \
+    real from_##a = (0.5f - w->o.a) * w->inverse.a;                                             \
+    real to_##a = (gather_w(scene.materials, at + 16 + n) - w->o.a) * w->inverse.a;             \
+    lo = max_r(lo, min_r(from_##a, to_##a));                                                    \
     hi = min_r(hi, max_r(from_##a, to_##a));
     AXIS(x, 0)
     AXIS(y, 1)
@@ -206,4 +216,125 @@ inline Spectrum grid_transmittance(Scene scene, integer name, Medium m, vec3 o, 
         active = sel_i(meets, active, grid_next(&w, b, active & !meets));
     }
     return passes;
+}
+
+/* Step bytes: numbers on grids, with 8 or 16 bits each. */
+inline integer grid_packed(integer name) { return sel_i((name & MEDIUM_BYTES) != 0, (integer)(2), (integer)(1)); }
+
+/* The number at index `at` of a brick over the brick's highest; word: the word that holds it. */
+inline real grid_number_at(integer packed, integer word, integer at)
+{
+    mask small = packed == 2;
+    integer place = sel_i(small, (at & 3) << 3, (at & 1) << 4), most = sel_i(small, (integer)(0xff), (integer)(0xffff));
+    return to_real((word >> place) & most) / to_real(most);
+}
+
+/* Twin, where all numbers have 16 bits. */
+inline integer grid_packed(integer name) { return (integer)(1); }
+inline real grid_number_at(integer packed, integer word, integer at)
+{
+    return to_real((word >> ((at & 1) << 4)) & 0xffff) * (1.0f / 65535.0f);
+}
+
+/* Step coloured: extinction with colours on a grid. */
+inline void grid_coloured(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas,
+                           Medium *m)
+{
+    Spectrum colour = grid_tint(scene, name, GRID_COLOUR, w, active, bits, lambdas);
+    m->sigma_s = spectrum_mul(m->sigma_s, colour);
+    m->sigma_t = spectrum_mul(m->sigma_t, colour);
+}
+
+/* Twin, where extinction has no colours on a grid. */
+inline void grid_coloured(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas,
+                           Medium *m) {}
+
+/* Step tinted: scattering with albedos on a grid. */
+inline void grid_tinted(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas,
+                          Medium *m)
+{
+    m->sigma_s = spectrum_mul(m->sigma_s, grid_tint(scene, name, GRID_ALBEDO, w, active, bits, lambdas));
+}
+
+/* Twin, where no albedo is on a grid. */
+inline void grid_tinted(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas,
+                          Medium *m) {}
+
+/* Step mixed: mixtures: media on a grid that are made of parts. */
+
+/* In a mixture's row, word GRID_MIXED is 1 + the first word of its shares in `images`; it is 0 for other media. The
+ * shares are a word for each brick, where its points begin from there, and for each point the density of GRIDS_MIXED
+ * parts over the density of the bricks. Behind word GRID_MIXED follow the phase function's word and the coefficients
+ * of each part. The mixture's own coefficients times the density of its bricks bound the sum of all parts: they are
+ * the majorant. */
+inline integer grid_shares(Scene scene, integer name, GridWalk w, mask active, natural bits)
+{
+    integer first = gather_i(scene.materials, sel_i(active, MEDIUM_ROW(name) + GRID_MIXED, (integer)(0))) - 1;
+    active = active & (first >= 0);
+    integer brick = (w.z * w.ny + w.y) * w.nx + w.x;
+    integer points = first + gather_i(scene.images, sel_i(active, first + brick, (integer)(0)));
+    return sel_i(active, points + GRIDS_MIXED * grid_corner(w, bits), (integer)(0));
+}
+
+/* A part of a mixture at the point with its shares at word `shares` of `images`, for a density of the bricks of 1.
+ * Lanes without shares get any medium. */
+inline Medium grid_part(Scene scene, integer name, int part, integer shares, Wavelengths lambdas)
+{
+    integer row = MEDIUM_ROW(name) + GRID_MIXED + 2 + part * (1 + 2 * MEDIUM_SCATTERING);
+    Medium m = medium_load(scene, sel_i(shares != 0, row + 1, (integer)(0)), lambdas);
+    real share = gather_w(scene.images, sel_i(shares != 0, shares + part, (integer)(0)));
+    m.sigma_s = spectrum_scale(m.sigma_s, share);
+    m.sigma_t = spectrum_scale(m.sigma_t, share);
+    return m;
+}
+
+/* The mixture of all parts at a point. */
+inline void grid_mixed(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas, Medium *m)
+{
+    integer shares = grid_shares(scene, name, w, active, bits);
+    if (any(shares != 0)) {
+        Medium whole = grid_part(scene, name, 0, shares, lambdas);
+        for (int i = 1; i < GRIDS_MIXED; i++) {
+            Medium part = grid_part(scene, name, i, shares, lambdas);
+            whole.sigma_s = spectrum_add(whole.sigma_s, part.sigma_s);
+            whole.sigma_t = spectrum_add(whole.sigma_t, part.sigma_t);
+        }
+        m->sigma_s = spectrum_sel(shares != 0, whole.sigma_s, m->sigma_s);
+        m->sigma_t = spectrum_sel(shares != 0, whole.sigma_t, m->sigma_t);
+    }
+}
+
+/* Twin, where no medium is a mixture. */
+inline void grid_mixed(Scene scene, integer name, GridWalk w, mask active, natural bits, Wavelengths lambdas, Medium *m)
+{
+}
+
+/* Step shadow: shadow rays through media on grids. */
+
+/* The key of the random numbers of a shadow ray. */
+inline natural grid_shadow_key(Scene scene, Slab path, uint at)
+{
+    integer vertex = (load_path_state(path, at) & PATH_DEPTH) + load_path_nulls(path, at);
+    return ~grid_key(scene, load_path_pixel_key(path, at), load_path_sample(path, at), vertex);
+}
+
+/* The transmittance of a shadow ray through a medium on a grid; for other media the argument. */
+inline Spectrum grid_shadow_transmittance(Scene scene, integer medium, vec3 o, vec3 d, real way, natural key,
+                                          mask active, Wavelengths lambdas, Spectrum transmittance)
+{
+    mask gridded = active & ((medium & MEDIUM_GRID) != 0);
+    if (any(gridded)) {
+        Medium m = medium_load(scene, sel_i(gridded, medium, (integer)(0)), lambdas);
+        Spectrum passed = grid_transmittance(scene, medium, m, o, d, way, key, gridded, lambdas);
+        transmittance = spectrum_sel(gridded, passed, transmittance);
+    }
+    return transmittance;
+}
+
+/* Twin, where no medium is on a grid. */
+inline natural grid_shadow_key(Scene scene, Slab path, uint at) { return ((natural)(0u)); }
+inline Spectrum grid_shadow_transmittance(Scene scene, integer medium, vec3 o, vec3 d, real way, natural key,
+                                          mask active, Wavelengths lambdas, Spectrum transmittance)
+{
+    return transmittance;
 }

@@ -71,24 +71,69 @@ inline GridWalk grid_point(Scene scene, integer name, integer number, vec3 p, ma
 {
     integer at = sel_i(active, MEDIUM_ROW(name) + 2 * MEDIUM_SCATTERING, (integer)(0));
     GridWalk w;
-    w.first = gather_i(scene.materials, at);
-    w.nx = max_i(gather_i(scene.materials, at + 1), (integer)(1));
-    w.ny = max_i(gather_i(scene.materials, at + 2), (integer)(1));
-    w.nz = gather_i(scene.materials, at + 3);
-    w.packed = grid_packed(name);
-#define AXIS(a, n)                                                            \
-    vec4 row_##a = row4(scene.materials, at + 4 + 4 * n);                     \
-    w.o.a = row_##a.x * p.x + row_##a.y * p.y + row_##a.z * p.z + row_##a.w;  \
-    w.d.a = 0.0f;                                                             \
-    w.inverse.a = 1.0f;
-    AXIS(x, 0)
-    AXIS(y, 1)
-    AXIS(z, 2)
-#undef AXIS
+    grid_enter(scene, name, at, p, v3(0.0f, 0.0f, 0.0f), &w);
     w.x = number % w.nx;
     w.y = (number / w.nx) % w.ny;
     w.z = number / (w.nx * w.ny);
     w.t = 0.0f;
     w.end = 0.0f;
     return w;
+}
+
+/* Step glow: the light of a grid at a point with this temperature, that of a black body; `light` for grids without
+ * temperatures. at: the grid's words. */
+inline Spectrum grid_glow(Scene scene, integer at, real number, mask active, Wavelengths lambdas, Spectrum light)
+{
+    integer kind = gather_i(scene.materials, at + 1);
+    mask glows = active & (kind != 0);
+    if (any(glows)) {
+        light = spectrum_sel(glows, grid_black_body(scene, at, number, kind == 2, glows, lambdas), light);
+    }
+    return light;
+}
+
+/* Twin, where no grid has a temperature. */
+inline Spectrum grid_glow(Scene scene, integer at, real number, mask active, Wavelengths lambdas, Spectrum light)
+{
+    return light;
+}
+
+/* Step black_body: Planck's law [W m^-2 sr^-1 nm^-1] times a factor, at the wavelengths of a path. normalised: the
+ * largest value is 1. at: the grid's words. */
+inline Spectrum grid_black_body(Scene scene, integer at, real kelvin, mask normalised, mask active, Wavelengths lambdas)
+{
+    real factor = gather_w(scene.materials, at + 3);
+    mask hot = active & (kelvin > 1.0f);
+    kelvin = sel(hot, kelvin, (real)(1.0f));
+    real t2 = kelvin * kelvin, top = 4.0956747e-15f * t2 * t2 * kelvin;
+    factor *= sel(normalised, 1.0f / top, (real)(1.0f));
+    Spectrum r;
+#define C(c)                                                                                        \
+    real nm_##c = lambdas.c, m2_##c = nm_##c * nm_##c;                                              \
+    real less_##c = exp_r(-min_r(1.438776877e7f / (nm_##c * kelvin), (real)(80.0f)));               \
+    r.c = sel(hot, factor * 1.191042972e20f / (m2_##c * m2_##c * nm_##c) * less_##c / (1.0f - less_##c), (real)(0.0f));
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+
+/* Twin, in RGB mode: from a table of colours. */
+inline Spectrum grid_black_body(Scene scene, integer at, real kelvin, mask normalised, mask active, Wavelengths lambdas)
+{
+    real factor = gather_w(scene.materials, at + 3);
+    mask hot = active & (kelvin > 1.0f);
+    kelvin = sel(hot, kelvin, (real)(1.0f));
+    real place = kelvin * gather_w(scene.materials, at + 5);
+    integer cell = clamp_i(to_integer(place), (integer)(1022));
+    real share = clamp_r(place - to_real(cell), (real)(0.0f), (real)(1.0f));
+    integer first = sel_i(hot, gather_i(scene.materials, at + 4) + 3 * cell, (integer)(0));
+    Spectrum r;
+#define C(c, i)                                                             \
+    real low_##c = gather(scene.distributions, first + i);                  \
+    r.c = sel(hot, low_##c + share * (gather(scene.distributions, first + 3 + i) - low_##c), (real)(0.0f));
+    C(x, 0)
+    C(y, 1)
+    C(z, 2)
+#undef C
+    return r;
 }

@@ -1,6 +1,8 @@
 /* Shared by phase functions that depend on the wavelength: a density over the cosine of the scattering angle for each
  * wavelength. Spectral mode samples the density of the hero wavelength, and spectra/hero.cl weighs all four. RGB mode
  * samples a random component, and the pdf is the mean of the three; equal components need no choice. */
+
+/* Step. */
 #if SPECTRUM_SIZE == 4
 inline mask phase_same(Spectrum s) { return mask_of(1); }
 inline integer phase_component(mask same, real *u) { return (integer)(0); }
@@ -21,6 +23,18 @@ inline real phase_part(Spectrum s, integer component)
 }
 inline real phase_pdf(Spectrum densities, mask same) { return sel(same, densities.x, spectrum_mean(densities)); }
 #endif
+
+/* A sample of the uniform density over the sphere. */
+inline BsdfSample phase_uniform(vec3 u, Spectrum weight)
+{
+    BsdfSample s = bsdf_nothing();
+    vec2 point = {u.x, u.y};
+    s.wi = uniform_sphere(point);
+    s.weight = weight;
+    s.pdf = 0.25f * INV_PI;
+    s.lobe = LOBE_TRANSMIT;
+    return s;
+}
 
 /* The sample of a scattering angle with this cosine; u: azimuth over 2 pi. */
 inline BsdfSample phase_turned(real cosine, real u)
@@ -57,3 +71,14 @@ inline real hg_turn(real of, real u)
     real turn = clamp_r((1.0f + g * g - root * root) / (2.0f * g), (real)(-1.0f), (real)(1.0f));
     return sel(even, 1.0f - 2.0f * u, turn);
 }
+
+/* Step frame: the shading frame of a point in a medium: z points against the ray. */
+typedef struct { Frame frame; } ShadingFrame;
+
+inline ShadingFrame shading_frame_load(Scene scene, integer row, Surface s, vec3 d, Wavelengths lambdas)
+{
+    ShadingFrame f = {frame_of(neg3(d))};
+    return f;
+}
+inline mask shading_frame_turns(Scene scene, integer row) { return mask_of(0); }
+inline real shading_frame_share(ShadingFrame f, vec3 w) { return 1.0f; }

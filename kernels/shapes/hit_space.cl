@@ -1,4 +1,4 @@
-/* The space in which a hit triangle lies, that of its instance, and the way from there to the world. */
+/* The space of a hit triangle, which its instance transforms to the world. */
 #include "tracing/instances.cl"
 
 typedef struct {

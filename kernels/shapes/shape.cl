@@ -8,13 +8,12 @@
  * and, for shapes that rays meet as they are (not as triangles),
  *
  *   ShapeHit    <kind>_intersect(<Kind> s, vec3 o, vec3 d, real tmin, real tmax);    nearest hit in (tmin, tmax)
- *   vec3        <kind>_onto(<Kind> s, vec3 p);                                       the point of it that p is beside
+ *   vec3        <kind>_onto(<Kind> s, vec3 p);                                       nearest point, for p close to it
  *   real        <kind>_size(<Kind> s);                                               see core/rounding.cl [m]
  *   vec3        <kind>_dpdu(<Kind> s, vec3 p, vec2 uv);                              tangent at a point of it
  *   vec3        <kind>_dpdv(<Kind> s, vec3 p, vec2 uv);                              and along v
  *
- * Normals point to the front, outward for closed shapes. ShapeSample is declared beside the kinds.
- */
+ * Normals point to the front, outward for closed shapes. ShapeSample is declared beside the kinds. */
 #include "generated/shape_sample.cl"
 
 typedef struct {

@@ -2,7 +2,7 @@
  * group of work-items counts in local memory what it has of each kind, and reserves room for all of
  * them with one addition to a kind's count. The order of the groups does not matter to the picture. */
 #include "core/base.cl"
-#include "transport/waiting.cl"
+#include "transport/queue.cl#waiting"
 
 /* Empty queues; a work-item for each. */
 kernel void append_begin(global uint *queue_starts, global uint *queue_counts, uint slots)

@@ -8,7 +8,7 @@
 #include "generated/shapes.cl"
 #include "generated/lights.cl"
 #include "shapes/surface.cl"
-#include "lights/light_begins.cl"
+#include "lights/light.cl#begins"
 
 #define COMMON(type, name) __attribute__((noinline)) type loop_##name
 #include "generated/common_part.cl"

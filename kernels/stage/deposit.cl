@@ -10,7 +10,7 @@
 #include "generated/shapes.cl"
 #include "generated/medium.cl"
 #include "shapes/surface.cl"
-#include "transport/light_path_sampler.cl"
+#include "transport/light_path.cl#sampler"
 #include "transport/photons/area.cl"
 #include "transport/photons/cells.cl"
 #include "generated/photon_numbers.cl"

@@ -16,9 +16,9 @@
 #include "generated/lights.cl"
 #include "generated/medium.cl"
 #include "generated/motion.cl"
-#include "transport/path_end.cl"
-#include "transport/next_light_path.cl"
-#include "transport/light_path_sampler.cl"
+#include "transport/path_state.cl#end"
+#include "transport/light_path.cl#next"
+#include "transport/light_path.cl#sampler"
 #include "generated/front_motion.cl"
 
 /* Puts a ray to a light into the shadow slab of the slots that `go` on. Returns the bits of Path.state that follow. */

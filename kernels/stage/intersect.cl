@@ -3,7 +3,7 @@
  * along what shading needs first: the normal and the material of the side that was met. */
 #include "core/base.cl"
 #include "shapes/shape.cl"
-#include "shapes/surface_flags.cl"
+#include "shapes/surface.cl#flags"
 #include "generated/trace.cl"
 #include "stage/stage.cl"
 

@@ -1,5 +1,5 @@
 /* What a kind of material has of its own, as a part of the loop (stage/loop.cl) for a vertex that several kinds share:
- * materials/material_apart.cl. */
+ * materials/bsdf.cl. */
 #include "core/base.cl"
 #include "shapes/shape.cl"
 #include "lights/light.cl"
@@ -9,7 +9,7 @@
 #include "materials/bsdf.cl"
 #include "generated/bsdf.cl"
 #include "generated/hero_steps.cl"
-#include "materials/pair.cl"
+#include "materials/bsdf.cl#pair"
 
 /* What a vertex asks for, of LANES paths. */
 inline BsdfAnswer material_answer(Bsdf m, vec3 wo, vec3 wi, vec3 u, int adjoint)

@@ -3,7 +3,7 @@
  * A matrix is 16 floats, row after row, that take a shape's own space to the world; `<name>_begin` is the first element
  * of `name` in its buffer. Vertices `first` to first + count - 1 of the table are the shape's.
  */
-#include "bvh/placed.cl"
+#include "bvh/place.cl"
 
 inline float3 place_row(global const float *matrix, uint row) { return vload3(0, matrix + 4 * row); }
 
@@ -64,7 +64,7 @@ kernel void smooth_normals(global const float *restrict vertices, global const u
     vstore3(place_unit(sum), first + i, normals);
 }
 
-/* One instance, whose row begins at word `at`; see bvh/placed.cl. */
+/* One instance, whose row begins at word `at`; see bvh/place.cl. */
 kernel void place_instance(global const float *restrict matrix, uint matrix_begin, float4 centre, float4 low,
                            float4 high, uint at, uint number, global uint *restrict instances,
                            global float *restrict boxes)

@@ -13,8 +13,8 @@
 #include "generated/lights.cl"
 #include "shapes/surface.cl"
 #include "generated/shading_frame.cl"
-#include "lights/next_event.cl"
-#include "lights/light_begins.cl"
+#include "lights/light.cl#next_event"
+#include "lights/light.cl#begins"
 #include "generated/common.cl"
 #include "materials/fresnel.cl"
 #include "materials/microfacet.cl"
@@ -22,7 +22,7 @@
 #include "generated/bsdf.cl"
 #include "generated/medium.cl"
 #include "transport/vertex.cl"
-#include "spectra/hero.cl"
+#include "spectra/hero.cl#sample"
 #include "generated/integrator.cl"
 
 #if QUEUED

@@ -2,7 +2,7 @@
  * serves the LANES slots from `at` on, for the loop of all stages in stage/loop.cl.
  *
  *     STAGE(name)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG) { SLABS SCENE STAGE_AT ... } */
-#include "bvh/no_vectorize.cl"
+#include "bvh/hints.cl"
 
 #ifdef PART
 #define STAGE(name) void PART

@@ -11,7 +11,7 @@
 #include "core/frame.cl"
 #include "core/warp.cl"
 #include "bvh/mask8.cl"
-#include "bvh/no_vectorize.cl"
+#include "bvh/hints.cl"
 
 #define TRIAL_BOUNCES 8
 #define TRIAL_STEPS 12

@@ -16,6 +16,17 @@ inline Spectrum bands_texel(Scene scene, integer first, integer bands, Spectrum 
     return r;
 }
 
+/* Bilinear between four texels, at `at` between them. */
+inline Spectrum bands_between(Scene scene, integer first, integer bands, integer texels[4], vec2 at, Spectrum numbers)
+{
+    Spectrum sum = spectrum_of(0.0f);
+    for (int corner = 0; corner < 4; corner++) {
+        real weight = ((corner & 1) ? at.x : 1.0f - at.x) * ((corner >> 1) ? at.y : 1.0f - at.y);
+        sum = spectrum_madd(bands_texel(scene, first + bands * texels[corner], bands, numbers), weight, sum);
+    }
+    return sum;
+}
+
 /* The same where there is light at the bands' wavelengths only: dark beyond the ends. */
 inline Spectrum bands_lit(Spectrum value, integer bands, Spectrum numbers)
 {

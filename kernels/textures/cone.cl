@@ -58,3 +58,21 @@ inline integer cone_word(Cone c) { return (integer)(0); }
 inline integer cone_scattered(Cone c, real pdf, mask delta) { return (integer)(0); }
 inline Cone cone_after(integer word, real t) { Cone c = {(real)(0.0f), (real)(0.0f)}; return c; }
 inline real cone_footprint(Cone c, vec3 d, vec3 n, vec3 dpdu, vec3 dpdv) { return (real)(0.0f); }
+
+/* Step first: the first Path.cone of a camera path, from its ray and a ray a pixel farther. */
+#include "textures/cone.cl"
+
+inline integer first_cone(Scene scene, CameraRay ray, vec2 position, vec2 lens, Wavelengths lambdas)
+{
+    vec2 beside = {position.x + 1.0f / to_real((integer)(scene.settings->film_width)),
+                   position.y + 1.0f / to_real((integer)(scene.settings->film_height))};
+    Spectrum unused;
+    CameraRay other = first_ray(scene, beside, lens, lambdas, &unused);
+    return cone_word(cone_of_pixel(ray.o, ray.d, other.o, other.d));
+}
+
+/* Step unrelated: where rays of neighbouring pixels have nothing in common, images show their finest level. */
+inline integer first_cone(Scene scene, CameraRay ray, vec2 position, vec2 lens, Wavelengths lambdas)
+{
+    return (integer)(0);
+}

@@ -4,9 +4,9 @@
  * the light (s = 0), next-event estimation chooses the light from x_{k-1} (s = 1), or a light path is connected to the
  * camera at x_1 (t = 1). The power heuristic with exponent 2 weighs them (Veach 1997, 9.2.4 and 10.2). Each side
  * carries a recursive MIS quantity from vertex to vertex, as dVCM and dVC of Georgiev 2012, "Implementing Vertex
- * Connection and Merging": the `mis_ratio` of its path is the density of the other side's technique over the path's
- * own density. Squared distances cancel. Densities of directions p [1/sr], reverse densities, and cosines to the
- * geometric normals remain.
+ * Connection and Merging": the `mis_ratio` of its path is the density of the other side's technique over the path's own
+ * density. Squared distances cancel. Densities of directions p [1/sr], reverse densities, and cosines to the geometric
+ * normals remain.
  *
  * The mis_ratio of a camera's path begins with the number l of light paths a sample. c is the cosine of the incident
  * ray, c' of the next ray, and p_back the density of the incident direction for a light path that comes back:
@@ -27,18 +27,18 @@
  * Direct light at x_1 is left to next-event estimation of the camera's path: a light path is connected from its second
  * vertex on, and for k = 2 the third density is 0. (Splats of light that next-event estimation finds without noise
  * would add noise only, see bench/notes/light_paths.md.) If x_1 is a collision, which the camera's path reaches by
- * chance, and no ray can meet the light, a light path is connected there too. Null surfaces change nothing.
- * If a material ends light paths (`ends_light_paths`), the camera's mis_ratio is 0.
+ * chance, and no ray can meet the light, a light path is connected there too. Null surfaces change nothing. If a
+ * material ends light paths (`ends_light_paths`), the camera's mis_ratio is 0.
  *
  * A vertex may be a collision in a medium. Both sides sample a collision with density transmittance times extinction,
  * and a surface with density transmittance. The transmittance between two vertices is equal both ways, and at a
- * collision the extinction takes the place of c and c'; both cancel, so that c and c' are 1 (VERTEX_COSINE). If one
- * side is connected and the other has sampled a distance, weights leave the transmittance out, as weights of next-event
+ * collision the extinction takes the place of c and c'; both cancel, so that c and c' are 1 (VERTEX_COSINE). If a side
+ * is connected and the other side has sampled a distance, weights leave the transmittance out, as weights of next-event
  * estimation do. They leave out the change by equiangular sampling too: any weights that sum to 1 are valid, and both
  * sides know these.
  *
  * If some light paths aim at specular shapes, Russian roulette ends most others at a diffuse x_{k-1}: the third density
- * is lower there (transport/diffuse_roulette.cl).
+ * is lower there (transport/roulette.cl).
  *
  * With photon merging (transport/photons/gather.cl) vertex merging at x_i is a fourth technique. x_i is the first
  * vertex from the camera that is not specular, if some vertex beyond it is specular: the camera's path and a light path
@@ -139,7 +139,7 @@ inline real mis_ratio_to_light(MisRatio r, Surface s, vec3 d, mask delta, real p
     return mis_ratio_limited(mis_ratio_arriving(r, delta, p, p_back) * change * VERTEX_COSINE(s.n, d));
 }
 
-/* receiver: by which next-event estimation would choose a light here. */
+/* receiver: of next-event estimation at the vertex. */
 inline MisRatio mis_ratio_of_light_path(Scene scene, Slab path, uint at, Vertex v, Receiver receiver)
 {
     MisRatio r;
@@ -194,7 +194,7 @@ inline real keep_mis_ratio_to_light(Slab path, uint at, mask scatters, MisRatio 
     return bs.p;
 }
 
-/* Stores the ratios of light paths that continue along `onward`. Returns the mask of those. */
+/* Stores the ratios of light paths that continue along `onward`. Returns the lanes that continue. */
 inline mask keep_mis_ratio_to_camera(Scene scene, Slab path, uint at, mask next, mask null, MisRatio r, Vertex *v,
                                      vec3 onward, BsdfSample bs)
 {
@@ -234,4 +234,126 @@ inline mask keep_mis_ratio_to_camera(Scene scene, Slab path, uint at, mask next,
 inline real mis_weight_of_connection(Scene scene, MisRatio r, Vertex v, BsdfPair pair, CameraPoint c, mask *shine)
 {
     return (real)(1.0f);
+}
+
+/* Step aimed: the first mis_ratio of a light path over the gain of aiming, see lights/aiming.cl. */
+inline real mis_ratio_aimed(real mis_ratio, LightRay r) { return mis_ratio / r.gain; }
+
+/* Twin, without aimed light paths. */
+inline real mis_ratio_aimed(real mis_ratio, LightRay r) { return mis_ratio; }
+
+/* Step camera: the mis_ratio of a camera's path at its first vertex, if light paths are connected to the camera. */
+inline real mis_ratio_seen(Scene scene, Vertex v, Sampler sampler, real mis_ratio)
+{
+    CameraPoint c = camera_connect(scene, v.s.p, mask_of(0), sampler_pair(sampler, (natural)(DIMENSION_LENS)));
+    return sel(c.seen, mis_ratio / max_r(c.importance * scene.settings->mis_area_unit, (real)(1e-30f)), (real)(0.0f));
+}
+
+/* Twin, without connections of light paths to the camera. */
+inline real mis_ratio_seen(Scene scene, Vertex v, Sampler sampler, real mis_ratio) { return (real)(0.0f); }
+
+/* Step chosen: the chance of the light for the mis_ratio of a light path at its first vertex. The light tree chooses
+ * by the gloss of the surface (receiver), so the chance depends on the next direction of the light path. */
+inline MisRatio mis_ratio_chosen(Scene scene, Slab path, uint at, Vertex v, MisRatio r, Receiver receiver)
+{
+    if (any(r.first)) {
+        integer row = sel_i(r.first, load_path_light(path, at), (integer)(0));
+        real chance = common_light_tree_pmf(scene, row, v.s.p, receiver);
+        r.nee_pdf *= sel(r.first, chance, (real)(1.0f));
+    }
+    return r;
+}
+
+/* Twin, where the chance of a light does not depend on the direction of its light. */
+inline MisRatio mis_ratio_chosen(Scene scene, Slab path, uint at, Vertex v, MisRatio r, Receiver receiver) { return r; }
+
+/* Step merging: the merge_ratio, which is added to the mis_ratio at the next specular vertex. */
+
+#include "transport/photons/weight.cl"
+#include "generated/mis_merging_area.cl"
+
+/* The incident mis_ratio of a camera's path, with the merge_ratio if the vertex is specular. */
+inline real mis_ratio_arriving(MisRatio r, mask delta, real p, real p_back)
+{
+    real more = sel(mis_specular(delta, p, p_back), r.merge_ratio, (real)(0.0f));
+    return sqrt(sqr(r.arrives) + sqr(more));
+}
+
+/* The density of merging at a vertex over the density of a camera's path, 0 without merging. */
+inline real merge_ratio_here(Scene scene, Slab path, uint at, Vertex v)
+{
+    if (!BSDF_MERGES) return 0.0f;
+    real area = mis_merging_area(scene, load_path_sample(path, at), v);
+    return sel(merging_here(v.state, v.depth), area, (real)(0.0f));
+}
+
+/* The density of merging at a photon over the density of its light path. */
+inline real merge_ratio_of_photon(Scene scene, Slab path, uint at, Vertex v)
+{
+    if (!BSDF_MERGES) return 0.0f;
+    real area = mis_merging_area(scene, merging_pass(scene, load_path_sample(path, at)), v);
+    return sel((v.state & PATH_SHARP) != 0, area / scene.settings->light_paths, (real)(0.0f));
+}
+
+/* The merge_ratio of a camera's path that continues along d. */
+inline real merge_ratio_to_light(MisRatio r, Surface s, vec3 d, mask delta, real p, real p_back)
+{
+    real either = sqrt(sqr(r.merge_ratio * p_back) + sqr(r.merges)) / max_r(p, (real)(1e-30f));
+    return sel(mis_specular(delta, p, p_back), (real)(0.0f), mis_ratio_limited(either * VERTEX_COSINE(s.n, d)));
+}
+
+/* The merge_ratio of a light path that continues along d. */
+inline real merge_ratio_to_camera(MisRatio r, Surface s, vec3 d, mask delta, real p, real p_back)
+{
+    real begun = sel(mis_specular(delta, p, p_back), r.merge_ratio * p_back, r.merges) / max_r(p, (real)(1e-30f));
+    return mis_ratio_limited(sel(delta, r.merge_ratio, begun) * VERTEX_COSINE(s.n, d));
+}
+
+/* The square that merging adds to the mis_ratio of a light path that is connected to the camera along d. */
+inline real merge_ratio_square(MisRatio r, Surface s, vec3 d, real importance, real p, real p_back)
+{
+    real more = mis_ratio_limited(r.merge_ratio * p * importance * VERTEX_COSINE(s.n, d));
+    return sel(mis_specular(mask_of(0), p, p_back), sqr(more), (real)(0.0f));
+}
+
+/* Store the merge_ratio of paths in m that continue along `onward`, from the camera and from a light. */
+inline void keep_merge_ratio_to_light(Slab path, uint at, mask m, MisRatio r, Vertex *v, vec3 onward, mask delta,
+                                      real p, real p_back)
+{
+    v->state -= sel_i(mis_specular(delta, p, p_back), (integer)(0), v->state & PATH_SHARP);
+    store_path_merge_ratio(path, at, m, merge_ratio_to_light(r, v->s, onward, delta, p, p_back));
+}
+inline void keep_merge_ratio_to_camera(Slab path, uint at, mask m, mask null, MisRatio r, Vertex *v, vec3 onward,
+                                       mask delta, real p, real p_back)
+{
+    store_path_merge_ratio(path, at, m, merge_ratio_to_camera(r, v->s, onward, delta, p, p_back));
+    v->state = v->state | sel_i(mis_specular(delta, p, p_back) & !null, (integer)(PATH_SHARP), (integer)(0));
+}
+
+/* Twin, without photon merging. */
+inline real mis_ratio_arriving(MisRatio r, mask delta, real p, real p_back) { return r.arrives; }
+inline real merge_ratio_here(Scene scene, Slab path, uint at, Vertex v) { return (real)(0.0f); }
+inline real merge_ratio_of_photon(Scene scene, Slab path, uint at, Vertex v) { return (real)(0.0f); }
+inline real merge_ratio_square(MisRatio r, Surface s, vec3 d, real importance, real p, real p_back)
+{
+    return (real)(0.0f);
+}
+inline void keep_merge_ratio_to_light(Slab path, uint at, mask m, MisRatio r, Vertex *v, vec3 onward, mask delta,
+                                      real p, real p_back) {}
+inline void keep_merge_ratio_to_camera(Slab path, uint at, mask m, mask null, MisRatio r, Vertex *v, vec3 onward,
+                                       mask delta, real p, real p_back) {}
+
+/* Step area: `merging_area` in units of mis_area_unit. */
+#define mis_merging_area(scene, pass, v) (merging_area(scene, pass) / (scene).settings->mis_area_unit)
+
+/* Step area_along: `merging_area` at a collision, in units of mis_area_unit. */
+#include "transport/photons/media.cl"
+
+/* 0 in a medium without photons. */
+inline real mis_merging_area(Scene scene, integer pass, Vertex v)
+{
+    mask merges = MATERIAL_KIND(merging_phase(scene, v.media.medium)) == (integer)(BSDF_KIND);
+    Medium m = medium_load(scene, sel_i(merges, v.media.medium, (integer)(0)), v.lambdas);
+    real area = merging_area_along(scene, pass, m.sigma_t) / scene.settings->mis_area_unit;
+    return sel(merges, area, (real)(0.0f));
 }

@@ -1,10 +1,12 @@
-/* The queue of a loop's work-item: its slots sorted by the kind of material that they wait for. To be shaded in SIMD
- * the state of LANES of them is brought to a block, LANES neighbouring slots beyond those of the paths, and back. */
-#include "transport/waiting.cl"
+/* The queue of a loop's work-item: its slots sorted by the kind of material that shades them. For SIMD shading the
+ * state of LANES slots is copied to a block, LANES neighbouring slots beyond all paths, and back. */
+
+/* Step. */
+#include "transport/queue.cl#waiting"
 #include "generated/block.cl"
 
-/* Of the slots from `first` to `end`, those that wait for kind k go to queue[starts[k]] and further, below
- * queue[starts[k + 1]], in ascending order: a counting sort. The entries from `first` to `end` are theirs alone. */
+/* Sorts the slots from `first` to `end` by a counting sort: slots of kind k go to queue[starts[k]] up to, but without,
+ * queue[starts[k + 1]], in ascending order. Queue entries from `first` to `end` belong to this work-item. */
 called void queue_sort(Slab path, Slab hit, global uint *queue, uint *starts, uint first, uint end)
 {
     uint next[BSDF_COUNT], total = first;
@@ -30,11 +32,11 @@ called void queue_sort(Slab path, Slab hit, global uint *queue, uint *starts, ui
     }
 }
 
-/* Whether so many slots wait for a kind that it is quicker to shade all neighbours as they lie, others masked out. */
+/* Whether so many slots wait for a kind that it is faster to shade all slots in place, with other kinds masked out. */
 inline int queue_is_dense(uint waiting, uint slots) { return 4 * waiting > 3 * slots; }
 
-/* Brings the paths from `entry` of the queue on, of which the last one is before `end`, to a block; that one fills what
- * is left. Of the shadow ray only t is brought, by which the others are known to hold nothing. */
+/* Copies the paths from `entry` of the queue on, up to `end`, to a block; the last path fills the remaining lanes. Of
+ * the shadow ray only t is copied, which marks lanes without a shadow ray. */
 called void queue_take(Slab path, Slab hit, Slab shadow, constant BlockWords *words, global const uint *queue,
                        uint entry, uint end, uint block)
 {
@@ -42,13 +44,13 @@ called void queue_take(Slab path, Slab hit, Slab shadow, constant BlockWords *wo
     for (uint i = 0; i < words->path; i++) slab_gather(path, words->path_words[i], slots, block);
     for (uint i = 0; i < words->hit; i++) slab_gather(hit, words->hit_words[i], slots, block);
     slab_gather(shadow, SHADOW_T, slots, block);
-#if USES_LAYERS || LIGHT_LAYERS /* shading adds to pixels: the last path only once */
+#if USES_LAYERS || LIGHT_LAYERS /* shading adds to pixels, so copies of the last path are inactive */
     store_path_state(path, block, LANE_INDEX + (int)entry >= (int)end, (integer)(0));
 #endif
 }
 
-/* Brings back what may have changed: of paths, and `more_count` words of another slab. These are shadow rays after
- * shading, and hits after a walk, whose shadow rays have been tested. */
+/* Copies back the words that may have changed: of paths, and `more_count` words of another slab: shadow rays after
+ * shading, or hits after a walk, whose shadow rays have been traced. */
 called void queue_return(Slab path, Slab more, constant BlockWords *words, constant uchar *more_words, uint more_count,
                          global const uint *queue, uint entry, uint end, uint block)
 {
@@ -56,4 +58,14 @@ called void queue_return(Slab path, Slab more, constant BlockWords *words, const
     mask active = index < (int)end;
     for (uint i = 0; i < words->changed; i++) slab_scatter(path, words->path_words[i], block, slots, active);
     for (uint i = 0; i < more_count; i++) slab_scatter(more, more_words[i], block, slots, active);
+}
+
+/* Step waiting: the kind of material that shades the path of a slot. */
+#include "shapes/surface.cl#flags"
+
+/* The kind, -1 for a path that waits for no material. */
+inline integer waiting_kind(Slab path, Slab hit, uint at)
+{
+    mask waits = ((load_path_state(path, at) & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0);
+    return sel_i(waits, MATERIAL_KIND(load_hit_material(hit, at)), (integer)(-1));
 }

@@ -1,4 +1,4 @@
-/* A vertex of a path: the incident ray (its throughput includes absorption), the surface, scattering, continuation. */
+/* A vertex of a path: the incident ray (throughput includes absorption), the surface, scattering, continuation. */
 #include "generated/cone.cl"
 #include "generated/vertex_media.cl"
 
@@ -8,32 +8,32 @@ typedef struct {
     Wavelengths lambdas;
     Spectrum beta;        /* throughput, here */
     integer state, depth; /* see transport/path_state.cl */
-    integer met;          /* number of surfaces, with null surfaces, which add no depth */
+    integer met;          /* number of surfaces, including null surfaces, which add no depth */
     Surface s;
     mask front;           /* the front was hit */
     integer row;          /* of the material */
     Cone cone;            /* around the ray, here */
-    integer object, primitive, material; /* see transport/vertex_names.cl */
-    VertexMedia media;    /* what is around */
+    integer object, primitive, material; /* identifiers, see vertex_names */
+    VertexMedia media;    /* media around the vertex */
 } Vertex;
 
 #include "generated/vertex_steps.cl"
 
-/* |cosine| of a direction d to a surface of normal n, by which densities of its directions become those of points. In
- * a medium the extinction is in its place: it is the same for light that comes the other way, and counts as 1. */
+/* |cosine| of a direction d to a surface of normal n, which converts densities of directions to densities of points. In
+ * a medium extinction takes its place: it is equal for both directions of light, and counts as 1. */
 #if BSDF_IS_PHASE
 #define VERTEX_COSINE(n, d) ((real)(1.0f))
 #else
 #define VERTEX_COSINE(n, d) fabs(dot3(n, d))
 #endif
 
-#define VERTEX_COUNTS (!BSDF_IS_NULL && !BSDF_IS_PANE) /* it is a step of its path, whatever the lobe */
+#define VERTEX_COUNTS (!BSDF_IS_NULL && !BSDF_IS_PANE) /* it adds to the path's depth, whatever the lobe */
 
 typedef struct {
     Sampler sampler;
     natural dimension;     /* the first of the vertex */
-    vec2 choice;           /* chooses a light, and a lobe; 0 where there is nothing to choose */
-    Wavelengths lambdas;   /* of incident light: other than the vertex's at fluorescence */
+    vec2 choice;           /* selects a light, and a lobe; 0 without a choice */
+    Wavelengths lambdas;   /* of incident light: differ from the vertex's at fluorescence */
     Bsdf bsdf;
     ShadingFrame shading;
     vec3 wo;               /* to the previous vertex, in shading.frame */
@@ -65,7 +65,7 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active
     return v;
 }
 
-/* Loads the material. Where it fluoresces, the `active` paths take the wavelengths by which light comes. */
+/* Loads the material. Where it fluoresces, the `active` paths take the wavelengths of the incident light. */
 inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active, Vertex v, Sampler sampler)
 {
     Scattering scatter;
@@ -111,7 +111,7 @@ inline mask vertex_is_null(integer lobe)
     return BSDF_IS_NULL ? mask_of(1) : BSDF_IS_PANE ? (lobe & LOBE_NULL) != 0 : mask_of(0);
 }
 
-/* Whether paths may be longer than to this vertex; null: those that it does not count for. */
+/* Whether paths may continue beyond the vertex; null: paths that cross a null surface. */
 inline mask vertex_continues(Scene scene, Vertex v, mask null)
 {
     mask more = v.depth + 1 < scene.settings->max_depth, beyond = v.met - v.depth < MOST_NULL_SURFACES;
@@ -121,7 +121,7 @@ inline mask vertex_continues(Scene scene, Vertex v, mask null)
 /* Continues the `next` paths along d; null: paths that cross a null surface. */
 inline void vertex_leave(Slab path, uint at, mask next, mask null, Vertex v, vec3 d, Spectrum beta)
 {
-    if (BSDF_IS_NULL || BSDF_IS_PANE) { /* the camera's ray has its end, and lights are weighed by what was before */
+    if (BSDF_IS_NULL || BSDF_IS_PANE) { /* MIS weights use the origin before it */
         real pdf = load_path_pdf(path, at), onward = v.t + surface_ray_offset(v.s, d);
         store_path_pdf(path, at, next & null & (v.depth == 0), pdf + onward);
         store_path_null_distance(path, at, next & null, load_path_null_distance(path, at) + onward);
@@ -143,11 +143,41 @@ inline void vertex_end(Slab path, uint at, mask active, mask next, mask null, in
     store_path_state(path, at, active, BSDF_IS_NULL ? state : sel_i(null, state, state + 1));
 }
 
-inline void hide_light(Slab path, uint at, mask hidden, Vertex v) /* the camera's ray goes on behind it */
+inline void hide_light(Slab path, uint at, mask hidden, Vertex v) /* a camera ray continues behind the light */
 {
     store_path_o(path, at, hidden, surface_offset(v.s, v.d));
     store_path_pdf(path, at, hidden, load_path_pdf(path, at) + v.t);
     store_path_null_distance(path, at, hidden, load_path_null_distance(path, at) + v.t);
     store_path_cone(path, at, hidden, cone_word(v.cone));
-    store_path_mis_ratio(path, at, hidden, (real)(0.0f)); /* the light hides it from light paths */
+    store_path_mis_ratio(path, at, hidden, (real)(0.0f)); /* light paths cannot pass the light */
 }
+
+/* Step names: identifiers of a surface for layers: its index in the scene's shapes, its primitive, and its material. */
+inline void vertex_names(Scene scene, Slab hit, uint at, mask active, Vertex *v)
+{
+    v->object = v->primitive = v->material = -1;
+    if (BSDF_IS_PHASE) return;
+    integer row = sel_i(active, load_hit_shape(hit, at), (integer)(0));
+    ShapeRow shape = shape_row_row(scene.shapes, row * SHAPE_ROW_WORDS);
+    int numbers = scene.settings->material_numbers;
+    if (numbers) v->material = to_integer(gather(scene.distributions, numbers + row));
+    v->object = shape.number;
+#if USES_INSTANCES
+    integer instance = sel_i(active, load_hit_instance(hit, at), (integer)(0));
+    integer placed = sel_i(instance > 0, instance - 1, (integer)(0)) * INSTANCE_ROW_WORDS;
+    v->object = sel_i(instance > 0, instance_row_row(scene.instances, placed).number, v->object);
+#endif
+    mask many = (shape.kind == 0) | ((shape.flags & SHAPE_MANY) != 0);
+    integer own = load_hit_prim(hit, at) - shape.prim;
+    v->primitive = sel_i(active & many, own, (integer)(0));
+    int rows = scene.settings->primitive_rows;
+    if (rows) { /* by the caller's numbers of faces, or strands */
+        integer place = as_integer(gather(scene.distributions, rows + row));
+        mask listed = active & (place > 0);
+        integer told = as_integer(gather(scene.distributions, sel_i(listed, place + own, (integer)(0))));
+        v->primitive = sel_i(listed, told, v->primitive);
+    }
+}
+
+/* Twin, where no layer needs identifiers. */
+inline void vertex_names(Scene scene, Slab hit, uint at, mask active, Vertex *v) {}

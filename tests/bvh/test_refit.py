@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from clpt import bvh
-from clpt.testing.rounding import contracts
+from clpt.testing.probe import contracts
 
 MISS = 0xFFFFFFFF
 LAYOUTS = [*bvh.LAYOUTS]

@@ -228,17 +228,17 @@ inline int shape_intersect(ShapeTable table, uint prim, float3 o, float3 d, floa
     *t = at;
     return 1;
 }}
-#include "bvh/{layout}.cl"
-#include "bvh/shapes.cl"
+#include "bvh/shapes.cl#{step}"
 kernel void closest(global const float *nodes, global const uint *indices, ShapeTable table,
                     global const float8 *rays, global float2 *hits, global int *met)
 {{
     uint i = get_global_id(0);
     float8 r = rays[i];
     float t = r.s7;
-    uint prim = shapes_closest(nodes, indices, table, r.s0, r.s1, r.s2, r.s4, r.s5, r.s6, r.s3, &t);
+    uint prim = shapes_trace(nodes, indices, table, r.s012, r.s456, r.s3, &t, 0);
     hits[i] = (float2)(t, as_float(prim));
-    met[i] = shapes_occluded(nodes, indices, table, r.s0, r.s1, r.s2, r.s4, r.s5, r.s6, r.s3, r.s7);
+    t = r.s7;
+    met[i] = shapes_trace(nodes, indices, table, r.s012, r.s456, r.s3, &t, 1) != BVH_MISS;
 }}
 """
 
@@ -261,7 +261,8 @@ def test_tree_over_shapes(device, count, layout):
     nearest = t.min(1, initial=np.inf)
     sure = (np.abs(b**2 - c) > 1e-5).all(1) & (np.abs(t - 1e-4) > 1e-4).all(1)
 
-    program = dev.build(device, dev.assemble("test", {"test": SPHERES.format(layout=layout)}))
+    text = SPHERES.format(step=layout.removeprefix("shapes_"))
+    program = dev.build(device, dev.assemble("test", {"test": text}))
     kernel = program.kernel("closest")
     hits, met = np.zeros((2000, 2), np.float32), np.zeros(2000, np.int32)
     upload, download = _buffers(device)

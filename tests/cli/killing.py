@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from clpt.cli.display import Display
 from clpt.cli.files import checkpoints
 from clpt.cli.files.targets import CHECKPOINT
 from clpt.files.output_files import PARTIAL
@@ -100,7 +101,9 @@ def wait_for(moment: str, folder: Path, path: Path, rng: random.Random) -> None:
 def last_film(path: Path, figures: Figures) -> SavedFilm | None:
     """The film that a render would go on with. Raises SceneError if a file is lost."""
     notes: list[str] = []
-    saved = checkpoints.find(path, None, notes.append)
+    shown = Display()
+    shown.note = notes.append
+    saved = checkpoints.find(path, None, shown)
     figures.former += bool(notes)
     return saved
 

@@ -10,7 +10,7 @@ import pytest
 from clpt import images
 from clpt.__main__ import run
 from clpt.images import spectral_exr
-from clpt.images.differences import EPSILON, differences
+from clpt.images.measures import EPSILON, differences
 from clpt.images.spectral_exr import SpectralImage
 
 RNG = np.random.default_rng(4)

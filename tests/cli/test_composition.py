@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from clpt import images, transforms
 from clpt.__main__ import run
 from clpt.cli.options.applied import changed, composed
-from clpt.cli.options.changes import SceneChanges
-from clpt.cli.options.composition import CameraType, Composition, CropType, Orbit
+from clpt.cli.options.changes import CameraType, CropType, SceneChanges
 from clpt.errors import SceneError
 from clpt.formats import brought, load
 from clpt.scene import Film, Scene, cameras, framing, lights, shapes
@@ -26,7 +25,7 @@ CORNELL = str(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
 
 
 def seen_from(scene: Scene, *orbit: float) -> cameras.Camera:
-    return composed(scene, Composition(camera=Orbit(*orbit))).camera
+    return composed(scene, SceneChanges(camera=(*orbit, 1.0)[:3])).camera
 
 
 @pytest.fixture
@@ -83,11 +82,11 @@ def test_an_stl_stands_upright(tmp_path):
 
 def test_an_image_takes_the_place_of_sky_and_studio(scenes, sky):
     studio = load(scenes / "bowl.obj")
-    made = composed(studio, Composition(env=sky))
+    made = composed(studio, SceneChanges(env=sky))
     assert [light.kind for light in made.lights] == ["envmap"]
     assert [shape.kind for shape in made.shapes] == ["mesh"] and len(studio.shapes) == 3
     own = dataclasses.replace(studio, extra={}, lights=[lights.Constant(), lights.Point()])
-    made = composed(own, Composition(env=sky, env_rotation=90.0))
+    made = composed(own, SceneChanges(env=sky, env_rotation=90.0))
     assert [light.kind for light in made.lights] == ["point", "envmap"] and len(made.shapes) == 3
     ahead = np.asarray(made.lights[1].to_world) @ (0, 0, 1, 0)  # the middle of the image
     assert np.allclose(ahead, (1, 0, 0, 0))  # where azimuth 90 is
@@ -147,10 +146,10 @@ def test_surroundings_that_clpt_brings_are_found_in_any_folder(tmp_path, monkeyp
     scene, sky = load(CORNELL), Path("scenes/poppy_field/sky.exr")
     monkeypatch.chdir(tmp_path)
     assert brought(sky) != sky and brought(Path("none.hdr")) == Path("none.hdr")
-    made = composed(scene, Composition(env=sky))
+    made = composed(scene, SceneChanges(env=sky))
     assert made.lights[-1].kind == "envmap"
     with pytest.raises(SceneError):  # a name that no file system takes
-        composed(scene, Composition(env=Path("scenes/poppy_field/" + 300 * "x" + ".hdr")))
+        composed(scene, SceneChanges(env=Path("scenes/poppy_field/" + 300 * "x" + ".hdr")))
     sky.parent.mkdir(parents=True)
     sky.touch()
     assert brought(sky) == sky  # the user's own file comes first
@@ -162,7 +161,7 @@ def test_surroundings_that_clpt_brings_are_found_in_any_folder(tmp_path, monkeyp
         (["--camera", "10,100"], "the elevation is -90 to 90 degrees, not 100"),
         (["--camera", "10,20,0"], "the distance is 0.001 to 1e+06, not 0; 1 frames all"),
         (["--camera", "1,2,3,4"], "does not look like 45,20"),
-        (["--camera", "front"], "only .xml and glTF have cameras to choose from, no 'front'"),
+        (["--camera", "front"], "only .xml, glTF and USD have cameras to choose from, no 'front'"),
         (["--camera", "front", "-D", "camera=a"], "-D camera= says it already"),
         (["--crop", "1:2"], "does not look like 100:200,50:150"),
         (["--crop", "1.5:2,0:1"], "pixels are whole numbers"),
@@ -187,7 +186,7 @@ def test_any_text_is_a_value_or_is_refused(text):
         except click.BadParameter as error:
             assert error.format_message()
             continue
-        if isinstance(made, Orbit):
+        if isinstance(made, tuple):
             assert math.isfinite(made.azimuth) and abs(made.elevation) <= 90.0
         elif isinstance(made, tuple):
             try:
@@ -200,7 +199,7 @@ def test_any_text_is_a_value_or_is_refused(text):
 def test_a_camera_that_flattens_space_has_no_up():
     """It matters only to who asks for it."""
     scene = Scene(camera=cameras.Matrix(view=np.zeros((4, 4))), shapes=[shapes.Sphere()])
-    assert composed(scene, Composition()) is scene
+    assert composed(scene, SceneChanges()) is scene
     with pytest.raises(SceneError, match="its up is not known"):
         seen_from(scene, 0.0, 0.0)
 

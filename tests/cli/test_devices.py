@@ -10,8 +10,8 @@ from rich.console import Console
 
 from clpt import device
 from clpt.__main__ import run
-from clpt.cli.printing.devices import table
-from clpt.cli.printing.names import device_name
+from clpt.cli.devices import table
+from clpt.cli.display import device_name
 
 
 def test_table(capsys):

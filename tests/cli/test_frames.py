@@ -14,9 +14,9 @@ from PIL import Image
 
 from clpt import device, images
 from clpt.__main__ import run
-from clpt.cli.opening import factories
+from clpt.cli import opening
 from clpt.cli.render import frames as frames_module
-from clpt.cli.render.frame_values import Frames, expanded, numbered
+from clpt.cli.render.settings import Frames, expanded, numbered
 from clpt.device.stream import Stream
 
 SIZE = ["--size", "16x12", "--spp", "2", "--mode", "rgb"]
@@ -145,13 +145,13 @@ def two_devices(monkeypatch) -> list[device.Device]:
 @pytest.mark.parametrize("count", [1, 5])
 def test_several_devices(scene, tmp_path, two_devices, monkeypatch, count):
     """A frame is a device's, but where there are fewer frames than devices."""
-    used, original = set(), factories.new_renderer
+    used, original = set(), opening.new_renderer
 
     def note(plan, devices, **made):
         used.add(len(devices))
         return original(plan, devices, **made)
 
-    monkeypatch.setattr(factories, "new_renderer", note)
+    monkeypatch.setattr(opening, "new_renderer", note)
     assert run(["render", "turn.xml", "--frames", f"1:{count}", *TURN, *SIZE]) == 0
     assert used == {2 if count == 1 else 1}
     for frame in range(1, count + 1):

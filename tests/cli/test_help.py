@@ -14,8 +14,8 @@ import pytest
 from clpt import choices
 from clpt.bvh import layouts
 from clpt.cli import COMMANDS, cli
-from clpt.cli.options.headings import HEADINGS, OTHER, Grouped
-from clpt.images.colour import tones
+from clpt.cli.options.records import HEADINGS, OTHER, Grouped
+from clpt.images import colour
 from clpt.render.film import layer_channels
 from clpt.scene import kinds
 from clpt.scene.layers import LAYERS
@@ -106,7 +106,7 @@ def test_choices_are_the_names_of_what_there_is() -> None:
         "SPACES": spaces.SPACES,
         "LAYOUTS": layouts.LAYOUTS,
         "TREES": layouts.TREES,
-        "TONES": tones.TONES,
+        "TONES": colour.TONES,
         "CHANNEL_NAMES": layer_channels.SETS,
     }
     for name, table in tables.items():

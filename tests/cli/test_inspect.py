@@ -12,7 +12,7 @@ from PIL import Image
 
 from clpt import images
 from clpt.__main__ import run
-from clpt.cli.plots.pixels import strip
+from clpt.cli.plots import strip
 from clpt.images import spectral_exr
 from clpt.images.spectral_exr import SpectralImage
 from clpt.render.renderer import Renderer
@@ -130,8 +130,8 @@ def test_the_strip_is_a_rainbow():
 def test_without_matplotlib_the_extra_is_named(here, capsys, monkeypatch):
     """The values are printed all the same."""
     spectral_exr.write("a.exr", SpectralImage(VALUES, NM))
-    monkeypatch.delitem(sys.modules, "clpt.cli.plots.pixels")
-    monkeypatch.delattr("clpt.cli.plots.pixels")
+    monkeypatch.delitem(sys.modules, "clpt.cli.plots")
+    monkeypatch.delattr("clpt.cli.plots")
     monkeypatch.setitem(sys.modules, "matplotlib.axes", None)
     assert run(["inspect", "a.exr", "--at", "0,0"]) == 0
     assert capsys.readouterr().err == ""

@@ -13,8 +13,8 @@ import pytest
 
 from clpt import images
 from clpt.__main__ import run
+from clpt.cli import opening
 from clpt.cli.files import checkpoints, outputs, targets
-from clpt.cli.opening import factories, scenes
 from clpt.cli.options import scene_options
 from clpt.cli.process import stopping
 from clpt.cli.render import picture
@@ -26,10 +26,10 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 POINTS = {
     "outputs are checked": (targets, "checked", False),
     "a film is looked for": (checkpoints, "find", False),
-    "the device is opened": (scenes, "share_compilers", False),
+    "the device is opened": (opening, "share_compilers", False),
     "the scene is read": (scene_options, "load", False),
-    "the scene is checked": (scenes, "check", False),
-    "kernels are built": (factories, "new_renderer", False),
+    "the scene is checked": (opening, "check", False),
+    "kernels are built": (opening, "new_renderer", False),
     "checkpoints begin": (checkpoints.Checkpoints, "__init__", False),
     "samples are taken": (picture, "render_samples", False),
     "a film is saved": (checkpoints.Checkpoints, "save", True),
@@ -75,12 +75,12 @@ def test_a_signal_at_each_point(tmp_path, monkeypatch, capsys, heeded, point, nu
 
 BUILDING = """
 import hashlib, sys
-import clpt.cli.opening.factories as factories
+import clpt.cli.opening as opening
 from clpt.__main__ import main
 def build(*_, **__):  # C, that no signal ends
     print("builds", file=sys.stderr, flush=True)
     hashlib.pbkdf2_hmac("sha256", b"", b"", 2_000_000_000)
-factories.new_renderer = build
+opening.new_renderer = build
 main()
 """
 

@@ -11,8 +11,8 @@ import pytest
 
 import clpt
 from clpt.__main__ import run
+from clpt.cli.options.records import Handler
 from clpt.cli.options.values import MOST_SAMPLES, Count, Noise
-from clpt.cli.options.verbosity import Handler
 from clpt.device import context
 from clpt.errors import SceneError
 from clpt.render.flow.scene_to_tables import lower

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from clpt.cli import COMMANDS, cli
 from clpt.cli.inspect import PixelType
 from clpt.cli.options.applied import changed
-from clpt.cli.options.changes import SceneChanges
-from clpt.cli.options.composition import CameraType, CropType
-from clpt.cli.options.loading_options import Bytes
+from clpt.cli.options.changes import CameraType, CropType, SceneChanges
+from clpt.cli.options.loading import Bytes
+from clpt.cli.options.scene_options import Where
 from clpt.cli.options.values import (
     Count,
     LightPaths,
@@ -25,9 +25,7 @@ from clpt.cli.options.values import (
     Stops,
     White,
 )
-from clpt.cli.options.workers import Where
-from clpt.cli.render.frame_values import Frames
-from clpt.cli.render.settings import Address, Duration, Period, SampleRange
+from clpt.cli.render.settings import Address, Duration, Frames, Period, SampleRange
 from clpt.errors import SceneError
 from clpt.scene import Scene
 from clpt.scene.cameras import Perspective

@@ -30,7 +30,7 @@ from clpt.cli.render.passes import render_samples
 from clpt.errors import DeviceError, SceneError
 from clpt.formats import load
 from clpt.images import exr_files, spectral_exr
-from clpt.images.colour.view import View
+from clpt.images.colour import View
 from clpt.render.film import film_file
 from clpt.render.renderer import Renderer
 from clpt.spectra import read_sensor
@@ -316,7 +316,7 @@ def test_the_renderer_gets_the_tree_that_was_asked_for(given, told, monkeypatch,
     def refuse(*_, tree_quality, layout, **__):
         raise SceneError(f"{tree_quality} {layout}")
 
-    monkeypatch.setattr(sys.modules["clpt.cli.opening.factories"], "Renderer", refuse)
+    monkeypatch.setattr(sys.modules["clpt.cli.opening"], "Renderer", refuse)
     assert run(["render", CORNELL, "--quiet", *given]) == 2
     assert f"clpt: error: {told}" in capsys.readouterr().err
 

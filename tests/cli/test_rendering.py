@@ -12,10 +12,9 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
-from clpt.cli.opening.factories import DEVICE_SECONDS
-from clpt.cli.printing import display
-from clpt.cli.printing.display import Bar, Lines, clock, figures
-from clpt.cli.printing.names import device_name, device_names
+from clpt.cli import display
+from clpt.cli.display import Bar, Lines, clock, device_name, device_names, figures
+from clpt.cli.opening import DEVICE_SECONDS
 from clpt.cli.process import stopping
 from clpt.cli.render import report
 from clpt.cli.render.passes import GROWTH, End, pass_size, render_samples

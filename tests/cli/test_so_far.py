@@ -9,10 +9,11 @@ import pytest
 
 from clpt import images
 from clpt.__main__ import run
+from clpt.cli.display import Display
 from clpt.cli.files import outputs
 from clpt.cli.options.grading import Grading
-from clpt.cli.render import so_far
-from clpt.cli.render.so_far import PictureSoFar
+from clpt.cli.render import picture
+from clpt.cli.render.picture import PictureSoFar
 from clpt.errors import SceneError
 
 CORNELL = str(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
@@ -23,7 +24,7 @@ COMMON = ["--size", "8x6", "--mode", "rgb"]
 def clock(monkeypatch):
     """A clock that is set by hand."""
     now = [100.0]
-    monkeypatch.setattr(so_far.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(picture.time, "monotonic", lambda: now[0])
     return now
 
 
@@ -48,15 +49,14 @@ def test_every_format_while_it_renders(tmp_path, monkeypatch):
 def test_it_waits_for_its_time(clock, monkeypatch):
     written = []
     monkeypatch.setattr(outputs, "write", lambda path, *rest: written.append(clock[0]))
-    made = PictureSoFar(30.0, (Path("a.png"),), None, dict, Grading(), pytest.fail)
-    for now in (101.0, 129.0, 131.0, 140.0, 160.0, 161.0):
-        clock[0] = now
-        made.after_pass()
+    so_far = PictureSoFar(30.0, (Path("a.png"),), None, Grading(), Display())
+    for clock[0] in (101.0, 129.0, 131.0, 140.0, 160.0, 161.0):
+        if so_far.is_due:
+            so_far.write({})
     assert written == [131.0, 161.0]
-    never = PictureSoFar(None, (Path("a.png"),), None, dict, Grading(), pytest.fail)
+    never = PictureSoFar(None, (Path("a.png"),), None, Grading(), Display())
     clock[0] = 1e9
-    never.after_pass()
-    assert len(written) == 2
+    assert not never.is_due
 
 
 def test_what_cannot_be_written_is_told_once(clock, monkeypatch):
@@ -67,10 +67,12 @@ def test_what_cannot_be_written_is_told_once(clock, monkeypatch):
             raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(outputs, "write", write)
-    made = PictureSoFar(1.0, (Path("a.png"), Path("b.exr")), None, dict, Grading(), told.append)
+    shown = Display()
+    shown.note = told.append
+    so_far = PictureSoFar(1.0, (Path("a.png"), Path("b.exr")), None, Grading(), shown)
     for failing[0] in (True, True, False, True):
         clock[0] += 10.0
-        made.after_pass()
+        so_far.write({})
     assert len(told) == 4 and "a.png: cannot be written: [Errno 28]" in told[0]
     assert all(text.endswith("the render goes on") for text in told)
 

@@ -20,8 +20,8 @@ from PIL import Image
 import clpt
 from clpt import errors
 from clpt.__main__ import run
-from clpt.cli.options.verbosity import Handler
-from clpt.cli.printing import display as displays
+from clpt.cli import display as displays
+from clpt.cli.options.records import Handler
 from clpt.cli.process import failures, terminal
 from clpt.errors import ClptError
 

@@ -18,7 +18,7 @@ from machines import LONGEST, client_of, machines, wait_until  # noqa: E402
 
 from clpt import images  # noqa: E402
 from clpt.__main__ import run  # noqa: E402
-from clpt.cli.opening.factories import ClusterFactory  # noqa: E402
+from clpt.cli.opening import ClusterFactory  # noqa: E402
 
 SIZE = ["--size", "16x12", "--mode", "rgb"]
 TURN = ["-D", "angle={10*(frame-2)}"]

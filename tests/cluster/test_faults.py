@@ -34,7 +34,7 @@ from machines import (  # noqa: E402
     wait_until,
 )
 
-from clpt.cluster import keys, processes, tasks  # noqa: E402
+from clpt.cluster import processes, tasks  # noqa: E402
 from clpt.cluster.cluster_renderer import ClusterRenderer  # noqa: E402
 from clpt.errors import ClusterError  # noqa: E402
 
@@ -208,7 +208,7 @@ def test_a_scheduler_that_is_killed(tmp_path):
         scheduler(tmp_path) as (process, address),
         workers(address, 2, *keyed(tmp_path)) as started,
     ):
-        security = keys.security(tmp_path)
+        security = processes.security(tmp_path)
         client = Client(address, security=security)
         with client, ClusterRenderer(scene(), client) as renderer:
 
@@ -237,7 +237,7 @@ def test_a_client_that_is_killed(tmp_path):
         with client_of([*command, *more], tmp_path) as client:
             while "spp/s" not in (line := client.stderr.readline()) and "samples" not in line:
                 assert line, client.wait()
-        other = Client(address, security=keys.security(tmp_path))
+        other = Client(address, security=processes.security(tmp_path))
         with other, ClusterRenderer(scene(), other) as renderer:
             began = time.monotonic()
             assert renderer.run(100)

@@ -30,7 +30,6 @@ from clpt.errors import SceneError
 from clpt.render.film import film_file
 from clpt.render.film.pictures import Pictures
 from clpt.render.film.saved_film import SavedFilm
-from clpt.render.pictures import DevicePictures
 from clpt.render.resumable import ResumableRenderer
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene, shapes
@@ -117,7 +116,7 @@ PLANS = {
     "noise_lights": Plan(WIDE, LIGHT_PATHS, noise=NOISE),
 }
 MAKERS = ("device", "devices", "cluster")
-Maker = Callable[..., DevicePictures]
+Maker = Callable[..., ResumableRenderer]
 
 
 def of_plans(which: Callable[[Plan], bool] = lambda plan: True) -> pytest.MarkDecorator:
@@ -171,9 +170,9 @@ def make(request: pytest.FixtureRequest, plan: Plan) -> Iterator[Maker]:
     """Make a renderer of the film, whose samples are taken by one of MAKERS."""
     with ExitStack() as opened:
 
-        def made(name: str, first_sample: int = 0, **more: int) -> DevicePictures:
+        def made(name: str, first_sample: int = 0, **more: int) -> ResumableRenderer:
             given = {"halves": plan.halves, "first_sample": first_sample, **more}
-            renderer: DevicePictures
+            renderer: ResumableRenderer
             if name == "device":
                 renderer = clpt.Renderer(plan.scene, **given)
             elif name == "devices":
@@ -255,7 +254,7 @@ def check_film(found: clpt.FilmState, wanted: clpt.FilmState) -> None:
     assert (found.taken, found.scale) == (wanted.taken, wanted.scale)
 
 
-def check(source: DevicePictures | SavedFilm, whole: Whole) -> None:
+def check(source: ResumableRenderer | SavedFilm, whole: Whole) -> None:
     """Check that a film, its pictures and its figures are those of one run."""
     saved = source.saved_film()
     check_film(saved.film, whole.saved.film)
@@ -263,7 +262,7 @@ def check(source: DevicePictures | SavedFilm, whole: Whole) -> None:
     check_arrays(pictures(source), whole.pictures)
 
 
-def check_counts(renderer: DevicePictures, whole: Whole) -> None:
+def check_counts(renderer: ResumableRenderer, whole: Whole) -> None:
     counts, wanted = renderer.counts, Counts(**whole.saved.counts)
     for name in ("samples", "rays", "rejected", "full"):  # a cluster does not tell rays apart
         assert getattr(counts, name) == getattr(wanted, name), name

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="modes of POSIX"
 sys.path.insert(0, str(Path(__file__).parent))
 from machines import ENVIRONMENT, LONGEST, ROOT, machines, wait_until  # noqa: E402
 
-from clpt.cluster import keys, processes  # noqa: E402
+from clpt.cluster import processes  # noqa: E402
 from clpt.errors import ClusterError  # noqa: E402
 
 BOX = str(ROOT / "scenes/cornell_box")
@@ -37,7 +37,7 @@ def context(folder: Path | None) -> ssl.SSLContext:
     found = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     found.check_hostname, found.verify_mode = False, ssl.CERT_NONE
     if folder is not None:
-        found.load_cert_chain(folder / keys.FILE)
+        found.load_cert_chain(folder / processes.KEYS_FILE)
     return found
 
 
@@ -122,7 +122,7 @@ def test_nobody_without_the_keys_gets_an_answer(three, tmp_path):
     wait_until(lambda: len(listening(*started)) == 4, "four listeners")
     found = listening(*started)
     assert len({process for process, _ in found}) == 4, "a process listens at two ports"
-    keys.make(tmp_path / "foreign")
+    processes.make_keys(tmp_path / "foreign")
     strangers = None, context(None), context(tmp_path / "foreign")  # TCP, TLS, with other keys
     requests = (b"GET /info/main/workers.html HTTP/1.0\r\n\r\n", bytes(8), b"")
     asked = list(itertools.product((port for _, port in found), strangers, requests))
@@ -198,7 +198,7 @@ async def everything_asked(folder: Path, foreign: Path, scratch: Path) -> list[s
                         await comm.write({"op": name, "reply": True, "asked": True})
                         await asyncio.wait_for(comm.read(), 5)
             assert not heard
-            mine = keys.security(folder).get_connection_args("client")
+            mine = processes.security(folder).get_connection_args("client")
             comm = await connect(scheduler.address, **mine)
             await comm.write({"op": "identity", "reply": True, "asked": True})
             assert (await comm.read())["type"] == "Scheduler"
@@ -209,8 +209,8 @@ async def everything_asked(folder: Path, foreign: Path, scratch: Path) -> list[s
 
 def test_whatever_dask_can_do_is_behind_the_keys(tmp_path, capsys):
     """Every handler of scheduler and worker, with those of their extensions, by name."""
-    keys.make(tmp_path / "own")
-    keys.make(tmp_path / "foreign")
+    processes.make_keys(tmp_path / "own")
+    processes.make_keys(tmp_path / "foreign")
     names = asyncio.run(everything_asked(tmp_path / "own", tmp_path / "foreign", tmp_path))
     print(*names, sep="\n")
     assert {"Scheduler.identity", "Worker.run", "Worker.update_data"} <= set(names)
@@ -255,7 +255,7 @@ def test_what_was_said_cannot_be_said_again(tmp_path):
         port = int(client.scheduler.address.rpartition(":")[2])
         with recording(port, said) as there:
             address = f"tls://127.0.0.1:{there.getsockname()[1]}"
-            with Client(address, security=keys.security(folder)) as other:
+            with Client(address, security=processes.security(folder)) as other:
                 other.run_on_scheduler(tell_again, told)
         assert told.read_text() == "once" and sum(map(len, said)) > 2000
         for bytes_of_one in said:
@@ -284,27 +284,27 @@ def test_a_folder_that_others_made_is_not_used(tmp_path, monkeypatch):
 
 def test_keys_are_this_user_s_alone(tmp_path):
     folder = tmp_path / "keys"
-    keys.make(folder)
-    path = folder / keys.FILE
+    processes.make_keys(folder)
+    path = folder / processes.KEYS_FILE
     content = path.read_bytes()
-    keys.make(folder)
+    processes.make_keys(folder)
     assert path.read_bytes() == content, "they stay"
     assert [path] == list(folder.iterdir())
     assert folder.stat().st_mode & 0o777 == 0o700 and path.stat().st_mode & 0o777 == 0o600
-    assert keys.security(folder).require_encryption
+    assert processes.security(folder).require_encryption
     path.chmod(0o640)
     with pytest.raises(ClusterError, match="is open to others"):
-        keys.security(folder)
+        processes.security(folder)
     path.chmod(0o600)
     folder.chmod(0o770)
     with pytest.raises(ClusterError, match="is open to others"):
-        keys.security(folder)
+        processes.security(folder)
     folder.chmod(0o700)
     path.write_text("no keys")
     with pytest.raises(ClusterError, match="holds no keys"):
-        keys.security(folder)
+        processes.security(folder)
     with pytest.raises(ClusterError, match="clpt cluster start makes them"):
-        keys.security(tmp_path)
+        processes.security(tmp_path)
     (tmp_path / "file").touch()
     with pytest.raises(ClusterError, match="keys cannot be written"):
-        keys.make(tmp_path / "file")
+        processes.make_keys(tmp_path / "file")

@@ -11,7 +11,8 @@ import pyopencl as cl
 import pytest
 
 from clpt import device
-from clpt.device import DeviceArray, dlpack
+from clpt.device import DeviceArray
+from clpt.device import array as arrays
 
 VALUES = np.arange(24, dtype=np.float32).reshape(2, 3, 4)
 
@@ -36,7 +37,7 @@ def taken(capsule):
     rename = ctypes.pythonapi.PyCapsule_SetName
     rename.argtypes = (ctypes.py_object, ctypes.c_char_p)
     rename(capsule, b"used_dltensor")
-    return dlpack._Managed.from_address(address)
+    return arrays._Managed.from_address(address)
 
 
 def test_numpy_gets_a_copy(array):
@@ -73,18 +74,18 @@ def test_dlpack_of_a_cpu_is_numpys(array, opened):
 def test_dlpack_of_another_device_is_opencls(array, monkeypatch):
     """As a GPU has it: its memory for who knows OpenCL, a copy for who asks for the CPU."""
     monkeypatch.setattr(DeviceArray, "_in_host_memory", False)
-    assert array.__dlpack_device__()[0] == dlpack.OPENCL
-    assert taken(array.__dlpack__()).tensor.device_type == dlpack.OPENCL
+    assert array.__dlpack_device__()[0] == arrays.OPENCL
+    assert taken(array.__dlpack__()).tensor.device_type == arrays.OPENCL
     with pytest.raises((BufferError, RuntimeError)):
         np.from_dlpack(array)
     np.testing.assert_array_equal(np.from_dlpack(array, device="cpu"), VALUES)
     with pytest.raises(BufferError, match="only by a copy"):
-        array.__dlpack__(dl_device=(dlpack.CPU, 0), copy=False)
+        array.__dlpack__(dl_device=(arrays.CPU, 0), copy=False)
 
 
 def test_dlpack_of_opencl_memory(array, opened):
     """The capsule tells the cl_mem, and keeps it alive until its consumer calls the deleter."""
-    on = (dlpack.OPENCL, opened.context.devices.index(opened.queue.device))
+    on = (arrays.OPENCL, opened.context.devices.index(opened.queue.device))
     capsule = array.__dlpack__(dl_device=on)
     managed = taken(capsule)
     tensor, address = managed.tensor, ctypes.addressof(managed)
@@ -94,23 +95,23 @@ def test_dlpack_of_opencl_memory(array, opened):
     assert tensor.strides[: tensor.ndim] == [12, 4, 1]
     del array, capsule
     gc.collect()
-    assert address in dlpack._owned
+    assert address in arrays._owned
     buffer = cl.Buffer.from_int_ptr(tensor.data, True)
     host = np.empty_like(VALUES)
     cl.enqueue_copy(opened.queue, host, buffer)
     np.testing.assert_array_equal(host, VALUES)
     managed.deleter(address)
-    assert address not in dlpack._owned
+    assert address not in arrays._owned
 
 
 def test_capsules_that_nobody_takes_keep_nothing(array):
     """One may wait for the next that is made, however many there were."""
-    before = len(dlpack._owned)
+    before = len(arrays._owned)
     for _ in range(5):
         array.__dlpack__(dl_device=array._opencl_device, copy=True)
-    assert len(dlpack._owned) <= before + 1
+    assert len(arrays._owned) <= before + 1
     held = [array.__dlpack__(dl_device=array._opencl_device) for _ in range(5)]
-    assert len(dlpack._owned) >= len(held)
+    assert len(arrays._owned) >= len(held)
 
 
 def test_dlpack_refuses_other_devices(array):
@@ -122,14 +123,14 @@ def test_dlpack_refuses_other_devices(array):
 def test_a_capsule_that_is_held_stays_however_python_counts(array, monkeypatch, fewer):
     """Some versions of Python borrow references where others count one more."""
     real = sys.getrefcount
-    monkeypatch.setattr(dlpack.sys, "getrefcount", lambda one: real(one) - 1 - fewer)
-    monkeypatch.setattr(dlpack, "_owned", {})
-    on = (dlpack.OPENCL, 0)
+    monkeypatch.setattr(arrays.sys, "getrefcount", lambda one: real(one) - 1 - fewer)
+    monkeypatch.setattr(arrays, "_owned", {})
+    on = (arrays.OPENCL, 0)
     held = array.__dlpack__(dl_device=on)
     array.__dlpack__(dl_device=on)  # nobody takes it
-    assert len(dlpack._owned) == 2
-    dlpack._sweep()
-    assert [entry[-1] for entry in dlpack._owned.values()] == [held]
+    assert len(arrays._owned) == 2
+    arrays._sweep()
+    assert [entry[-1] for entry in arrays._owned.values()] == [held]
     del held
-    dlpack._sweep()
-    assert not dlpack._owned
+    arrays._sweep()
+    assert not arrays._owned

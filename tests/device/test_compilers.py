@@ -14,7 +14,7 @@ import pyopencl as cl
 import pytest
 
 from clpt import device as dev
-from clpt.device import compile_limits, compilers, disk_cache, native_programs
+from clpt.device import compilers, disk_cache, native_programs
 from clpt.device.compilers import Compilers, Job
 from clpt.device.program import Argument
 from clpt.errors import DeviceError, KernelBuildError
@@ -158,18 +158,18 @@ def test_a_compiler_that_hangs_is_ended_and_named(monkeypatch: pytest.MonkeyPatc
 
 def test_a_compiler_of_this_process_that_hangs_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
-    monkeypatch.setattr(compile_limits, "at_limit", said.append)
-    monkeypatch.setenv(compile_limits.VARIABLE, "0.05")
+    monkeypatch.setattr(compilers, "at_limit", said.append)
+    monkeypatch.setenv(compilers.VARIABLE, "0.05")
     source = dev.Source("stage/shade.cl", "", ())
-    with compile_limits.watched(source):
+    with compilers.watched(source):
         while not said:
             pass
     assert "'stage/shade.cl'" in said[0]
-    monkeypatch.setenv(compile_limits.VARIABLE, "0")
-    assert compile_limits.seconds_for(source) == math.inf
-    monkeypatch.setenv(compile_limits.VARIABLE, "long")
+    monkeypatch.setenv(compilers.VARIABLE, "0")
+    assert compilers.seconds_for(source) == math.inf
+    monkeypatch.setenv(compilers.VARIABLE, "long")
     with pytest.raises(DeviceError, match="CLPT_COMPILE_SECONDS is a number of seconds"):
-        compile_limits.seconds_for(source)
+        compilers.seconds_for(source)
 
 
 def test_python_goes_on_while_a_binary_is_made(opened: dev.Device) -> None:

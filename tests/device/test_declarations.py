@@ -12,7 +12,7 @@ import pytest
 
 import clpt
 from clpt import device as dev
-from clpt.device import declarations, native_programs
+from clpt.device import building, native_programs
 from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.render.wavefront import guide, photons
 from clpt.scene import Film
@@ -23,7 +23,7 @@ needs_clang = pytest.mark.skipif(CLANG is None, reason="clang is not installed")
 
 
 def check(given: Iterable[str]) -> None:
-    found = errors([declarations.declarations() + text for text in given], functions=OURS)
+    found = errors([building.declarations() + text for text in given], functions=OURS)
     assert found
     for error in found:
         assert not error, error[:3000]
@@ -74,7 +74,7 @@ def test_what_is_not_declared_is_tried_with_the_header(value: str, tries: int) -
         return native_programs.build(on.context, on.info.cl_device, text, flags)
 
     text = f"kernel void given(global float *out) {{ out[0] = {value}; }}"
-    program = declarations.built(on, text, ["-cl-std=CL1.2"], build)
+    program = building.first_built(on, text, ["-cl-std=CL1.2"], build)
     assert len(made) == tries
     out, found = cl.Buffer(on.context, cl.mem_flags.READ_WRITE, 4), np.empty(1, np.float32)
     program.given(on.queue, (1,), (1,), out)
@@ -83,6 +83,6 @@ def test_what_is_not_declared_is_tried_with_the_header(value: str, tries: int) -
 
 
 def test_no_macro_is_left() -> None:
-    text = declarations.declarations()
+    text = building.declarations()
     left = {line.split()[1].partition("(")[0] for line in text.splitlines() if "#define" in line}
     assert left == {line.split()[1] for line in text.splitlines() if "#undef" in line}

@@ -15,7 +15,7 @@ import pytest
 import clpt
 from clpt import device
 from clpt.bench import bandwidth
-from clpt.device import building, compile_limits, native_programs, program
+from clpt.device import building, compilers, native_programs, program
 from clpt.render.wavefront import bounce_loop
 from clpt.render.wavefront.bounce_loop import LEAST_ITEMS
 from clpt.scene import Film, Scene, cameras, integrators, lights, materials, shapes
@@ -244,8 +244,8 @@ def test_a_compiler_that_takes_minutes_is_named(
             pass
         return build(context, on, code, options)
 
-    monkeypatch.setenv(compile_limits.VARIABLE, "0.05")
-    monkeypatch.setattr(compile_limits, "at_limit", said.append)
+    monkeypatch.setenv(compilers.VARIABLE, "0.05")
+    monkeypatch.setattr(compilers, "at_limit", said.append)
     monkeypatch.setattr(native_programs, "build", slow)
     monkeypatch.setattr(building, "_known", lambda *_: None)
     assert np.array_equal(rendered(scene, BadDevice()), picture)

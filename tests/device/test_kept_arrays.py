@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt.device import kept_arrays
+from clpt.device import buffers
 
 
 def test_what_was_made_before_is_read(tmp_path: Path, cache_folder: Path) -> None:
@@ -18,7 +18,7 @@ def test_what_was_made_before_is_read(tmp_path: Path, cache_folder: Path) -> Non
         return np.full((2, 3), number), np.array(others, np.float32)
 
     def kept(*given: object) -> tuple[np.ndarray, ...]:
-        return kept_arrays.kept(make, *given, files=[code])
+        return buffers.kept(make, *given, files=[code])
 
     first, again = kept(0.1, (1, 2)), kept(0.1, (1, 2))
     assert made == [0.1] and len(again) == 2

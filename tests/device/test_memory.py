@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from clpt.files import host_memory
+from clpt.files import budget
 
 GIB = 2**30
 
@@ -23,9 +23,9 @@ def test_pages_of_files_do_not_count_as_used(tmp_path, monkeypatch, limit, usage
     (tmp_path / usage).write_text(f"{GIB - 100}\n")
     stat = (tmp_path / usage).with_name("memory.stat")
     stat.write_text(f"anon 5\n{inactive} {2**20}\nactive_file 7\n")
-    assert host_memory.available(tmp_path) == 100 + 2**20
+    assert budget.free_memory(tmp_path) == 100 + 2**20
     (tmp_path / limit).write_text("max\n")
-    assert host_memory.available(tmp_path) == host_memory.available(tmp_path / "none")
+    assert budget.free_memory(tmp_path) == budget.free_memory(tmp_path / "none")
 
 
 @pytest.mark.parametrize("held_by", ["", "job", "job/step"])
@@ -48,4 +48,4 @@ def test_limits_of_all_groups_that_hold_the_process_count(
     group.mkdir(parents=True)
     for name, content in ((limit, GIB), (usage, GIB - 500), ("memory.stat", f"{inactive} 100")):
         (group / name).write_text(f"{content}\n")
-    assert host_memory.available(tmp_path / "groups", tmp_path / "own") == 600
+    assert budget.free_memory(tmp_path / "groups", tmp_path / "own") == 600

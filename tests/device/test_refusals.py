@@ -6,7 +6,7 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from clpt.device import Buffers, Stream, host_buffer, refusals
+from clpt.device import Buffers, Stream, host_buffer, runtimes
 from clpt.errors import DeviceError, MemoryBudgetError
 from tests.device.bad_device import driver_error
 
@@ -50,7 +50,7 @@ def test_commands(stream, device, monkeypatch, command, code, expected):
 
 
 def test_a_number_of_nvidias_is_explained():
-    error = refusals.refused("a command", driver_error(-9999))
+    error = runtimes.refused("a command", driver_error(-9999))
     assert "beyond its buffers" in str(error) and "new process" in str(error)
 
 
@@ -80,6 +80,6 @@ def test_a_command_that_the_driver_refuses_in_earnest(stream, device):
 
 
 def test_the_message_says_how_much_and_what_to_do():
-    error = refusals.refused("a copy", driver_error(CODE.OUT_OF_HOST_MEMORY), 3 << 20)
+    error = runtimes.refused("a copy", driver_error(CODE.OUT_OF_HOST_MEMORY), 3 << 20)
     assert str(error).startswith("a copy needs 3 MiB, the device has no more: lower the size")
     assert (error.asked, error.available) == (3 << 20, None)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from clpt.device import disk_cache, runtimes
-from clpt.files import output_files, ownership
+from clpt.files import output_files
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="this system has no such owners")
 OTHER = 65534
@@ -68,7 +68,10 @@ def test_no_cache_lies_where_others_can_write(
     found = where_caches_are()
     assert {"clpt", "XDG_CACHE_HOME", "POCL_CACHE_DIR"} <= found.keys()
     for folder in found.values():
-        assert folder.is_relative_to(place / "temporary") and ownership.fault(folder) is None
+        assert (
+            folder.is_relative_to(place / "temporary")
+            and output_files.ownership_fault(folder) is None
+        )
     assert len(caplog.records) == 1 and str(cache) in caplog.text
     assert "can be written by others" in caplog.text
 
@@ -101,7 +104,7 @@ def test_safe_caches_stay_where_they_are(place: Path, caplog: pytest.LogCaptureF
     home = place / "home" / ".cache"
     assert found == {"clpt": home / "clpt", "POCL_CACHE_DIR": home / "clpt" / "pocl"}
     made(place / "sticky", 0o1777)
-    assert ownership.fault(made(place / "sticky" / "x", 0o700)) is None
+    assert output_files.ownership_fault(made(place / "sticky" / "x", 0o700)) is None
     assert not caplog.text
 
 
@@ -114,7 +117,7 @@ def test_temporary_folders_are_safe_too(place: Path) -> None:
     """Where others can take away what lies in TMPDIR, another folder holds caches."""
     made(place / "temporary", 0o777)
     found = disk_cache.temporary_folder()
-    assert ownership.fault(found) is None and not found.is_relative_to(place)
+    assert output_files.ownership_fault(found) is None and not found.is_relative_to(place)
 
 
 def test_links_on_the_way_count(place: Path) -> None:
@@ -123,11 +126,11 @@ def test_links_on_the_way_count(place: Path) -> None:
     made(place / "open" / "x", 0o700)
     (place / "link").symlink_to("open/x")
     (place / "again").symlink_to(place / "link")
-    assert "others" in str(ownership.fault(place / "again"))
+    assert "others" in str(output_files.ownership_fault(place / "again"))
     (place / "round").symlink_to("round")
     with pytest.raises(OSError, match="symbolic links"):
-        ownership.followed(place / "round" / "a")
-    assert ownership.followed(place / "link" / ".." / "new") == place / "open" / "new"
+        output_files.followed(place / "round" / "a")
+    assert output_files.followed(place / "link" / ".." / "new") == place / "open" / "new"
 
 
 def test_folders_of_others_are_unsafe(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -135,8 +138,8 @@ def test_folders_of_others_are_unsafe(place: Path, monkeypatch: pytest.MonkeyPat
     if os.getuid() == 0:
         os.chown(place / "x", OTHER, OTHER)
     else:
-        monkeypatch.setattr(ownership.os, "getuid", lambda: os.geteuid() + 1)
-    assert "another user" in str(ownership.fault(folder))
+        monkeypatch.setattr(output_files.os, "getuid", lambda: os.geteuid() + 1)
+    assert "another user" in str(output_files.ownership_fault(folder))
 
 
 @pytest.fixture
@@ -156,7 +159,7 @@ def shared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Pa
         link = Path(tempfile.mktemp(dir=folder, prefix="clpt-test-", suffix=".png"))
         link.symlink_to(precious)
         user = os.getuid()
-        monkeypatch.setattr(ownership.os, "geteuid", lambda: user + 1)
+        monkeypatch.setattr(output_files.os, "geteuid", lambda: user + 1)
     yield link, precious
     link.unlink(missing_ok=True)
 

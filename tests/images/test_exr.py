@@ -11,7 +11,7 @@ import pytest
 
 from clpt import images
 from clpt.errors import SceneError
-from clpt.images.exr_channels import Choice, choose
+from clpt.images.exr import Choice, choose
 from clpt.spectra import spaces
 from tests.images import files
 

@@ -8,7 +8,7 @@ from PIL import Image
 
 from clpt import images
 from clpt.errors import SceneError
-from clpt.images import sizes, spectral_exr
+from clpt.images import checks, spectral_exr
 from clpt.images.pillow import from_pillow
 from clpt.spectra import spaces
 
@@ -254,9 +254,9 @@ def test_images_of_too_many_pixels(tmp_path, monkeypatch):
         images.write(path, whole)
     spectral = tmp_path / "bands.exr"
     spectral_exr.write(spectral, spectral_exr.SpectralImage(whole, [400.0, 500.0, 600.0], True))
-    monkeypatch.setattr(sizes, "PIXELS", 600)
+    monkeypatch.setattr(checks, "PIXELS", 600)
     assert all(images.read(path).shape == whole.shape for path in paths)
-    monkeypatch.setattr(sizes, "PIXELS", 599)
+    monkeypatch.setattr(checks, "PIXELS", 599)
     for path in [*paths, spectral]:
         with pytest.raises(SceneError, match=r"has 30x20 pixels, more than the 599 that") as raised:
             (spectral_exr if path == spectral else images).read(path)

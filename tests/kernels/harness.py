@@ -9,8 +9,7 @@ import numpy as np
 from clpt import device, testing
 from clpt.scene.materials import LEAVES, Material
 from clpt.testing import probe
-from clpt.testing.probe import COMPONENTS, NOTHING, root_text
-from clpt.testing.rounding import CONTRACTED, contracts
+from clpt.testing.probe import COMPONENTS, CONTRACTED, NOTHING, contracts, root_text
 
 MODES = tuple(COMPONENTS)
 

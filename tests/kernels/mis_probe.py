@@ -58,7 +58,7 @@ inline Lamp lamp(integer row)
 #define light_shows(scene, row, front) (front)
 #define light_path_pdf(scene, row, p, wi, t, n) (scene).emission
 #define light_emit_pdf(scene, row, wi, t) (scene).emission
-#define light_found_pdf(scene, row, p, receiver, wi, t, n) (scene).found
+#define light_nee_pdf(scene, row, p, receiver, wi, t, n) (scene).found
 #define common_light_begins_pdf(scene, row, p, receiver, wi, t, n, there) \
     (*(there) = (scene).found, (scene).emission)
 #define load_path_mis_ratio(path, at) (path).mis_ratio
@@ -177,13 +177,13 @@ class VertexProbe:
             lanes=1,
             virtual={
                 **lights.virtual_files(),
-                "generated/diffuse_roulette.cl": either(dull, "transport/diffuse_roulette.cl"),
+                "generated/diffuse_roulette.cl": either(dull, "transport/roulette.cl#diffuse"),
                 "generated/mis_ratio_steps.cl": (
-                    *either(merged, "transport/mis_ratio_merging.cl"),
-                    *either(joined, "transport/mis_ratio_camera.cl"),
-                    "transport/mis_pdf.cl#none",
+                    *either(merged, "transport/mis_ratio.cl#merging"),
+                    *either(joined, "transport/mis_ratio.cl#camera"),
+                    "materials/bsdf.cl#mis_pdf#none",
                 ),
-                "generated/mis_merging_area.cl": ("transport/mis_merging_area.cl",),
+                "generated/mis_merging_area.cl": ("transport/mis_ratio.cl#area",),
                 "world.cl": WORLD,
             },
             defines={name: int(holds) for name, holds in flags.items()},

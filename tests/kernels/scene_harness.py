@@ -26,7 +26,7 @@ def scene_files(mode: str) -> dict[str, device.Part | str | tuple[str, ...]]:
         **PLAIN,
         "generated/scene.cl": scene_text(),
         "generated/spectrum.cl": f'#include "spectra/{mode}.cl"\n',
-        "generated/spectrum_read.cl": f'#include "spectra/{mode}_read.cl"\n',
+        "generated/spectrum_read.cl": f'#include "spectra/{mode}.cl#read"\n',
     }
 
 

@@ -67,6 +67,7 @@ def emitting(name: str) -> str:
     """The functions of light paths."""
     kind = name.lower()
     return f"""
+/* Step emission: evenly in all directions. */
 Spectrum {kind}_intensity({name} l, Scene scene, vec3 d, Wavelengths lambdas)
 {{
     return emission_load(scene, l.intensity, texture_point_nowhere(), lambdas);

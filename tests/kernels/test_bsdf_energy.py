@@ -20,6 +20,8 @@ from tests.rotation import rotating
 # Duer's form of Ward's lobe makes light at grazing angles, as Mitsuba 0.6's does.
 TOLERANCE = {m.RoughPlastic: 0.025, m.Principled: 0.75, m.PrincipledThin: 0.65, m.Ward: 1.0}
 
+INDICES = ("int_ior", "eta", "ior", "specular_ior")  # of insides, by their parameters' names
+
 kinds = rotating("cls, mode", LEAVES, MODES, turn=quick_mode)
 
 
@@ -105,14 +107,18 @@ def test_reciprocity(cls, mode):
         wo, wi = checks.clear_pairs(rng)
         if not params.get("thin", 1):  # what is scattered to the inside takes it for a vacuum
             params = params | {"diffuse_transmission": 0.0}
+        if not params.get("thin_walled", 1):  # likewise; coats and weights change the index
+            alone = {"subsurface_inside": 0, "coat_weight": 0.0, "specular_weight": 1.0}
+            params = params | {name: np.array(value) for name, value in alone.items()}
         there, back = checks.both_ways(probe, params, wo, wi)
         if cls is m.PrincipledThin:  # facets that light is to pass are cut off by wi, not by wo
             same = wo[:, 2] * wi[:, 2] > 0.0
             there, back = there[same], back[same]
         elif cls.chromatic:  # f / index^2 on the side of wo is what is reciprocal
-            inside = next(params[k] for k in ("int_ior", "eta", "ior") if k in params)
+            inside = next(params[k] for k in INDICES if k in params)
             inside = inside / params.get("ext_ior", 1.0)
-            inside = np.ones_like(inside) if params.get("thin", 0) else inside
+            thin = params.get("thin", 0) or params.get("thin_walled", 0)
+            inside = np.ones_like(inside) if thin else inside
             inside = np.full_like(inside, inside.mean()) if mode == "rgb" else inside
             there = np.where(wo[:, 2:] < 0.0, there / inside**2, there)
             back = np.where(wi[:, 2:] < 0.0, back / inside**2, back)

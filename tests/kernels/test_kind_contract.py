@@ -1,4 +1,4 @@
-"""Lights know their bounds and power, cameras their extent; kinds of the tests' own too."""
+"""Lights know their bounds and power, cameras their extent, textures and materials their parts."""
 
 from __future__ import annotations
 
@@ -15,13 +15,18 @@ import pytest
 
 import clpt
 from clpt import transforms
-from clpt.scene import Film, Scene, lights, materials, shapes
+from clpt.render.spectra.look import Look
+from clpt.scene import Film, Scene, lights, materials, shapes, textures
 from clpt.scene.cameras import KINDS, Perspective
 from clpt.scene.integrators import Path as PathIntegrator
-from clpt.scene.params import real
+from clpt.scene.params import factor, host, real
+from clpt.scene.roles import Role
+from clpt.scene.texture_values import Attributes, Operation, Texture, Use, brightness_at
+from clpt.spectra import Constant
 from clpt.view import probe
 from tests.kernels import kind_contract, strangers
 from tests.kernels.kind_contract import LAMPS, check_bounds, check_number, check_power
+from tests.kernels.test_textures import look_up
 
 ROOT = Path(__file__).resolve().parents[2]
 each = pytest.mark.parametrize("cls", LAMPS, ids=lambda cls: cls.kind)
@@ -56,9 +61,8 @@ def test_lights_of_the_tests_own(tmp_path: Path) -> None:
     after = after.replace("*ON_SHAPES, Point,", "*ON_SHAPES, Point, Wire, Tube,", 1)
     file.write_text(f"{before}\n{strangers.PYTHON}\nON_SHAPES = {after}", "utf-8")
     for name in strangers.POINTS:
-        folder = tmp_path / "kernels/lights"
-        (folder / f"kinds/{name.lower()}.cl").write_text(strangers.sampling(name), "utf-8")
-        (folder / f"emission/{name.lower()}.cl").write_text(strangers.emitting(name), "utf-8")
+        text = strangers.sampling(name) + strangers.emitting(name)
+        (tmp_path / f"kernels/lights/kinds/{name.lower()}.cl").write_text(text, "utf-8")
     command = [sys.executable, "-m", "tests.kernels.kind_contract", *strangers.POINTS]
     paths = os.pathsep.join([str(tmp_path), str(ROOT)])
     environment = {**os.environ, "PYTHONPATH": paths}
@@ -145,3 +149,109 @@ def test_a_camera_whose_pixel_it_cannot_narrow_is_cropped() -> None:
     pixel = probe.pixel_of(scene, 3, 4, 0, PathIntegrator(max_depth=1))
     assert pixel.film.crop == (3, 4, 1, 1) and pixel.camera is scene.camera
     assert dataclasses.replace(pixel.film, crop=None).width == WIDTH
+
+
+# ---- textures
+
+# Of a constant beside a texture: lights are weighed by it as by equal energy, which is 2.1 %
+# brighter than the D65 that kernels take.
+ROUGH = 0.022
+LOOK = Look(spectral=False, lo=360.0, hi=830.0)
+TEXELS = np.random.default_rng(3).random((8, 8, 3)).astype(np.float32)
+MOVED = np.array([[1.5, -0.4, 0.3], [0.7, 2.0, -1.2], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Screen(Texture):
+    """A texture of the tests' own: 1 - (1 - first) (1 - second), as of two projectors."""
+
+    first: object = factor(0.0, "a colour")
+    second: object = real(0.5, "a number", textured=True)
+
+    @property
+    def combines(self) -> bool:
+        return True
+
+    def operation(self, use: Use, role: Role) -> Operation | None:
+        return "mix", ((self.first, use), (Constant(1.0), use), (self.second, "real"))
+
+    def brightness_at(
+        self, look: object, uv: np.ndarray, area: np.ndarray, attributes: Attributes
+    ) -> np.ndarray:
+        first, second = (
+            brightness_at(part, LOOK, uv, area, attributes) for part in (self.first, self.second)
+        )
+        return 1.0 - (1.0 - first) * (1.0 - second)
+
+
+def bitmap(**more: object) -> textures.Bitmap:
+    return textures.Bitmap(image=TEXELS, filter="nearest", **more)
+
+
+def board(**more: object) -> textures.Checkerboard:
+    return textures.Checkerboard(color0=(0.9, 0.2, 0.1), color1=0.3, **more)
+
+
+GREY = textures.Bitmap(image=TEXELS.mean(axis=2), filter="nearest")
+KNOWN = {
+    "bitmap": bitmap(),
+    "moved bitmap": bitmap(to_uv=MOVED, wrap="mirror", wrap_v="clamp"),
+    "zero around": bitmap(to_uv=MOVED, wrap="zero"),
+    "board": board(to_uv=MOVED),
+    "board of images": textures.Checkerboard(color0=bitmap(), color1=GREY),
+    "product": textures.Product(first=bitmap(), second=2.0),
+    "mix": textures.Mix(first=bitmap(), second=0.25, amount=GREY),
+    "screen": Screen(first=GREY, second=GREY),
+}
+
+
+@pytest.mark.parametrize("texture", KNOWN.values(), ids=KNOWN)
+def test_a_texture_knows_its_brightness(texture: Texture) -> None:
+    """Off the borders of texels it is the mean of the channels that kernels look up."""
+    uv = (np.random.default_rng(4).integers(0, 64, (500, 2)) + 0.5) / 64.0
+    expected = look_up([texture], "emission", uv).mean(axis=1)
+    area = np.zeros(1)
+    found = texture.brightness_at(LOOK, uv[None], area, {})[0]
+    np.testing.assert_allclose(found, expected, rtol=ROUGH, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["bitmap", "product", "mix"])
+def test_a_mean_is_that_of_all_points(name: str) -> None:
+    texture = {**KNOWN, "mix": textures.Mix(first=bitmap(), second=0.25, amount=0.3)}[name]
+    axis = (np.arange(64) + 0.5) / 64.0
+    uv = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    expected = look_up([texture], "emission", uv).mean(dtype=np.float64)
+    assert texture.mean(LOOK) == pytest.approx(expected, rel=ROUGH)
+
+
+# ---- materials
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Dusted(materials.Material):
+    """A composite of the tests' own: dust, a dull grey, on a share of another material."""
+
+    is_composite = True
+
+    material: materials.Material = host(materials.Diffuse(), "below the dust", form="material")
+    dust: materials.Material = host(materials.Diffuse(reflectance=0.4), "dust", form="material")
+    share: float = real(0.5, "of the surface that has dust", "", 0.0, 1.0)
+
+    @property
+    def mixture(self) -> tuple[object, materials.Material, materials.Material]:
+        return self.share, self.material, self.dust
+
+
+def test_a_composite_of_the_tests_own() -> None:
+    """It shades as a blend of the same materials, to the bit."""
+    below, dust = materials.Diffuse(reflectance=(0.9, 0.3, 0.1)), materials.Diffuse(reflectance=0.4)
+    blended = materials.Blend(first=below, second=dust, weight=0.25)
+    pictures = []
+    for material in (Dusted(material=below, dust=dust, share=0.25), blended):
+        wall_ = dataclasses.replace(WALL, material=material)
+        camera = Perspective(to_world=transforms.look_at([0, 0, AWAY], [0, 0, 0], [0, 1, 0]))
+        film = Film(width=8, height=8, mode="rgb")
+        scene = Scene(camera=camera, film=film, shapes=[wall_], lights=[lights.Constant()])
+        pictures.append(np.asarray(clpt.render(scene, spp=4)))
+    np.testing.assert_array_equal(*pictures)
+    assert 0.1 < pictures[0][..., 2].mean() < 0.4

@@ -8,7 +8,7 @@ import pytest
 from clpt import lenses, spectra
 from clpt.errors import SceneError
 from clpt.lenses import Prescription, Surface
-from clpt.lenses.coatings import quarter_wave
+from clpt.lenses.prescription import quarter_wave
 from clpt.lenses.tracing import Rays, trace
 from clpt.render.camera.encode import encode_camera, ghost_pairs
 from clpt.render.flow import stages

@@ -14,6 +14,7 @@ from clpt.geometry import triangles
 from clpt.render.lights import encode as lights
 from clpt.render.lights import images as image_lights
 from clpt.render.lights.check import check_light
+from clpt.render.lights.find import environment_of
 from clpt.render.lights.images import face_coordinates, face_directions
 from clpt.render.records import lights as light_records
 from clpt.scene.lights import (
@@ -344,7 +345,7 @@ def test_images_are_chosen_by_what_they_send(name):
     value = r[5] / r[4]
     assert (r[4] > 0.0).all()
     assert value.std() < 0.1 * value.mean()
-    mean = image_lights.mean_radiance(image_lights.content(lamp, scene.encoder.look))
+    mean = environment_of(lamp, scene.encoder.look).strength
     assert value.mean() == pytest.approx(4.0 * np.pi * mean, rel=0.02)
 
 
@@ -662,11 +663,10 @@ def test_uv_on_a_mesh():
 
 
 def test_brightness_of_a_texture_is_its_mean():
-    from clpt.render.lights.power import brightness
     from clpt.render.spectra.look import Look
 
     board = Checkerboard(color0=(1.0, 1.0, 1.0), color1=(0.0, 0.5, 1.0))
-    assert brightness(board, Look(False, 360.0, 830.0)) == pytest.approx(0.75)
+    assert board.mean(Look(False, 360.0, 830.0)) == pytest.approx(0.75)
 
 
 @pytest.mark.parametrize(

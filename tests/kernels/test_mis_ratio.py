@@ -17,7 +17,7 @@ from tests.kernels.mis_probe import LAMPS, LIGHT_PATHS, vertex_probe
 
 PATHS = 1 << 15  # of each length
 SHARP = 8.0  # SHARP_PDF of transport/mis_ratio.cl [1/sr]
-DULL, DIFFUSE_SHARE = 1.0, 0.125  # of transport/diffuse_roulette.cl, DIFFUSE_PDF and DIFFUSE_SHARE
+DULL, DIFFUSE_SHARE = 1.0, 0.125  # of transport/roulette.cl, DIFFUSE_PDF and DIFFUSE_SHARE
 SHARED = (
     50  # paths that every way that there is must share with others, so that the test can see it
 )

@@ -159,7 +159,7 @@ SIDE, BITS = 32, 2  # of the film [pixels], and how many samples a pixel takes, 
 def along_the_curve():
     """Points (n, 2) of zsobol for pixels x, y of a film, samples and dimensions."""
     settings = {"tiles_x": SIDE // 4, "sample_bits": BITS, "seed": 3}
-    files = ("samplers/kinds/zsobol.cl", "samplers/pixel_sampler_z.cl")
+    files = ("samplers/kinds/zsobol.cl", "samplers/pixel_sampler.cl#z")
     probe = SceneProbe(ON_FILM, 3, 2, files=files, settings=settings)
 
     def points(x, y, sample, dimension):

@@ -119,7 +119,7 @@ inline Layer layer_at(Layers l, integer i)
     mask at;
 {choose}    return r;
 }}
-#include "materials/boundary_film.cl"
+#include "materials/boundary.cl#film"
 #define X(i) block_load(in + (i) * n + at)
 kernel void probe(global const float *in, global float *out, uint n)
 {{

@@ -14,7 +14,7 @@ BODY = """
     Wavelengths w = wavelengths_sample(scene, x[0]);
     r[0] = w.x; r[1] = w.y; r[2] = w.z; r[3] = w.w; r[4] = density_pdf(scene, x[1]);
 """
-READ = '#include "spectra/spectral_read.cl"\n#include "spectra/density.cl"\n'
+READ = '#include "spectra/spectral.cl#read"\n#include "spectra/wavelengths.cl#density"\n'
 NODES = np.linspace(300.0, 829.5, 531)
 
 

@@ -9,12 +9,11 @@ import pytest
 
 from clpt import lenses, spectra
 from clpt.errors import SceneError
-from clpt.lenses import Prescription, Surface, spots
-from clpt.lenses.coatings import COATINGS, quarter_wave, reflectance
+from clpt.lenses import Prescription, Surface, tracing
 from clpt.lenses.glasses import AIR, LINE_C, LINE_D, LINE_F, by_name, by_number
 from clpt.lenses.paraxial import film_distance, stop_radius
-from clpt.lenses.pupils import ZONES, axis_solid_angle, zones
-from clpt.lenses.tracing import Rays, trace
+from clpt.lenses.prescription import COATINGS, quarter_wave, reflectance
+from clpt.lenses.tracing import ZONES, Rays, axis_solid_angle, trace, zones
 from clpt.spectra import Constant
 
 CROWN = Constant(1.5)
@@ -125,15 +124,15 @@ def test_spots_beside_optiland(name):
     lens = lenses.library(name)
     lens = lens.with_stop(stop_radius(lens, 8.0))
     back = lenses.cardinal(lens).back_focus
-    x, y = spots.pupil_points().T
+    x, y = tracing.pupil_points().T
     for angle in (0.0, 7.0, 14.0):
         for wavelength in (486.1, LINE_D, 656.3):
             peer = peer_of(lens, wavelength, angle, back, rims=True)
             rays = peer.trace_generic(0.0, float(angle > 0.0), x, y, wavelength * 1e-3)
             alive = np.isfinite(rays.x) & (np.asarray(rays.i) > 0.0)
             points = np.stack([np.asarray(rays.x), np.asarray(rays.y)], 1)[alive]
-            theirs = spots.Spot(points, float(alive.mean()))
-            ours = spots.spot(lens, angle, wavelength)
+            theirs = tracing.Spot(points, float(alive.mean()))
+            ours = tracing.spot(lens, angle, wavelength)
             assert ours.through == pytest.approx(theirs.through, abs=0.01)
             close = 1e-4 if wavelength == LINE_D else 0.01
             assert ours.radius == pytest.approx(theirs.radius, rel=close)

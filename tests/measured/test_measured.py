@@ -13,7 +13,7 @@ import clpt
 from clpt import measured
 from clpt.errors import SceneError
 from clpt.formats.pbrt.materials import material as pbrt_material
-from clpt.measured import tensor_file
+from clpt.measured import measurement
 from clpt.scene import materials
 from clpt.testing.probe import LAMBDAS
 from tests.formats.pbrt.test_pbrt_materials import params, state
@@ -58,9 +58,13 @@ def test_other_programs_read_and_write_tensor_files(tmp_path):
     rng = np.random.default_rng(1)
     given = {"a": rng.random((2, 3)).astype(np.float32), "bc": np.arange(5, dtype=np.int16)}
     ours, theirs = tmp_path / "ours", tmp_path / "theirs"
-    tensor_file.write(ours, given)
+    measurement.write_tensors(ours, given)
     other.write(str(theirs), **given)
-    for found in (other.read(str(ours)), tensor_file.read(ours), tensor_file.read(theirs)):
+    for found in (
+        other.read(str(ours)),
+        measurement.read_tensors(ours),
+        measurement.read_tensors(theirs),
+    ):
         assert found.keys() == given.keys()
         assert all(np.array_equal(found[name], given[name]) for name in given)
 
@@ -121,8 +125,8 @@ def test_damaged_files_are_refused(tmp_path, content, message):
 def test_what_does_not_match_is_refused(tmp_path, metals, name, change, message):
     path = tmp_path / "bad.bsdf"
     measured.write(path, metals["isotropic"])
-    fields = tensor_file.read(path)
-    tensor_file.write(path, fields | {name: change(fields[name])})
+    fields = measurement.read_tensors(path)
+    measurement.write_tensors(path, fields | {name: change(fields[name])})
     with pytest.raises(SceneError, match=message):
         measured.read(path)
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from clpt.sky import atmosphere
-from clpt.sky.atmosphere import TOP
+from clpt.sky import skylight
+from clpt.sky.skylight import TOP
 from clpt.spectra.air import EARTH, OZONE_MIDDLE, Atmosphere, densities
 
 FEW = 1e-3  # throughput at which a walk goes on by chance
@@ -99,13 +99,13 @@ def _bound(height, depth):
 def _lit(depth, p, toward):
     """Share of sunlight that comes to places."""
     r = np.linalg.norm(p, axis=1)
-    columns, seen = atmosphere.sun_columns(r, np.clip(p @ toward / r, -1.0, 1.0))
+    columns, seen = skylight.sun_columns(r, np.clip(p @ toward / r, -1.0, 1.0))
     return np.exp(-(columns.T @ depth)) * seen
 
 
 def _phase(air, part, cosine):
-    found = atmosphere.aerosol_phase(cosine, air.asymmetry)
-    return part * atmosphere.rayleigh_phase(cosine) + (1.0 - part) * found
+    found = skylight.aerosol_phase(cosine, air.asymmetry)
+    return part * skylight.rayleigh_phase(cosine) + (1.0 - part) * found
 
 
 def _turned(rng, air, part, d):
@@ -118,8 +118,8 @@ def _turned(rng, air, part, d):
     left = np.flatnonzero(own)
     while len(left):  # by rejection
         x = rng.uniform(-1.0, 1.0, len(left))
-        most = atmosphere.rayleigh_phase(1.0)
-        keep = rng.random(len(left)) * most < atmosphere.rayleigh_phase(x)
+        most = skylight.rayleigh_phase(1.0)
+        keep = rng.random(len(left)) * most < skylight.rayleigh_phase(x)
         cosine[left[keep]] = x[keep]
         left = left[~keep]
     return _around(rng, d, cosine)

@@ -13,7 +13,7 @@ from clpt.render.lights import sky as sky_light
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Sky
-from clpt.sky import atmosphere, dome, skylight
+from clpt.sky import dome, skylight
 from clpt.spectra import air, cie
 from clpt.spectra.air import EARTH, LAMBDAS, SUNLIGHT, Atmosphere, densities
 from tests.kernels.light_probe import lit
@@ -72,18 +72,18 @@ def flux(elevation: float) -> tuple[np.ndarray, np.ndarray]:
 def test_columns_are_those_of_a_fine_sum():
     """Straight up, slanting, along the ground, from above: within 1e-3."""
     for radius, mu in ((EARTH, 1.0), (EARTH, 0.3), (EARTH, 0.0), (EARTH + 20.0, 0.05)):
-        t = np.linspace(0.0, atmosphere.to_top(np.array(radius), np.array(mu)), 200_001)
+        t = np.linspace(0.0, skylight.to_top(np.array(radius), np.array(mu)), 200_001)
         height = np.sqrt(radius**2 + t**2 + 2.0 * radius * mu * t) - EARTH
         dense = densities(height)
         fine = ((dense[:, 1:] + dense[:, :-1]) * 0.5 * np.diff(t)).sum(axis=1)
-        np.testing.assert_allclose(atmosphere.columns(radius, mu), fine, rtol=1e-3, atol=1e-9)
+        np.testing.assert_allclose(skylight.columns(radius, mu), fine, rtol=1e-3, atol=1e-9)
 
 
 def test_air_masses_and_depths_are_the_published_ones():
     """Kasten and Young 1989 down to 5 degrees; Bodhaine 1999, table 3; ozone's Chappuis band."""
     for height in (60.0, 30.0, 15.0, 5.0):
         published = 1.0 / (np.sin(np.radians(height)) + 0.50572 * (height + 6.07995) ** -1.6364)
-        assert atmosphere.columns(EARTH, np.sin(np.radians(height)))[0] == pytest.approx(
+        assert skylight.columns(EARTH, np.sin(np.radians(height)))[0] == pytest.approx(
             published, rel=0.02
         )
     assert air.depth([400.0, 550.0, 700.0]) == pytest.approx([0.3600, 0.0970, 0.0364], rel=0.01)

@@ -1,4 +1,4 @@
-"""clpt.spectra.named: metals and glasses against published values."""
+"""clpt.spectra.dispersion: metals and glasses against published values."""
 
 import numpy as np
 import pytest

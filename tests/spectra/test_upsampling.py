@@ -5,7 +5,7 @@ import pytest
 
 from clpt import spectra
 from clpt.spectra import cie, upsampling
-from clpt.spectra.make_uplift import lab
+from clpt.spectra.make_data import lab
 from clpt.spectra.spectrum import d65
 from clpt.spectra.upsampling import evaluate
 

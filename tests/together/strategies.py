@@ -26,7 +26,6 @@ from clpt.render.flow.check import check
 from clpt.render.geometry.check import check_shapes
 from clpt.render.lights.check import check_light
 from clpt.render.materials.check import check_material
-from clpt.render.textures.check import check_textures
 from clpt.scene import (
     Scene,
     cameras,
@@ -44,6 +43,7 @@ from clpt.scene.layers import LAYERS
 from clpt.scene.motion import Deformation, Keys, Shutter
 from clpt.scene.params import Kind, defaults, params
 from clpt.scene.roles import Param
+from clpt.scene.textures import check_textures
 from tests.together.builds import FORMS as FORMS_OF_PROGRAMS
 from tests.together.builds import Way
 

@@ -77,7 +77,7 @@ def bench(
         show_list()
         return 0
     if light is not None:
-        from .first_light import tell_of_first_light
+        from .measuring import tell_of_first_light
 
         return tell_of_first_light(device, light, report.limit)
     report.check()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -10,18 +11,21 @@ from rich.table import Table
 from rich.text import Text
 
 from clpt import bench as benchmark
-from clpt.bench import apart, card, comparing, records, scenes
-from clpt.bench.comparing import Ratio
+from clpt.bench import apart, card, first_light, records, scenes
 from clpt.bench.figures import Figure
+from clpt.bench.records import Ratio
+from clpt.files import output_files
 
 from ... import device as dev
 from ...choices import TREES
-from ..printing.console import output_console
-from .settings import STAGES, Report
+from ..console import output_console
+from .settings import STAGES, Report, check_writable
 
 Which = tuple[str | int | None, str | None]  # see clpt.bench.apart.measured
 SLOWER = 3  # the exit status if a figure was refused, or is below --fail-below
 HEADINGS = ("figure", "", "unit", "±", "GB/s", "of a copy", "")
+WRONG = 3  # the exit status if a check is wrong
+LONGEST = 300.0  # seconds that a check may take without a figure, whatever --limit says
 
 
 def tell_of_devices(device: str | None, settings: Mapping[str, Any], report: Report) -> int:
@@ -45,15 +49,15 @@ def _report(console: Console, which: Which, settings: Mapping[str, Any], report:
     label = str(about["device"])
     some = any(figure.rounds and not figure.refused for figure in figures)
     if report.before is not None and some:
-        ratios = comparing.against(figures, report.before, label)
+        ratios = records.against(figures, report.before, label)
         limit = report.fail_below
         _show_ratios(console, ratios, limit)
         failed |= limit is not None and any(ratio.below(limit) for ratio in ratios)
     if report.plot is not None and some:
-        from ..plots import bench as bench_plot
+        from .. import plots
 
         then = {figures.index(r.figure): float(r.then["value"]) for r in ratios}
-        bench_plot.write(report.plot, f"{label}, clpt bench", figures, then)
+        plots.plot_figures(report.plot, f"{label}, clpt bench", figures, then)
     if report.card is not None:
         card.card({**records.circumstances(), **about}, figures).write(report.card)
     return failed
@@ -165,3 +169,22 @@ def show_list() -> None:
         for name, meaning in names.items():
             table.add_row(name, meaning)
         console.print(table)
+
+
+def tell_of_first_light(device: str | None, target: Path, limit: float) -> int:
+    """Run all checks, print a row of each, write the report; return the exit status."""
+    check_writable(target)
+    console = output_console()
+    checks = first_light.checks()
+    results: list[first_light.Result] = []
+    with console.status("checking") as status:
+        status.update(checks[0].name)
+        for result in first_light.run(device, min(limit, LONGEST), checks):
+            results.append(result)
+            row = f"{result.check.name:18} {result.seconds:4.0f} s  {result.summary}"
+            console.print(Text(row, style="red" if result.wrong else ""))
+            if len(results) < len(checks):
+                status.update(checks[len(results)].name)
+    output_files.write_text(target, first_light.report(results, len(checks)))
+    console.print(Text(f"{target} tells what to report, and to whom"))
+    return WRONG if any(result.wrong for result in results) else 0

@@ -14,7 +14,7 @@ from clpt.files import output_files
 
 from ...choices import TREES
 from ...errors import SceneError
-from ..process.extras import extra
+from ..process.failures import extra
 
 STAGES = (
     "generate", "emit", "intersect", "mix", "shade", "shadow", "splat", "append", "accumulate",
@@ -66,9 +66,9 @@ class Report:
             check_writable(self.card)
         if self.plot is not None:
             with extra("plot", "a plot"):
-                from ..plots import bench as bench_plot  # here: matplotlib is an extra, and slow
+                from .. import plots  # here: matplotlib is an extra, and slow
 
-            bench_plot.check(self.plot)
+            plots.check_format(self.plot)
         _ = self.before
 
     @cached_property

@@ -1,11 +1,11 @@
-"""Checkpoints: the film of a render in a file beside its picture, from which `--resume` goes on."""
+"""Checkpoints: the film of a render in a file beside its picture; `--resume` goes on with it."""
 
 from __future__ import annotations
 
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 from clpt.files import output_files
@@ -13,17 +13,16 @@ from clpt.files import output_files
 from ...errors import MemoryBudgetError, SceneError
 from ...render.film import film_file
 from ...render.film.saved_film import SavedFilm, differences_text, ranges_text
-from ...render.pictures import DevicePictures
+from ...render.resumable import ResumableRenderer
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
-from ..printing.display import clock
+from ..display import Display, clock
 from . import outputs
-from .standard_output import is_standard
-from .targets import CHECKPOINT, FILM, default
+from .targets import CHECKPOINT, FILM, default, is_standard
 
-PERIOD = 300.0  # seconds from one checkpoint to the next
+PERIOD = 300.0  # seconds between checkpoints
 PATIENCE = 600.0  # seconds of a render after which it has checkpoints unasked
-FORMER = ".1"  # ends the name of the checkpoint before the last one
+FORMER = ".1"  # ends the name of the previous checkpoint
 ADVICE = "render that again, or begin anew with --no-resume"
 
 
@@ -39,34 +38,34 @@ def path_of(scene: Path, targets: tuple[Path, ...]) -> Path:
 
 
 def former_of(path: Path) -> Path:
-    """Return where the checkpoint before the last one is."""
+    """Return the path of the previous checkpoint."""
     return path.with_name(path.name + FORMER)
 
 
-def find(path: Path, resume: bool | None, note: Callable[[str], None]) -> SavedFilm | None:
+def find(path: Path, resume: bool | None, shown: Display) -> SavedFilm | None:
     """Return the film to go on with, None to begin anew.
 
-    resume: True if there must be one, False if it is left alone, None: if there is one. A file that
-    is damaged is passed over for the one before it. note: gets what is worth saying.
+    resume: True: there must be a film; False: films are left alone; None: a film is taken if there
+    is a file. The previous checkpoint takes the place of a damaged file; shown: notes that.
 
-    Raises SceneError where none can be read, though there must be one or there is a file.
+    Raises SceneError where no film can be read, though `resume` asks for it or there is a file.
     """
     if resume is False:
         return None
-    present = [one for one in (path, former_of(path)) if one.exists()]
+    present = [candidate for candidate in (path, former_of(path)) if candidate.exists()]
     if not present:
         if resume:
             raise SceneError("there is nothing to resume: no such file", file=path)
         return None
     failures = []
-    for one in present:
+    for candidate in present:
         try:
-            saved = film_file.read(one)
+            saved = film_file.read(candidate)
         except SceneError as error:
             failures.append(error)
             continue
         for failure in failures:
-            note(f"clpt: warning: {failure}; {one} is taken in its place")
+            shown.note(f"clpt: warning: {failure}; {candidate} is taken in its place")
         return saved
     raise SceneError(f"{failures[0].message}; {ADVICE}", file=present[0])
 
@@ -87,7 +86,7 @@ def check_range(plan: Scene, numbers: tuple[int, int] | None) -> None:
 def check(
     saved: SavedFilm, path: Path, plan: Scene, first: int, end: int | None, *, gaps: bool = False
 ) -> None:
-    """Raise SceneError for a film of another scene, or of other samples than those from `first` on.
+    """Raise SceneError for a film of another scene, or without the samples from `first` on.
 
     end: of samples that are asked for, where no more are allowed; else None. gaps: whether samples
     may be missing, as workers of a cluster leave them.
@@ -109,17 +108,15 @@ def check(
         raise SceneError(message, file=path)
 
 
-def go_on(
-    renderer: DevicePictures, saved: SavedFilm, path: Path, note: Callable[[str], None]
-) -> None:
+def go_on(renderer: ResumableRenderer, saved: SavedFilm, path: Path, shown: Display) -> None:
     """Let a renderer go on from a film, and say so. Raises SceneError, which says what differs."""
     known = len(renderer.warnings)
     renderer._follow(saved.origin)
     refuse(saved.origin.differences(renderer._origin()), path)
     renderer._restore(saved)
-    note(f"goes on from {path}: {summary(saved)}")
+    shown.note(f"goes on from {path}: {summary(saved)}")
     for warning in renderer.warnings[known:]:
-        note(f"clpt: warning: {warning}")
+        shown.note(f"clpt: warning: {warning}")
 
 
 class Checkpoints:
@@ -127,21 +124,20 @@ class Checkpoints:
 
     A file that was asked for, or that was there before, stays at the end; others are removed.
 
-    path: where; period: seconds from one to the next, 0: never, None: nobody asked; resumed:
-    whether the render goes on from the file; targets: of the picture, which may be films; note:
-    prints a line.
+    path: of the file; period: seconds between checkpoints, 0: never, None: not asked for; resumed:
+    whether the render goes on from the file; targets: of the picture, which may be films.
     """
 
     def __init__(
         self,
-        renderer: DevicePictures,
+        renderer: ResumableRenderer,
         path: Path,
         period: float | None,
         resumed: bool,
         targets: Iterable[Path],
-        note: Callable[[str], None],
+        shown: Display,
     ):
-        self._renderer, self._path, self._note = renderer, path, note
+        self._renderer, self._path, self._shown = renderer, path, shown
         self._period = PERIOD if period is None else period
         self._keep = bool(period) or (resumed and period is None)
         now = time.monotonic()
@@ -169,7 +165,7 @@ class Checkpoints:
         """Write the film of the last whole pass, if it stays.
 
         stopped: whether a signal ended the render: then it stays too where checkpoints had begun;
-        failed: whether an error did: then it stays if there is one.
+        failed: whether an error ended it: then a film that is held stays.
         """
         self._wait()
         if self._keep or (stopped and self._written) or (failed and self._held):
@@ -182,7 +178,7 @@ class Checkpoints:
         if not self._written:
             return
         if self._keep or stopped:
-            self._note(f"{self._path}  --resume goes on from it")
+            self._shown.note(f"{self._path}  --resume goes on from it")
             return
         for path in (self._path, former_of(self._path)):
             path.unlink(missing_ok=True)
@@ -199,7 +195,7 @@ class Checkpoints:
             self._renderer._hold()
             self._held = True
         except MemoryBudgetError as error:
-            self._note(f"clpt: warning: no checkpoints: {error}")
+            self._shown.note(f"clpt: warning: no checkpoints: {error}")
             self._holds_from = self._due = math.inf
             self._keep = False
 
@@ -228,7 +224,9 @@ class Checkpoints:
     def _tell_failure(self) -> None:
         failure, self._failure = self._failure, None
         if failure:
-            self._note(f"clpt: warning: {failure}; what was there stays, and the render goes on")
+            self._shown.note(
+                f"clpt: warning: {failure}; what was there stays, and the render goes on"
+            )
 
 
 def summary(saved: SavedFilm) -> str:

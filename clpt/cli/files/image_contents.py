@@ -1,4 +1,4 @@
-"""An image file as `clpt inspect` shows it: values by wavelength or channel, and colours."""
+"""An image file or a film as `clpt info` and `clpt inspect` show it: values, colours, facts."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from clpt.images import spectral_exr
 
 from ...errors import SceneError
 from ...spectra.spaces import SPACES, chromaticities
+from ..console import shown
+from .targets import is_film
 
 Pixel = tuple[int, int]  # x, y from the top left
 LAYOUT = (
@@ -35,7 +37,7 @@ class ImageContents:
 
     values: (h, w, n); labels: a wavelength or a channel's name per value; lambdas: (n,) [nm], None
     where the image is not spectral; colours: (h, w, 3) linear Rec. 709, None where it has none;
-    quantity: what the values are, with their unit; facts: what else the file says; stops: by which
+    quantity: of the values, with its unit; facts: further entries of the file; stops: by so many
     screens show the colours brighter.
     """
 
@@ -66,6 +68,11 @@ class ImageContents:
         x, y = pixel
         colours = self.colours[y : y + 1, x : x + 1]
         return "#" + bytes(images.to_srgb8(colours, self.stops)[0, 0]).hex()
+
+
+def contents(path: Path) -> ImageContents:
+    """Return an image, a film or a checkpoint. Raises SceneError."""
+    return film_contents(path) if is_film(path) else read_contents(path)
 
 
 def read_contents(path: Path) -> ImageContents:
@@ -113,13 +120,13 @@ def _provenance(attributes: Mapping[str, Any]) -> dict[str, str]:
 
 def _mattes(attributes: Mapping[str, Any]) -> dict[str, str]:
     """The mattes of Cryptomatte that a file has, and how many names each knows."""
-    found = {}
+    mattes = {}
     for key, manifest in attributes.items():
         if key.startswith(MATTES) and key.endswith("/manifest"):
             name = str(attributes.get(key.replace("/manifest", "/name"), key))
             with contextlib.suppress(ValueError):
-                found[name] = f"Cryptomatte, {len(json.loads(manifest))} names"
-    return found
+                mattes[name] = f"Cryptomatte, {len(json.loads(manifest))} names"
+    return mattes
 
 
 def _read(path: Path) -> ImageContents:
@@ -153,7 +160,7 @@ def _read(path: Path) -> ImageContents:
 
 
 def _stops(attributes: Mapping[str, Any]) -> float:
-    """The stops by which screens show a picture brighter, 0 for what is no such number."""
+    """The stops that brighten a picture on screens, 0 where the file has no usable number."""
     stated = attributes.get(images.STOPS, 0.0)
     usable = isinstance(stated, (int, float)) and abs(stated) <= MOST_STOPS
     return float(stated) if usable else 0.0
@@ -196,8 +203,8 @@ def _layers(channels: dict[str, np.ndarray]) -> Iterator[str]:
         spread = f", {finite.min():.4g} to {finite.max():.4g}" if finite.size else ""
         lost = values.size - finite.size
         bad = f", {lost:,} not finite" if lost else ""
-        own = "" if [layer] == letters else f" {' '.join(letters)}"
-        yield f"{layer}{own}: {stored}{spread}{bad}"
+        letters_shown = "" if [layer] == letters else f" {' '.join(letters)}"
+        yield f"{layer}{letters_shown}: {stored}{spread}{bad}"
 
 
 def in_order(letter: str) -> tuple[int, str]:
@@ -208,3 +215,53 @@ def in_order(letter: str) -> tuple[int, str]:
 def size_text(values: np.ndarray) -> str:
     """Return the size of an image (h, w, n)."""
     return f"{values.shape[1]} x {values.shape[0]}"
+
+
+def film_summary(path: Path) -> dict[str, Any]:
+    """Return what a film file says of itself. Raises SceneError."""
+    from ...render.film import film_file  # here: an image needs no renderer
+
+    header = film_file.read_header(path)
+    height, width = header["shapes"]["words"][-2:]
+    origin, sessions, form = header["scene"], header["sessions"], header["form"]
+    film: dict[str, Any] = {"width": width, "height": height, "bands": form["bands"]}
+    crop = origin.get("film.crop")  # numbers with commas
+    part = {} if crop is None else {"crop": [round(float(n)) for n in str(crop).split(",")]}
+    return {
+        "format": "film",
+        "clpt": header["clpt"],
+        "samples": [f"{first} to {end - 1}" for first, end in header["taken"]],
+        "film": film | part,
+        "holds": ["picture", *form["layers"], *["alpha"] * form["alpha"]],
+        "integrator": header["settings"]["chosen.integrator"],
+        "sampler": origin["sampler.type"],
+        "seed": origin["seed"],
+        "noise": "noise" in header["adaptive"],
+        "seconds": round(sum(session["seconds"] for session in sessions), 3),
+        "sessions": [
+            f"{session['began']}  {session['seconds']:.1f} s  {session['device']['device']}"
+            for session in sessions
+        ],
+    }
+
+
+def film_contents(path: Path) -> ImageContents:
+    """Return the picture of a film, and what it says of itself. Raises SceneError."""
+    from ...render.film import film_file
+    from ...render.film.layer_channels import channels_of
+
+    picture, summary = film_file.read(path).developed(), film_summary(path)
+    form, lambdas, quantity = picture.form, None, "value (linear)"
+    colours = picture.colours()
+    values = picture.image()
+    if form.bands:
+        lambdas, quantity = picture.spectral_image().lambdas, "radiance [W m^-2 sr^-1 nm^-1]"
+        labels = [f"{nm:g} nm" for nm in lambdas]
+    else:
+        beside = channels_of(picture.layers()) if form.layers else {}
+        beside |= {"samples.X": picture.samples_per_pixel()} if form.adaptive else {}
+        labels = [*"RGBA"[: values.shape[2]], *beside]
+        values = np.dstack([values, *beside.values()])
+    facts = {"size": size_text(values)} | {k: shown(v).plain for k, v in summary.items()}
+    stops = form.display_exposure
+    return ImageContents(path, values, tuple(labels), lambdas, colours, quantity, facts, stops)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import secrets
 import tempfile
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,21 +15,22 @@ from ...errors import ClptError, SceneError
 from ...render.film import film_file, layer_channels
 from ...render.film.denoised_picture import DenoisedPicture
 from ...render.film.saved_film import SavedFilm
-from ...render.pictures import DevicePictures
 from ...render.resumable import ResumableRenderer
 from ...version import VERSION
+from ..display import Display
 from ..options.grading import Grading
-from .standard_output import is_standard
-from .targets import FILM
+from .targets import FILM, is_standard
 
 Film = ResumableRenderer | SavedFilm  # what can be saved
 Source = Film | DenoisedPicture  # what pictures are taken of
 
 
-def metadata(renderer: DevicePictures, scene: Path, seconds: float) -> dict[str, str | int | float]:
+def metadata(
+    renderer: ResumableRenderer, scene: Path, seconds: float
+) -> dict[str, str | int | float]:
     """Return the metadata of an .exr: how it was made. spp is the mean over all pixels.
 
-    seconds: of this session; those of former ones are added.
+    seconds: of this session; the seconds of former sessions are added.
     """
     plan = renderer.scene
     return {
@@ -51,12 +51,12 @@ def write_all(
     film: Film,
     stats: dict[str, str | int | float],
     grading: Grading,
-    tell: Callable[[str], None],
+    shown: Display,
     denoise: str | None = None,
 ) -> None:
-    """Write the picture so far to every path, denoised where that was asked for; tell of each.
+    """Write the picture so far to every path, denoised where that was asked for; note each.
 
-    denoise: a denoiser, by default the one that the film was made for.
+    denoise: a denoiser, by default that of the film.
 
     A picture that cannot be written goes to another folder, and if that fails too the film does.
     Raises SceneError at the end, which says where it is.
@@ -69,13 +69,13 @@ def write_all(
             picture = DenoisedPicture(film, denoise)
             stats = {**stats, "denoised": picture.text}
         except ClptError as error:  # the picture is worth more
-            tell(f"clpt: warning: not denoised: {error}")
+            shown.note(f"clpt: warning: not denoised: {error}")
     for path in paths:
         source = film if path.suffix.lower() == FILM else picture
         try:
             write(path, source, stats, grading)
             name = "standard output" if is_standard(path) else path
-            tell(str(name))
+            shown.note(str(name))
         except FAILURES as error:
             rescued = _rescue(path, film, source, stats, grading)
             failures.append(f"{failure(path, error)}; {rescued}")

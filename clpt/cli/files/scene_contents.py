@@ -12,35 +12,37 @@ from ...scene import Scene, framing, materials, shapes, textures
 from ...scene.params import Kind, fields_of
 
 DIGITS = 4  # of bounds that people read
-OF_FILES = ("scenes", "variables", "asset")  # what some formats tell besides
+OF_FILES = ("scenes", "variables", "asset")  # further entries of some formats
 FLAT_TRIANGLES = {shapes.Rectangle: 2, shapes.Cube: 12}
 
 
 def summary(scene: Scene) -> dict[str, Any]:
-    """Return what a scene's file holds, without what the studio added.
+    """Return the contents of a scene's file, without additions of the studio.
 
     `triangles` counts those of meshes, cubes and rectangles once, `triangles_instanced` once for
     each instance; `spheres` counts those of shapes with many.
     """
     added = scene.extra.get("studio", {"camera": False, "shapes": 0, "lights": 0})
-    own = scene.shapes[: len(scene.shapes) - added["shapes"]]
-    groups = {id(shape.group): shape.group for shape in own if isinstance(shape, shapes.Instance)}
+    authored = scene.shapes[: len(scene.shapes) - added["shapes"]]
+    groups = {
+        id(shape.group): shape.group for shape in authored if isinstance(shape, shapes.Instance)
+    }
     inside = [shape for group in groups.values() for shape in group.shapes]
-    plain = [shape for shape in own if not isinstance(shape, shapes.Instance)]
+    plain = [shape for shape in authored if not isinstance(shape, shapes.Instance)]
     surfaces = [*plain, *inside]
     counts = {_arrays(shape): _triangles(shape) for shape in surfaces}
     kinds = list(_nested(surfaces))
     lights = [light.kind for light in scene.lights[: len(scene.lights) - added["lights"]]]
     lights += [shape.emission.kind for shape in surfaces if shape.emission is not None]
-    bounds = [corner.tolist() for corner in framing.world_bounds(own)] if own else None
+    bounds = [corner.tolist() for corner in framing.world_bounds(authored)] if authored else None
     return {
         "format": scene.extra.get("format", "python"),
         "triangles": sum(counts.values()),
-        "triangles_instanced": sum(_instanced_triangles(own, groups)),
+        "triangles_instanced": sum(_instanced_triangles(authored, groups)),
         "spheres": sum(len(s.centers) for s in surfaces if isinstance(s, shapes.Spheres)),
-        "instances": len(own) - len({_arrays(shape) for shape in plain}),
+        "instances": len(authored) - len({_arrays(shape) for shape in plain}),
         "bounds": bounds,
-        "shapes": dict(Counter(shape.kind for shape in own)),
+        "shapes": dict(Counter(shape.kind for shape in authored)),
         "cameras": scene.extra.get("cameras", [] if added["camera"] else [scene.camera.kind]),
         "lights": dict(Counter(lights)),
         "materials": _by_kind(kinds, materials.Material),
@@ -57,7 +59,7 @@ def summary(scene: Scene) -> dict[str, Any]:
 
 
 def tidy(contents: dict[str, Any]) -> dict[str, Any]:
-    """Return a summary for people: without what a scene does not have, and bounds rounded."""
+    """Return a summary for people: without empty entries, and with rounded bounds."""
     same = {"triangles_instanced": "triangles", "sampler_in_file": "sampler"}
     kept = {
         name: value
@@ -86,11 +88,11 @@ def _arrays(shape: shapes.Shape) -> int:
 
 
 def _instanced_triangles(
-    own: Iterable[shapes.Shape], groups: dict[int, shapes.Group]
+    members: Iterable[shapes.Shape], groups: dict[int, shapes.Group]
 ) -> Iterator[int]:
     """Yield the triangles that each shape adds to the scene."""
     sizes = {key: sum(map(_triangles, group.shapes)) for key, group in groups.items()}
-    for shape in own:
+    for shape in members:
         if isinstance(shape, shapes.Instance):
             yield sizes[id(shape.group)]
         else:
@@ -105,16 +107,16 @@ def _triangles(shape: shapes.Shape) -> int:
     return FLAT_TRIANGLES.get(type(shape), 0)
 
 
-def _nested(things: Iterable[Kind]) -> Iterator[Kind]:
-    """Yield the kinds within things: materials, lights and the textures in them."""
-    for thing in things:
-        yield thing
-        yield from _nested(value for value in fields_of(thing).values() if isinstance(value, Kind))
+def _nested(roots: Iterable[Kind]) -> Iterator[Kind]:
+    """Yield kinds and the kinds in their fields: materials, lights and their textures."""
+    for root in roots:
+        yield root
+        yield from _nested(value for value in fields_of(root).values() if isinstance(value, Kind))
 
 
-def _by_kind(things: Iterable[Kind], base: type[Kind]) -> dict[str, int]:
-    distinct = {id(thing): thing for thing in things if isinstance(thing, base)}
-    return dict(Counter(thing.kind for thing in distinct.values()))
+def _by_kind(objects: Iterable[Kind], base: type[Kind]) -> dict[str, int]:
+    distinct = {id(element): element for element in objects if isinstance(element, base)}
+    return dict(Counter(element.kind for element in distinct.values()))
 
 
 def _film(scene: Scene) -> dict[str, Any]:
@@ -125,5 +127,5 @@ def _film(scene: Scene) -> dict[str, Any]:
         "bands": 0, "alpha": False, "layers": (), "output_space": "rec709", "exposure": 1.0,
         "display_exposure": 0.0,
     }  # fmt: skip
-    unusual = {k: given for k, given in fields_of(film).items() if k in usual and given != usual[k]}
+    unusual = {k: value for k, value in fields_of(film).items() if k in usual and value != usual[k]}
     return {**size, **whole, "mode": film.mode, "filter": film.filter.kind, **unusual}

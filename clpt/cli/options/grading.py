@@ -14,14 +14,14 @@ from .records import Command, with_options
 from .values import Choice, Stops
 
 if TYPE_CHECKING:
-    from clpt.images.colour.view import View
+    from clpt.images.colour import View
 
 
 @dataclass(frozen=True)
 class Grading:
     """The form of pictures in files.
 
-    exposure [stops], or "auto"; tone: a curve of clpt.images.colour.tones; view: of OpenColorIO,
+    exposure [stops], or "auto"; tone: a curve of clpt.images.colour; view: of OpenColorIO,
     instead;
     names: of channels of an .exr, a set of clpt.choices.CHANNEL_NAMES.
     """
@@ -33,12 +33,12 @@ class Grading:
 
     def unused(self, targets: tuple[Path, ...]) -> str | None:
         """Return a sentence on options that concern none of the files, None without such."""
-        given = {
+        used = {
             "--exposure": self.exposure != 0.0,
             "--tone": self.tone != "none",
             "--view": self.view is not None,
         }
-        names = [name for name, was in given.items() if was]
+        names = [name for name, was in used.items() if was]
         if not names or for_screens(targets):
             return None
         suffixes = " ".join(FOR_SCREENS)
@@ -73,7 +73,7 @@ class GradingOptions:
             return Grading(self.exposure, self.tone or "none", names=self.names)
         if self.tone is not None:
             raise click.UsageError("a view has its own tone curve; leave out --tone")
-        from clpt.images.colour.view import View  # here: help needs no numpy
+        from clpt.images.colour import View  # here: help needs no numpy
 
         seen = View(self.view, display=self.display, look=self.look, config=self.ocio)
         return Grading(self.exposure, view=seen, names=self.names)
@@ -106,5 +106,5 @@ names_option = click.option(
 
 
 def grading_options(command: Command) -> Command:
-    """Give a command the options of which `GradingOptions` is the record."""
+    """Give a command the options of the record `GradingOptions`."""
     return with_options(command, _OPTIONS)

@@ -1,11 +1,12 @@
-"""Options of scenes and of those who render them: of `clpt render`, `view`, `warm` and others."""
+"""Options of scenes, devices and workers, with records of their values."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 
 import click
 
@@ -21,14 +22,62 @@ from ...choices import (
     Quality,
 )
 from ...formats import load
-from .changes import SceneChanges
-from .composition import composition_options
-from .loading_options import Bytes, loading_options
-from .records import Command, with_options
+from .changes import SceneChanges, composition_options
+from .loading import Bytes, loading_options
+from .records import Command, Decorator, with_options
 from .values import Choice, LightPaths, Names, SensorName, Size, White
 
 if TYPE_CHECKING:
     from ...scene import Scene
+
+Progress: TypeAlias = Callable[[float, str], None]  # of `clpt.load`
+
+
+LOCAL = "local:"
+
+
+class Where(click.ParamType):
+    """The address of a scheduler, or local:N."""
+
+    name = "ADDRESS"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str:
+        text = str(value)
+        if not re.fullmatch(rf"{LOCAL}[1-9]\d{{0,2}}|tls://.+:\d+", text):
+            self.fail(f"{text!r} is neither tls://HOST:PORT nor local:N")
+        return text
+
+
+@dataclass(frozen=True)
+class Workers:
+    """The address of a cluster, None for none, and the folder of its keys."""
+
+    cluster: str | None = None
+    keys: Path | None = None
+
+    @property
+    def number(self) -> int | None:
+        """The number of workers to start on this machine; None where an address has its own."""
+        where = self.cluster or ""
+        return int(where.removeprefix(LOCAL)) if where.startswith(LOCAL) else None
+
+
+def worker_options(text: str) -> Decorator:
+    """Return a decorator that gives a command the options of the record `Workers`.
+
+    text: the help of --cluster.
+    """
+    options = (
+        click.option("--cluster", type=Where(), help=text),
+        click.option(
+            "--keys", type=click.Path(path_type=Path),
+            help="Folder of the cluster's keys.  "
+            "[default: that of clpt cluster start on this machine]",
+        ),
+    )  # fmt: skip
+    return lambda command: with_options(command, options)
 
 
 @dataclass(frozen=True)
@@ -38,7 +87,7 @@ class Loading:
     variables: dict[str, Any]
     missing_textures: Missing = "error"
 
-    def read(self, file: Path, progress: Callable[[float, str], None] | None = None) -> Scene:
+    def read(self, file: Path, progress: Progress | None = None) -> Scene:
         """Return the scene of a file. Raises SceneError."""
         return load(
             file, progress=progress, missing_textures=self.missing_textures, **self.variables
@@ -47,7 +96,7 @@ class Loading:
 
 @dataclass(frozen=True)
 class Machine:
-    """Devices of this machine, by what --device says, and the cores that one may use.
+    """The value of --device, and the most cores of a CPU.
 
     profiling: whether stages are timed.
     """
@@ -58,29 +107,30 @@ class Machine:
 
 
 @dataclass(frozen=True)
-class Build:
-    """Options of renderers that are built: see `RenderOptions`."""
-
-    layout: str | None = None
-    tree_quality: Quality = "high"
-    texture_budget: int | None = None
-
-
-@dataclass(frozen=True)
 class SceneOptions:
     """The options of `scene_options`: a scene, changes of it, and who renders it."""
 
     loading: Loading
     changes: SceneChanges
     machine: Machine
-    build: Build
+    layout: str | None = None
+    tree_quality: Quality = "high"
+    texture_budget: int | None = None
 
     @property
-    def made(self) -> dict[str, Any]:
-        """The options of renderers, by their names there."""
-        return {**vars(self.build), "denoise": self.changes.denoise}
+    def renderer_options(self) -> dict[str, Any]:
+        """The options of renderers, see `RenderOptions`."""
+        return {**self.build, "denoise": self.changes.denoise}
 
-    def scene(self, file: Path, progress: Callable[[float, str], None] | None = None) -> Scene:
+    @property
+    def build(self) -> dict[str, Any]:
+        """The options of trees and textures, by their names in `RenderOptions`."""
+        return {
+            "layout": self.layout, "tree_quality": self.tree_quality,
+            "texture_budget": self.texture_budget,
+        }  # fmt: skip
+
+    def scene(self, file: Path, progress: Progress | None = None) -> Scene:
         """Return the scene of a file, changed. Raises SceneError, click.BadParameter."""
         from .applied import changed
 
@@ -170,5 +220,5 @@ _OPTIONS = (
 
 
 def scene_options(command: Command) -> Command:
-    """Give a command the options of which `SceneOptions` is the record."""
+    """Give a command the options of the record `SceneOptions`."""
     return with_options(composition_options(command), _OPTIONS)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from ...choices import AUTO, MOST_LIGHT_PATHS, MOST_SAMPLES, OBSERVERS
 from ...errors import nearest
+from ...formats import own_scenes
 
 LARGEST = 65536  # pixels of a side
 MOST_NOISE = 0.5  # that --noise takes: beyond, a few samples of each pixel are enough
@@ -17,7 +21,7 @@ MOST_STOPS = 120.0  # float32 has not many more
 
 
 class Choice(click.Choice):
-    """One of some names, in small letters or capitals."""
+    """A name among several, in small letters or capitals."""
 
     def __init__(self, names: Iterable[str]):
         super().__init__(tuple(names), case_sensitive=False)
@@ -31,10 +35,10 @@ class Size(click.ParamType):
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[int, int]:
-        found = re.fullmatch(r"(\d{1,9})x(\d{1,9})", str(value).strip().lower())
-        if not found:
+        match = re.fullmatch(r"(\d{1,9})x(\d{1,9})", str(value).strip().lower())
+        if not match:
             self.fail(f"{value!r} does not look like 640x480", param, ctx)
-        width, height = int(found[1]), int(found[2])
+        width, height = int(match[1]), int(match[2])
         if not (1 <= width <= LARGEST and 1 <= height <= LARGEST):
             self.fail(f"{width}x{height}: each side can be 1 to {LARGEST} pixels", param, ctx)
         return width, height
@@ -48,12 +52,12 @@ class Noise(click.ParamType):
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
-        found = re.fullmatch(r"(\d{1,9}(?:\.\d*)?|\.\d+)(?:e-?\d{1,2})?( ?%)?", str(value).strip())
-        if not found:
+        match = re.fullmatch(r"(\d{1,9}(?:\.\d*)?|\.\d+)(?:e-?\d{1,2})?( ?%)?", str(value).strip())
+        if not match:
             self.fail(f"{value!r} does not look like 0.02 or 2%", param, ctx)
-        share = float(str(value).strip().rstrip(" %")) / (100.0 if found[2] else 1.0)
+        share = float(str(value).strip().rstrip(" %")) / (100.0 if match[2] else 1.0)
         if share > MOST_NOISE:
-            percent = not found[2] and share / 100.0 <= MOST_NOISE
+            percent = not match[2] and share / 100.0 <= MOST_NOISE
             advice = f"; write {share:g}% or {share / 100.0:g}" if percent else ""
             self.fail(f"{value} is a noise above {MOST_NOISE:.0%}{advice}", param, ctx)
         return share
@@ -67,13 +71,13 @@ class Count(click.ParamType):
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> int:
-        found = re.fullmatch(r"(\d{1,10})(?:\.(\d{1,6}))?([kM]?)", str(value).strip())
+        match = re.fullmatch(r"(\d{1,10})(?:\.(\d{1,6}))?([kM]?)", str(value).strip())
         number = 0.0
-        if found:
+        if match:
             number = (
-                float(f"{found[1]}.{found[2] or 0}") * {"": 1, "k": 1000, "M": 1000_000}[found[3]]
+                float(f"{match[1]}.{match[2] or 0}") * {"": 1, "k": 1000, "M": 1000_000}[match[3]]
             )
-        if not found or number != int(number):
+        if not match or number != int(number):
             self.fail(f"{value!r} is no whole number such as 256, 1k or 1M", param, ctx)
         if not 1 <= number <= MOST_SAMPLES:
             self.fail(f"{value} is outside of 1 to {MOST_SAMPLES}", param, ctx)
@@ -131,11 +135,11 @@ class Names(click.ParamType):
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> Any:
-        given = tuple(str(value).lower().split(","))
-        for name in given:
+        names = tuple(str(value).lower().split(","))
+        for name in names:
             if name not in self.known:
                 self.fail(f"{name!r} is unknown{nearest(name, self.known)}", param, ctx)
-        return given
+        return names
 
 
 class White(click.ParamType):
@@ -154,3 +158,28 @@ class White(click.ParamType):
             names = {name.lower(): name for name in ("none", *illuminants())}
             return names.get(str(value).lower(), value)
         return numbers[0] if len(numbers) == 1 else tuple(numbers)
+
+
+class ScenePath(click.Path):
+    """The path of a file or a folder, or of a scene that comes with clpt."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Return clpt's own scenes that begin so, with files that are there; else any files."""
+        shipped = [path for path in own_scenes.paths() if path.startswith(incomplete)]
+        if not incomplete or not shipped:
+            return super().shell_complete(ctx, param, incomplete)
+        folder, _, name = incomplete.rpartition("/")
+        try:
+            names = sorted(os.listdir(folder or "."))
+        except OSError:
+            names = []
+        here = [
+            f"{folder}/{entry}" if folder else entry for entry in names if entry.startswith(name)
+        ]
+        files = [path for path in here if path not in shipped and path != own_scenes.SCENES]
+        return [CompletionItem(path) for path in (*shipped, *files)]

@@ -1,7 +1,9 @@
-"""Failures as the user reads them: one line, and an exit status."""
+"""Failures as the user reads them: a single line, and an exit status."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import click
@@ -16,7 +18,7 @@ BAD_INPUT, BUG = 2, 1
 
 
 def message_of(error: Exception) -> tuple[str, int]:
-    """Return what to say of an error, and the exit status: of bad input, or of a fault of clpt.
+    """Return the message of an error, and the exit status: of bad input, or of a fault of clpt.
 
     A fault keeps its traceback in a file.
     """
@@ -28,13 +30,13 @@ def message_of(error: Exception) -> tuple[str, int]:
 
 
 def complain(message: str) -> None:
-    """Print an error as one line."""
+    """Print an error as a single line."""
     terminal.clear_line()
     terminal.say(f"clpt: error: {message}")
 
 
 def _keep_traceback(error: Exception) -> str:
-    """Write the traceback of an error to clpt's log folder; a phrase that tells where."""
+    """Write the traceback of an error to clpt's log folder; return a phrase with its path."""
     import platformdirs
 
     from ...device import disk_cache  # here: most commands end without a fault, some without OpenCL
@@ -50,3 +52,19 @@ def _keep_traceback(error: Exception) -> str:
     except OSError:
         return ""
     return f" (a fault of clpt; please report it with {path})"
+
+
+@contextmanager
+def extra(name: str, purpose: str) -> Iterator[None]:
+    """Guard an import of packages that an extra of clpt installs.
+
+    Raises ClptError, which names the extra, where a package is not installed.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package == "clpt":
+            raise
+        message = f'{purpose} needs {package}: install it by pip install "clpt[{name}]"'
+        raise ClptError(message) from error

@@ -1,4 +1,4 @@
-"""The signals that end a command: Ctrl-C, and those by which a system ends a process."""
+"""The signals that end a command: Ctrl-C, and the signals of a system that ends processes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 from . import failures, terminal
 
-GRACE = 1.0  # seconds after a signal in which KeyboardInterrupt may end a process by itself
+GRACE = 1.0  # seconds that KeyboardInterrupt has to end a process by itself
 ENDING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)
 )  # as Ctrl-C, which is SIGINT
@@ -55,7 +55,7 @@ def tell() -> None:
 
 @contextmanager
 def stops() -> Iterator[list[int]]:
-    """Yield a list that the first signal's number is put into; a second one acts as always."""
+    """Yield a list that gets the first signal's number; a second signal acts as always."""
     caught: list[int] = []
     before: dict[int, Any] = {}
 
@@ -119,7 +119,7 @@ def prompt(last: Callable[[], None]) -> Iterator[None]:
 def _watch(reader: int, last: Callable[[], None], bound: int) -> None:
     """Read the numbers of signals until the pipe is closed; end the process if that takes long.
 
-    bound: how many signals there must be; GRACE after them, or at one more, the process ends.
+    bound: signals to wait for; GRACE after them, or at a further signal, the process ends.
     """
     number, count = 0, 0
     while select.select([reader], [], [], GRACE if count >= bound else None)[0]:

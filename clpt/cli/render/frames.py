@@ -8,12 +8,11 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -22,21 +21,19 @@ from clpt.render.flow.check import check
 from ... import images
 from ...device import share_compilers
 from ...errors import ClusterError, SceneError
-from ...render.pictures import DevicePictures
+from ...render.resumable import ResumableRenderer
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
 from ...version import VERSION
+from ..display import Display, clock
 from ..files import outputs, targets
-from ..opening.devices import choose_devices
-from ..opening.factories import RendererFactory, cluster_factories, device_factories
+from ..opening import RendererFactory, choose_devices, cluster_factories, device_factories
 from ..options.applied import changed
-from ..printing.display import Display, clock
 from ..process.stopping import STATUS, stops
 from . import video
-from .frame_values import expanded, has_number, numbered, varies
 from .passes import End, render_samples
-from .refused import refusals
-from .settings import Job
+from .report import refusals
+from .settings import Job, expanded, has_number, numbered, varies
 
 KEPT = (".exr", ".png")  # formats that keep a frame's fingerprint
 LOOK = 0.1  # seconds between two looks at signals
@@ -60,8 +57,8 @@ class _Frames:
                 "or give a scene of each frame, as scene.####.json"
             )
         named = numbered(scene, numbers[0]) if has_number(scene) else scene
-        outputs = job.output.paths or targets.default(named)
-        if not job.output.paths and job.animation.video is None:
+        outputs = job.paths or targets.default(named)
+        if not job.paths and job.animation.video is None:
             outputs = outputs[:1]  # .exr
         frames = cls(job, numbers, outputs)
         if job.animation.video is not None:
@@ -73,9 +70,9 @@ class _Frames:
 
     @property
     def pictures(self) -> list[Path]:
-        """The .png files of the first path that is one, of all frames."""
-        found = [path for path in self.outputs if path.suffix.lower() == ".png"]
-        return [numbered(path, frame) for path in found[:1] for frame in self.numbers]
+        """The .png files of all frames, of the first path that ends so."""
+        pngs = [path for path in self.outputs if path.suffix.lower() == ".png"]
+        return [numbered(path, frame) for path in pngs[:1] for frame in self.numbers]
 
     def file(self, frame: int) -> Path:
         """Return the scene file of a frame."""
@@ -130,7 +127,7 @@ def render_frames(job: Job, shown: Display) -> int:
 def _factories(
     job: Job, frames: int, shown: Display, resources: ExitStack
 ) -> Sequence[RendererFactory]:
-    """Return who renders frames: devices, or the workers of a cluster."""
+    """Return factories of renderers: of devices, or of the workers of a cluster."""
     if job.workers.cluster is not None:
         together = 1 if job.until.limit is not None else frames  # its time is a frame's own
         several = cluster_factories(job.workers, job.options, together, shown)
@@ -141,7 +138,7 @@ def _factories(
 
 
 class _FrameLoop:
-    """Threads that take frames, one for each factory, and one that reads scenes ahead."""
+    """A thread for each factory, which takes frames, and a thread that reads scenes ahead."""
 
     def __init__(
         self,
@@ -189,7 +186,7 @@ class _FrameLoop:
 
     def _work(self, factory: RendererFactory, reader: ThreadPoolExecutor) -> None:
         """Render frames with renderers of a factory, till none is left."""
-        renderer: DevicePictures | None = None
+        renderer: ResumableRenderer | None = None
         try:
             while (taken := self._take(reader)) is not None:
                 frame, scene = taken
@@ -214,13 +211,13 @@ class _FrameLoop:
         error: BaseException,
         taken: tuple[int, Future[tuple[Scene, str]]],
     ) -> bool:
-        """Leave a factory out, of which others get the frame; return whether there are others."""
+        """Leave a factory out, give its frame to others; return whether there are others."""
         with self._lock:
             self.factories = [factory for factory in self.factories if factory is not lost]
             self._ahead.appendleft(taken)
-        what = f"{lost.name} failed and is left out, others do its part: {error}"
+        message = f"{lost.name} failed and is left out, others do its part: {error}"
         if self.factories:
-            self.shown.note(f"clpt: warning: {what}")
+            self.shown.note(f"clpt: warning: {message}")
         return bool(self.factories)
 
     def _frame(
@@ -229,9 +226,9 @@ class _FrameLoop:
         scene: Scene,
         digest: str,
         factory: RendererFactory,
-        renderer: DevicePictures | None,
-    ) -> DevicePictures | None:
-        """Render a frame unless it is complete; return the renderer for the next one."""
+        renderer: ResumableRenderer | None,
+    ) -> ResumableRenderer | None:
+        """Render a frame unless it is complete; return the renderer for the next frame."""
         plan = self.plan
         if plan.is_complete(frame, digest):
             self._tell(frame, "is complete", 0.0)
@@ -254,28 +251,28 @@ class _FrameLoop:
         stats = outputs.metadata(renderer, plan.file(frame), seconds)
         stats |= {"frame": frame, "fingerprint": digest}
         grading, paths = plan.job.graded.grading, plan.targets(frame)
-        outputs.write_all(paths, renderer, stats, grading, lambda text: None)
+        outputs.write_all(paths, renderer, stats, grading, Display())
         bad = "".join(f", {text}" for text in refusals(renderer))
         done = f"{paths[0]}  {stats['spp']:.4g} spp, {seconds:.1f} s{bad}"
         self._tell(frame, done, time.perf_counter() - began)
         return renderer
 
-    def _tell(self, frame: int, what: str, seconds: float) -> None:
-        """Say that a frame is done, and how long the rest takes."""
+    def _tell(self, frame: int, event: str, seconds: float) -> None:
+        """Say that a frame is done, and how long the remaining frames take."""
         with self._lock:
             self._done += 1
             self._rendered += seconds > 0.0
             left = len(self.plan.numbers) - self._done
             passed = time.perf_counter() - self._began
-            rest = f"; {clock(passed / self._rendered * left)} left" if self._rendered else ""
+            remaining = f"; {clock(passed / self._rendered * left)} left" if self._rendered else ""
             number = f"{self._done} of {len(self.plan.numbers)}"
-        self.shown.note(f"frame {frame} ({number}): {what}{rest if left else ''}")
+        self.shown.note(f"frame {frame} ({number}): {event}{remaining if left else ''}")
 
 
 def _showing(
-    scene: Scene, factory: RendererFactory, renderer: DevicePictures | None, shown: Display
-) -> DevicePictures:
-    """Return a renderer of a scene: the one that there is, if it can take the scene."""
+    scene: Scene, factory: RendererFactory, renderer: ResumableRenderer | None, shown: Display
+) -> ResumableRenderer:
+    """Return a renderer of a scene: the former renderer, if it can take the scene."""
     if renderer is not None:
         try:
             renderer.update(scene=scene)
@@ -289,14 +286,12 @@ def _showing(
 
 def _fingerprint_of(path: Path) -> str | None:
     """The fingerprint that a frame's file keeps; None without, or where it cannot be read."""
-    read: Callable[[Path], Mapping[str, Any]] = images.attributes
-    if path.suffix.lower() == ".png":
-        read = images.png_text
     try:
         if path.suffix.lower() not in KEPT or not path.is_file():
             return None
         images.read_stored(path)  # all of it: a file may be cut off
-        found = read(path).get("fingerprint")
+        png = path.suffix.lower() == ".png"
+        kept = (images.png_text(path) if png else images.attributes(path)).get("fingerprint")
     except (SceneError, OSError, RuntimeError, ValueError, SyntaxError):
         return None
-    return found if isinstance(found, str) else None
+    return kept if isinstance(kept, str) else None

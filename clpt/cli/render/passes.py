@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ...choices import MOST_SAMPLES
-from ...render.pictures import DevicePictures
 from ...render.progress import Progress
+from ...render.resumable import ResumableRenderer
 from ...render.wavefront.wavefront import Counts
-from ..opening.factories import DEVICE_SECONDS
+from ..opening import DEVICE_SECONDS
 
 GROWTH = 3  # times what has been rendered so far
 
@@ -32,7 +32,7 @@ class End:
 
 
 def render_samples(
-    renderer: DevicePictures,
+    renderer: ResumableRenderer,
     end: End,
     show: Callable[[Progress], None],
     after_pass: Callable[[], None] = lambda: None,
@@ -41,8 +41,8 @@ def render_samples(
 ) -> None:
     """Render until the end.
 
-    after_pass: is called when a pass has come to its end; pass_seconds: of a pass, infinite for a
-    single one.
+    show: called with the progress; after_pass: called at the end of a pass; pass_seconds: of a
+    pass, infinite for a single pass.
 
     It ends soon after the limit, perhaps before every pixel has a sample, and within a second of a
     signal.
@@ -51,7 +51,15 @@ def render_samples(
     if renderer.samples >= last:
         return
     began = time.perf_counter()
-    tell = _teller(renderer, end, show, began)
+    total = 0 if end.samples is None else end.samples - first
+    former = renderer.counts if renderer.samples > first else Counts()
+
+    def tell(progress: Progress) -> bool:
+        seconds = time.perf_counter() - began
+        paths, rays = progress.paths - former.samples, progress.rays - former.rays
+        show(dataclasses.replace(progress, total=total, seconds=seconds, paths=paths, rays=rays))
+        return not (end.stopped or (limit is not None and seconds >= limit))
+
     size, now = 1 if math.isfinite(pass_seconds) else last - renderer.samples, began
     while renderer.run(size, tell, noise=end.noise):
         after_pass()
@@ -61,26 +69,7 @@ def render_samples(
         if end.stopped or samples_left <= 0 or seconds_left <= 0 or renderer.active == 0.0:
             break
         rate = size / max(now - start, 1e-9)
-        done = renderer.samples - first
-        size = pass_size(done, rate, samples_left, seconds_left, pass_seconds)
-
-
-def _teller(
-    renderer: DevicePictures, end: End, show: Callable[[Progress], None], began: float
-) -> Callable[[Progress], bool]:
-    """Return what shows the progress since `began`, and tells whether the render goes on."""
-    first = renderer.first_sample
-    total = 0 if end.samples is None else end.samples - first
-    others = renderer.counts if renderer.samples > first else Counts()  # who rendered before
-
-    def tell(progress: Progress) -> bool:
-        seconds = time.perf_counter() - began
-        paths, rays = progress.paths - others.samples, progress.rays - others.rays
-        show(dataclasses.replace(progress, total=total, seconds=seconds, paths=paths, rays=rays))
-        over = end.seconds is not None and seconds >= end.seconds
-        return not (end.stopped or over)
-
-    return tell
+        size = pass_size(renderer.samples - first, rate, samples_left, seconds_left, pass_seconds)
 
 
 def pass_size(

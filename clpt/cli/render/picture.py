@@ -1,32 +1,44 @@
-"""A picture of one scene, by devices of this machine or by workers, and all files of it."""
+"""The picture of a scene, by devices of this machine or by workers, and its files."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import ClusterError
+from ...render.film.layer_channels import channels_of
 from ...render.film.saved_film import SavedFilm
-from ...render.pictures import DevicePictures
 from ...render.progress import Progress
+from ...render.resumable import ResumableRenderer
 from ...scene import Scene
+from ..display import Display, device_names
 from ..files import checkpoints, outputs
-from ..opening.factories import DeviceFactory, RendererFactory, cluster_factories, device_factories
-from ..opening.scenes import open_scene, read_scene
-from ..options.grading import for_screens
-from ..printing.display import Display
-from ..printing.names import device_names
+from ..files.outputs import Film
+from ..opening import (
+    DeviceFactory,
+    RendererFactory,
+    cluster_factories,
+    device_factories,
+    open_scene,
+    read_scene,
+)
+from ..options.grading import Grading, for_screens
 from ..process.stopping import STATUS, stops
-from . import brightness, report
+from . import report
 from .passes import End, render_samples
-from .refused import refusals
+from .report import refusals
 from .settings import Job
-from .so_far import PictureSoFar
-from .tev_viewer import showing
+
+if TYPE_CHECKING:
+    from clpt.images.tev import Viewer
 
 
 def render_picture(job: Job, shown: Display, began: float) -> int:
@@ -34,23 +46,24 @@ def render_picture(job: Job, shown: Display, began: float) -> int:
 
     began: the command, or the scene of several [s of time.perf_counter].
 
-    Raises what the render raises, after the picture so far and the film are written.
+    Raises errors of the render after the picture so far and the film are written.
     """
     if text := job.graded.grading.unused(job.targets):
         shown.note(f"clpt: warning: {text}")
-    former = _Former.find(job, shown.note)
+    former = _Former.find(job, shown)
     with ExitStack() as resources:
-        opened = _open(job, former, shown, resources)
+        opened = _open(job, shown, resources)
+        former.check(job, opened.scene)
         renderer = opened.factory.make(opened.scene, shown, job.until.first)
         resources.callback(renderer.close)
         shown.note(report.header(shown.name, renderer, opened.where))
-        end = former.go_on(renderer, job.until.end(opened.scene), shown.note)
+        end = former.go_on(renderer, job.until.end(opened.scene), shown)
         opened.tell_before(job.verbose)
-        picture = _Picture(job, renderer, former, shown)
-        viewer = showing(job.tev, job.scene.name, renderer, shown.note)
-        with stops() as stopped, viewer as show_picture:
+        picture = _Picture(job, renderer, former, shown, opened.factory)
+        resources.callback(picture.close)
+        with stops() as stopped:
             ends = End(end, job.until.limit, renderer.scene.noise, stopped)
-            picture.render(opened.factory, ends, show_picture)
+            picture.render(ends)
             picture.finish(bool(stopped))
             shown.note(report.ending(renderer, ends, time.perf_counter() - began))
         opened.tell_after(job.verbose)
@@ -68,10 +81,10 @@ class _Former:
     film: SavedFilm | None
 
     @classmethod
-    def find(cls, job: Job, note: Callable[[str], None]) -> _Former:
-        """Return what there is of a picture, and is not to be left alone. Raises SceneError."""
+    def find(cls, job: Job, shown: Display) -> _Former:
+        """Find the checkpoint to go on from, if any. Raises SceneError."""
         path = checkpoints.path_of(job.scene, job.targets)
-        return cls(path, checkpoints.find(path, job.resuming.resume, note))
+        return cls(path, checkpoints.find(path, job.resume, shown))
 
     def check(self, job: Job, scene: Scene) -> None:
         """Raise SceneError where the render cannot take its samples, or not go on."""
@@ -81,20 +94,18 @@ class _Former:
             first, end = job.until.numbers or (0, None)
             checkpoints.check(self.film, self.path, scene, first, end, gaps=gaps)
 
-    def go_on(
-        self, renderer: DevicePictures, end: int | None, note: Callable[[str], None]
-    ) -> int | None:
+    def go_on(self, renderer: ResumableRenderer, end: int | None, shown: Display) -> int | None:
         """Give the film to a renderer; return the end of its samples, see `Until.end`."""
         if self.film is None:
             return end
-        checkpoints.go_on(renderer, self.film, self.path, note)
-        taken = self.film.film.taken  # workers take what is missing before its last sample too
+        checkpoints.go_on(renderer, self.film, self.path, shown)
+        taken = self.film.film.taken  # workers also take missing samples before its last
         return max(end, taken[-1][1]) if end and taken else end
 
 
 @dataclass(frozen=True)
 class _Opened:
-    """A scene, and what makes its renderer; devices: the same, on this machine; loading [s]."""
+    """A scene, and the factory of its renderer; devices: the same, on this machine; loading [s]."""
 
     scene: Scene
     factory: RendererFactory
@@ -103,35 +114,31 @@ class _Opened:
 
     @property
     def where(self) -> str:
-        """Who renders, in short."""
+        """Short names of devices or workers."""
         if self.devices is None:
             return f"workers of {self.factory.name}"
         return device_names([on.info for on in self.devices.devices])
 
     def tell_before(self, verbose: int) -> None:
-        """Print what the devices have made of the scene."""
+        """Print sizes of the encoded scene on the devices."""
         if verbose and self.devices is not None:
             report.before(self.devices.renderer, self.loading)
 
     def tell_after(self, verbose: int) -> None:
-        """Print what the devices have done."""
+        """Print the work of the devices."""
         if verbose and self.devices is not None:
             report.after(self.devices.renderer)
 
 
-def _open(job: Job, former: _Former, shown: Display, resources: ExitStack) -> _Opened:
-    """Return the scene, checked, and what renders it; resources: get what is to be closed."""
-
-    def accept(scene: Scene) -> None:
-        former.check(job, scene)
-
+def _open(job: Job, shown: Display, resources: ExitStack) -> _Opened:
+    """Return the scene and the factory of its renderer; resources: closed at the end."""
     if job.workers.cluster is not None:
-        scene = read_scene(job.scene, job.options, shown, accept)
+        scene = read_scene(job.scene, job.options, shown)
         (workers,) = resources.enter_context(cluster_factories(job.workers, job.options, 1, shown))
         return _Opened(scene, workers)
-    found = open_scene(job.scene, job.options, shown, resources, accept)
-    (devices,) = device_factories(found.devices, job.options, 1)
-    return _Opened(found.scene, devices, devices, found.loading)
+    scene, opened, loading = open_scene(job.scene, job.options, shown, resources)
+    (devices,) = device_factories(opened, job.options, 1)
+    return _Opened(scene, devices, devices, loading)
 
 
 class _Picture:
@@ -140,44 +147,61 @@ class _Picture:
     ready: when it began [s of time.perf_counter].
     """
 
-    def __init__(self, job: Job, renderer: DevicePictures, former: _Former, shown: Display):
-        self._job, self._renderer, self._shown = job, renderer, shown
+    def __init__(
+        self,
+        job: Job,
+        renderer: ResumableRenderer,
+        former: _Former,
+        shown: Display,
+        factory: RendererFactory,
+    ):
+        self._job, self._renderer, self._shown, self._factory = job, renderer, shown, factory
         self.ready = time.perf_counter()
-        period, every, note = job.resuming.period, job.output.every, shown.note
-        going_on, grading = former.film is not None, job.graded.grading
         self._writer = checkpoints.Checkpoints(
-            renderer, former.path, period, going_on, job.targets, note
+            renderer, former.path, job.period, former.film is not None, job.targets, shown
         )
-        self._so_far = PictureSoFar(every, job.targets, renderer, self._stats, grading, note)
-        self._adaptive = renderer.scene.noise is not None or (
+        self._so_far = PictureSoFar(job.every, job.targets, renderer, job.graded.grading, shown)
+        self._viewer: Viewer | None = None
+        if job.tev is not None:
+            from clpt.images.tev import Viewer  # here: most renders show nothing
+
+            self._viewer = Viewer(job.scene.name, *job.tev, tell=shown.note)
+        adaptive = renderer.scene.noise is not None or (
             former.film is not None and bool(former.film.adaptive)
         )
+        self._pass_seconds = factory.pass_seconds(adaptive, job.period, job.every)
+        self._single = math.isinf(self._pass_seconds)  # a pass, whose film is whole at any time
 
-    def render(self, factory: RendererFactory, end: End, show_picture: Callable[[], None]) -> None:
-        """Render until the end, and write now and then; show_picture: called after each pass."""
-        seconds = factory.pass_seconds(
-            self._adaptive, self._job.resuming.period, self._job.output.every
-        )
-        single = math.isinf(seconds)  # a pass, whose film is whole at any time
+    def close(self) -> None:
+        """Leave the viewer."""
+        if self._viewer is not None:
+            self._viewer.close()
 
-        def after_pass() -> None:
+    def render(self, end: End) -> None:
+        """Render until the end, and write now and then."""
+        with self._rescuing(), self._shown.rendering():
+            render_samples(
+                self._renderer, end, self._show, self._after_pass, pass_seconds=self._pass_seconds
+            )
+        self._ended()
+
+    def _show(self, progress: Progress) -> None:
+        self._factory.look(progress)
+        if self._single:
             self._after_pass()
-            show_picture()
+        self._shown.show(progress)
 
-        def show(progress: Progress) -> None:
-            factory.look(progress)
-            if single:
-                after_pass()
-            self._shown.show(progress)
+    def _after_pass(self) -> None:
+        self._writer.after_pass()
+        if self._so_far.is_due and self._has_samples:
+            self._so_far.write(self._stats())
+        if self._viewer is not None:
+            self._viewer.show(channels_so_far(self._renderer))
 
-        def ended() -> None:
-            factory.report()
-            if single:
-                self._writer.hold()
-
-        with self._rescuing(ended), self._shown.rendering():
-            render_samples(self._renderer, end, show, after_pass, pass_seconds=seconds)
-        ended()
+    def _ended(self) -> None:
+        self._factory.report()
+        if self._single:
+            self._writer.hold()
 
     def finish(self, stopped: bool) -> None:
         """Write the picture, and the film if it stays. Raises ClusterError without a sample."""
@@ -192,14 +216,14 @@ class _Picture:
         """Note pixels without a sample, and samples that the film refused."""
         few = [f"only {share:.1%} of the pixels have a sample; others are black"] * (share < 1.0)
         grading, targets = self._job.graded.grading, self._job.targets
-        told = [*few, *refusals(self._renderer)]
+        warnings = [*few, *refusals(self._renderer)]
         if self._has_samples:
             if grading.exposure == "auto" and for_screens(targets):
-                self._shown.note(f"exposure {brightness.exposure_found(self._renderer):+.1f} stops")
-            elif for_screens(targets) and (said := brightness.display_exposure(self._renderer)):
+                self._shown.note(f"exposure {report.exposure_found(self._renderer):+.1f} stops")
+            elif for_screens(targets) and (said := report.display_exposure(self._renderer)):
                 self._shown.note(said)
-            told += brightness.remarks(self._renderer, grading, targets)
-        for text in told:
+            warnings += report.remarks(self._renderer, grading, targets)
+        for text in warnings:
             self._shown.note(f"clpt: warning: {text}")
 
     @property
@@ -210,38 +234,90 @@ class _Picture:
         seconds = time.perf_counter() - self.ready
         return outputs.metadata(self._renderer, self._job.scene, seconds)
 
-    def _after_pass(self) -> None:
-        self._writer.after_pass()
-        if self._has_samples:
-            self._so_far.after_pass()
-
     def _write(self) -> float:
         """Write the files of the picture; return the samples of a pixel in the mean."""
         job, stats, denoiser = self._job, self._stats(), self._renderer.denoise
         with self._shown.phase(f"denoising ({denoiser})") if denoiser else nullcontext():
-            outputs.write_all(
-                job.targets, self._renderer, stats, job.graded.grading, self._shown.note
-            )
+            outputs.write_all(job.targets, self._renderer, stats, job.graded.grading, self._shown)
         return float(stats["spp"])
 
     @contextmanager
-    def _rescuing(self, ended: Callable[[], None]) -> Iterator[None]:
+    def _rescuing(self) -> Iterator[None]:
         """Write the film and the picture so far, where they can be read, if it fails inside."""
-
-        def write_film() -> None:
-            self._writer.save(False, failed=True)
-
-        def write_picture() -> None:
-            if self._has_samples:
-                self._warn(self._write())
-
         try:
             yield
         except Exception:
-            for step in ended, write_film, write_picture:
+            for step in self._ended, self._rescue_film, self._rescue_picture:
                 try:
                     step()
                 except outputs.FAILURES as error:
                     self._shown.note(f"clpt: warning: {error}")
             self._writer.finish(True)
             raise
+
+    def _rescue_film(self) -> None:
+        self._writer.save(False, failed=True)
+
+    def _rescue_picture(self) -> None:
+        if self._has_samples:
+            self._warn(self._write())
+
+
+class PictureSoFar:
+    """Writes the picture of a render that goes on, at the ends of its passes.
+
+    A reader sees a whole picture at any time, see clpt.files.output_files. A file that cannot be
+    written is noted once, and tried again; the render goes on.
+
+    period: seconds between pictures, None: never.
+    """
+
+    def __init__(
+        self,
+        period: float | None,
+        targets: tuple[Path, ...],
+        source: outputs.Source,
+        grading: Grading,
+        shown: Display,
+    ):
+        self._period, self._targets, self._source = period or math.inf, targets, source
+        self._grading, self._shown = grading, shown
+        self._due = time.monotonic() + self._period
+        self._failed: set[Path] = set()
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the period since the last picture is over."""
+        return time.monotonic() >= self._due
+
+    def write(self, stats: dict[str, str | int | float]) -> None:
+        """Write the picture; stats: its metadata."""
+        for path in self._targets:
+            self._write(path, stats)
+        self._due = time.monotonic() + self._period  # from its end: a render is not all writing
+
+    def _write(self, path: Path, stats: dict[str, str | int | float]) -> None:
+        try:
+            outputs.write(path, self._source, stats, self._grading)
+        except outputs.FAILURES as error:
+            if path not in self._failed:
+                self._shown.note(
+                    f"clpt: warning: {outputs.failure(path, error)}; the render goes on"
+                )
+            self._failed.add(path)
+        else:
+            self._failed.discard(path)
+
+
+def channels_so_far(source: Film) -> dict[str, NDArray[np.float32]]:
+    """Return all channels of the picture so far, (h, w) by name: colours, layers, bands."""
+    picture = source.picture()
+    channels = {letter: picture[..., i] for i, letter in enumerate("RGBA"[: picture.shape[2]])}
+    channels |= channels_of(source.layers())
+    if source.form.adaptive:
+        channels["samples.X"] = source.samples_per_pixel()
+    if source.form.bands:
+        spectral = source.spectral_image()
+        for nm, band in zip(spectral.lambdas, np.moveaxis(spectral.values, 2, 0), strict=True):
+            channels[f"bands.{nm:g}nm"] = band
+    return channels

@@ -2,26 +2,39 @@
 
 from __future__ import annotations
 
+import ast
+import operator
 import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from clpt.files import output_files
+
 from ...choices import MOST_SAMPLES, MOST_SEED, VIEWER
-from ..files.standard_output import FORMATS
-from ..files.targets import default
-from ..options.changes import Sampling
+from ..files.targets import STANDARD_FORMATS, default
 from ..options.grading import GradingOptions
 from ..options.records import Command, with_options
-from ..options.scene_options import SceneOptions
+from ..options.scene_options import SceneOptions, Workers
 from ..options.values import Choice, Count, Noise
-from ..options.workers import Workers
-from .frame_values import Frames
 
 if TYPE_CHECKING:
     from ...scene import Scene
+
+MOST_FRAMES = 10**6
+DIGITS = 4  # of a frame's number in a name that says nothing else
+
+_NUMBER = re.compile(r"#+|%0?(\d?)d")
+_BRACES = re.compile(r"\{([^{}]*)\}")
+_FORM = re.compile(r"0?\d{0,2}(\.\d{1,2})?[defg]?")
+_OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
+    ast.Div: operator.truediv, ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod,
+    ast.USub: operator.neg, ast.UAdd: operator.pos,
+}  # fmt: skip
 
 
 class SampleRange(click.ParamType):
@@ -32,10 +45,10 @@ class SampleRange(click.ParamType):
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[int, int]:
-        found = re.fullmatch(r"(\d{1,10}):(\d{1,10})", str(value).strip())
-        if not found or not int(found[1]) < int(found[2]) <= MOST_SAMPLES:
+        match = re.fullmatch(r"(\d{1,10}):(\d{1,10})", str(value).strip())
+        if not match or not int(match[1]) < int(match[2]) <= MOST_SAMPLES:
             self.fail(f"{value!r} is no range of samples such as 0:1024", param, ctx)
-        return int(found[1]), int(found[2])
+        return int(match[1]), int(match[2])
 
 
 class Duration(click.ParamType):
@@ -49,11 +62,11 @@ class Duration(click.ParamType):
     ) -> float:
         text = str(value).strip().lower()
         number = r"(\d+(?:\.\d+)?)"
-        found = re.fullmatch(rf"(?:{number}h)?(?:{number}m)?(?:{number}s?)?", text)
-        if not text or not found:
+        match = re.fullmatch(rf"(?:{number}h)?(?:{number}m)?(?:{number}s?)?", text)
+        if not text or not match:
             self.fail(f"{value!r} does not look like 30s, 5m or 1h30m", param, ctx)
-        hours, minutes, rest = (float(n or 0) for n in found.groups())
-        seconds = 3600 * hours + 60 * minutes + rest
+        hours, minutes, seconds_part = (float(n or 0) for n in match.groups())
+        seconds = 3600 * hours + 60 * minutes + seconds_part
         if not self.least <= seconds < 1e9:
             self.fail(f"{value!r} is no time to render in", param, ctx)
         return seconds
@@ -63,6 +76,26 @@ class Period(Duration):
     """A time, or 0."""
 
     least = 0.0
+
+
+class Frames(click.ParamType):
+    """FIRST:LAST or FIRST:LAST:STEP, both included, or a single number; returned as a range."""
+
+    name = "FIRST:LAST"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> range:
+        match = re.fullmatch(r"(\d{1,9})(?::(\d{1,9}))?(?::(\d{1,9}))?", str(value).strip())
+        if not match:
+            self.fail(f"{value!r} does not look like 1:240, 1:240:2 or 7", param, ctx)
+        first, last, step = int(match[1]), int(match[2] or match[1]), int(match[3] or 1)
+        if last < first or not step:
+            self.fail(f"{value!r} has no frames", param, ctx)
+        frames = range(first, last + 1, step)
+        if len(frames) > MOST_FRAMES:
+            self.fail(f"{value!r} are more than {MOST_FRAMES} frames", param, ctx)
+        return frames
 
 
 class Address(click.ParamType):
@@ -84,24 +117,17 @@ class Address(click.ParamType):
 
 
 @dataclass(frozen=True)
-class Output:
-    """The files of the picture, and how often they are written while it is rendered [s]."""
-
-    paths: tuple[Path, ...]
-    every: float | None
-
-
-@dataclass(frozen=True)
 class Until:
-    """When a render ends: by its samples and noise, a time [s], or the numbers of its samples."""
+    """When a render ends: samples and noise, a time [s], or the numbers of its samples."""
 
-    sampling: Sampling
+    spp: int | None
+    noise: float | None
     limit: float | None
     numbers: tuple[int, int] | None
 
     def check(self) -> None:
         """Raise click.UsageError for options that say different things."""
-        if self.numbers and (self.sampling.spp or self.sampling.noise):
+        if self.numbers and (self.spp or self.noise):
             message = "--samples says how many there are; leave out --spp and --noise"
             raise click.UsageError(message)
 
@@ -114,16 +140,8 @@ class Until:
         """Return the end of the samples, None where the limit or the noise ends the render."""
         if self.numbers:
             return self.numbers[1]
-        free = self.limit is not None or self.sampling.noise
-        return self.sampling.spp if free else scene.spp
-
-
-@dataclass(frozen=True)
-class Resuming:
-    """The seconds between two films that are saved, and whether the render goes on from one."""
-
-    period: float | None
-    resume: bool | None
+        free = self.limit is not None or self.noise
+        return self.spp if free else scene.spp
 
 
 @dataclass(frozen=True)
@@ -134,28 +152,20 @@ class Animation:
     fps: float
     video: Path | None
 
-    def check(self, output: Output, until: Until, resuming: Resuming) -> None:
-        """Raise click.UsageError for options that do not go together."""
-        if self.frames is None:
-            if self.video is not None:
-                raise click.UsageError("--video needs --frames")
-            return
-        if until.numbers or resuming.period is not None or resuming.resume is not None:
-            raise click.UsageError("frames go on by themselves: leave out what saves one picture")
-        if output.every is not None:
-            raise click.UsageError("each frame is written when it is complete: leave out --every")
-
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """The options of `clpt render`: when a render ends, who renders, what is written and told.
+    """The options of `clpt render`: when a render ends, devices, files and messages.
 
-    tev: host and port of a viewer; verbose: whether figures are printed.
+    every: seconds between pictures so far; period: seconds between checkpoints; resume: whether to
+    go on from a checkpoint; tev: host and port of a viewer; verbose: whether figures are printed.
     """
 
-    output: Output
+    paths: tuple[Path, ...]
+    every: float | None
     until: Until
-    resuming: Resuming
+    period: float | None
+    resume: bool | None
     animation: Animation
     options: SceneOptions
     workers: Workers
@@ -170,11 +180,17 @@ class Settings:
         if self.tev is not None and (animated or self.workers.cluster is not None):
             message = "--tev shows one picture of this machine: not with these options yet"
             raise click.UsageError(message)
-        self.animation.check(self.output, self.until, self.resuming)
+        if self.animation.video is not None and not animated:
+            raise click.UsageError("--video needs --frames")
+        saves = self.until.numbers or self.period is not None or self.resume is not None
+        if animated and saves:
+            raise click.UsageError("frames go on by themselves: leave out what saves one picture")
+        if animated and self.every is not None:
+            raise click.UsageError("each frame is written when it is complete: leave out --every")
         self.until.check()
 
     def of(self, scene: Path) -> Job:
-        """Return what is rendered of a scene."""
+        """Return the job of a scene."""
         machine = replace(self.options.machine, profiling=bool(self.verbose))
         options = replace(self.options, machine=machine)
         return Job(scene=scene, **(vars(self) | {"options": options}))
@@ -190,7 +206,7 @@ class Job(Settings):
     @property
     def targets(self) -> tuple[Path, ...]:
         """The files of the picture."""
-        return self.output.paths or default(self.scene)
+        return self.paths or default(self.scene)
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -204,11 +220,10 @@ class Job(Settings):
         def name(path: Path) -> Path:
             return Path(str(path).replace(old, new))
 
-        output, animation = self.output, self.animation
-        output = replace(output, paths=tuple(map(name, output.paths)))
+        animation = self.animation
         if animation.video is not None:
             animation = replace(animation, video=name(animation.video))
-        return replace(self, output=output, animation=animation)
+        return replace(self, paths=tuple(map(name, self.paths)), animation=animation)
 
     def with_variables(self, variables: dict[str, Any]) -> Job:
         """Return the job with other values of the scene's variables."""
@@ -226,7 +241,7 @@ _OUTPUT = (
         "[default: {scene}.exr and {scene}.png]",
     ),
     click.option(
-        "--format", "form", type=Choice(FORMATS),
+        "--format", "form", type=Choice(STANDARD_FORMATS),
         help="Of the picture of -o -.  [default: png]",
     ),
     click.option(
@@ -285,5 +300,66 @@ tev_option = click.option(
 
 
 def picture_options(command: Command) -> Command:
-    """Give a command the options of which the records of this module are made, and the seed."""
+    """Give a command the options of the records of this module, and the seed."""
     return with_options(command, (*_OUTPUT, *_UNTIL, *_RESUMING, _SEED, *_ANIMATION))
+
+
+def has_number(path: Path) -> bool:
+    """Whether a name has a place for a frame's number: #### or %04d."""
+    return _NUMBER.search(path.name) is not None
+
+
+def numbered(path: Path, frame: int) -> Path:
+    """Return the name of a frame's file: #### or %04d is its number, or else a number is added."""
+    if not has_number(path):
+        return output_files.beside(path, f".{frame:0{DIGITS}}{path.suffix}")
+
+    def number(match: re.Match[str]) -> str:
+        digits = len(match[0]) if match[0][0] == "#" else int(match[1] or 1)
+        return f"{frame:0{digits}}"
+
+    return path.with_name(_NUMBER.sub(number, path.name))
+
+
+def varies(variables: Mapping[str, str]) -> bool:
+    """Whether a value has an expression in braces."""
+    return any(_BRACES.search(value) for value in variables.values())
+
+
+def expanded(variables: Mapping[str, str], frame: int, fps: float) -> dict[str, str]:
+    """Return the values of a frame's variables.
+
+    Braces hold arithmetic of numbers, `frame` and `time`, which is frame / fps [s], by + - * / // %
+    and parentheses; behind a colon the form of the number, as in {frame:04}.
+
+    Raises click.BadParameter.
+    """
+    names = {"frame": frame, "time": frame / fps}
+
+    def value(match: re.Match[str]) -> str:
+        text, _, form = match[1].partition(":")
+        try:
+            if not _FORM.fullmatch(form):
+                raise ValueError(f"{form!r} is no form of a number")
+            return format(_computed(ast.parse(text.strip(), mode="eval").body, names), form)
+        except (SyntaxError, ValueError, ArithmeticError, RecursionError, MemoryError) as error:
+            why = "it is no arithmetic" if isinstance(error, SyntaxError) else error
+            raise click.BadParameter(f"{match[0]}: {why}", param_hint="-D") from error
+
+    return {name: _BRACES.sub(value, text) for name, text in variables.items()}
+
+
+def _computed(node: ast.expr, names: Mapping[str, float]) -> float:
+    """The value of an expression. Raises ValueError for more than arithmetic."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
+        return node.value
+    if isinstance(node, ast.Name):
+        if node.id not in names:
+            raise ValueError(f"there is no {node.id!r}; known: {', '.join(names)}")
+        return names[node.id]
+    if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:
+        return _OPERATORS[type(node.op)](_computed(node.operand, names))
+    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+        sides = _computed(node.left, names), _computed(node.right, names)
+        return _OPERATORS[type(node.op)](*sides)
+    raise ValueError("only numbers, frame, time, + - * / // % and parentheses are known")

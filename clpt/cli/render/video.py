@@ -22,7 +22,7 @@ from clpt import images
 from clpt.files import output_files
 
 from ...errors import SceneError
-from ..process.extras import extra
+from ..process.failures import extra
 from ..process.stopping import stops
 
 LOOK = 0.02  # seconds between two looks at ffmpeg
@@ -50,7 +50,7 @@ def check(path: Path) -> None:
 
 
 def write(path: Path, frames: Sequence[Path], fps: float) -> None:
-    """Write .png files of one size as a video. Raises SceneError."""
+    """Write .png files of equal size as a video. Raises SceneError."""
     if path.suffix.lower() == MOVING_PICTURE:
         _moving_picture(path, frames, fps)
         return
@@ -64,7 +64,7 @@ def write(path: Path, frames: Sequence[Path], fps: float) -> None:
 
 
 def _moving_picture(path: Path, frames: Sequence[Path], fps: float) -> None:
-    """Write .png files of one size as a .webp that begins again at its end. Raises SceneError."""
+    """Write .png files of equal size as a .webp that begins again at its end. Raises SceneError."""
     first, *others = (Image.fromarray(_read(frame)) for frame in frames)
     if any(other.size != first.size for other in others):
         raise SceneError("frames of a video have one size", file=frames[0])
@@ -80,9 +80,9 @@ def _moving_picture(path: Path, frames: Sequence[Path], fps: float) -> None:
 
 
 def _encode(ffmpeg: str, path: Path, frames: Sequence[Path], fps: float) -> None:
-    """Let ffmpeg write a file. Raises OSError, with what ffmpeg says, unless it could.
+    """Let ffmpeg write a file. Raises OSError, with the message of ffmpeg, where it fails.
 
-    A signal raises KeyboardInterrupt when ffmpeg is gone: one without an owner would write on.
+    A signal raises KeyboardInterrupt when ffmpeg is gone: without an owner it would write on.
     """
     height, width = _read(frames[0]).shape[:2]
     rate = str(Fraction(fps).limit_denominator())
@@ -139,7 +139,7 @@ def _feed(
 
 
 def _read(path: Path) -> np.ndarray:
-    """A .png as (h, w, 3) uint8: what is transparent is over black."""
+    """A .png as (h, w, 3) uint8: transparent pixels are over black."""
     values = images.read_stored(path).values
     if values.shape[2] == 4:
         values = (values[..., :3].astype(np.uint16) * values[..., 3:] // 255).astype(np.uint8)

@@ -9,13 +9,9 @@ import click
 from ...choices import MOST_SEED
 from ...formats import locate
 from ..options.grading import grading_options
-from ..options.headings import grouped
-from ..options.records import with_records
-from ..options.scene_options import scene_options
-from ..options.scene_path import ScenePath
-from ..options.values import Count, Noise
-from ..options.verbosity import verbose_option
-from ..options.workers import worker_options
+from ..options.records import grouped, verbose_option, with_records
+from ..options.scene_options import scene_options, worker_options
+from ..options.values import Count, Noise, ScenePath
 from .settings import Settings
 
 EXAMPLES = (

@@ -17,57 +17,56 @@ from ...cluster.multi_renderer import MultiRenderer
 from ...formats import locate
 from ...scene import Scene
 from ...view.access import is_loopback
-from ...view.commands import OF_VIEW
+from ...view.messages import OF_VIEW
 from ...view.pictures import Display
 from ...view.saving import Folder
+from ...view.saving import load as load_view
 from ...view.session import Session, Source
-from ...view.views import load as load_view
+from ..display import Display as Progress
+from ..display import display
 from ..files import outputs, targets
-from ..opening.scenes import Opened, open_scene
-from ..opening.workers import connected
+from ..opening import connected, open_scene
 from ..options.grading import Grading
 from ..options.scene_options import SceneOptions
-from ..printing.display import Display as Progress
-from ..printing.display import display
 from ..process import terminal
-from ..process.extras import extra
+from ..process.failures import extra
 from ..process.stopping import STATUS, stops
 from .settings import Settings
 
-CLOSE_SECONDS = 3.0  # in which a session ends that waits for no compiler
+CLOSE_SECONDS = 3.0  # a session that waits for no compiler ends within them
 
 
 def show(scene: Path, settings: Settings) -> int:
-    """Show a scene until a signal comes; return the exit status. Raises what its session does."""
+    """Show a scene until a signal comes; return the exit status. Raises errors of its session."""
     from ...view.server import Server  # here: asyncio and sockets are for this command alone
 
     file = locate(scene)
     begins = load_view(settings.opened) if settings.opened is not None else None
     looked_at = _display(settings)
     with ExitStack() as resources:
-        server = Server(settings.listening.host, settings.listening.port)
+        server = Server(settings.host, settings.port)
         resources.callback(server.close)
         _announce(server.address, settings)
         shown = display(settings.quiet, None)
-        opened = open_scene(file, settings.options, shown, resources)
-        where, make = _renderers(settings, opened, shown, resources)
+        plan, devices, _ = open_scene(file, settings.options, shown, resources)
+        where, make = _renderers(settings, devices, shown, resources)
         session = Session(
-            opened.scene,
-            opened.devices[0],
+            plan,
+            devices[0],
             server,
             folder=_folder(file, settings),
             source=_source(file, settings.options),
             display=looked_at,
             where=where,
             make=make,
-            **vars(settings.options.build),
+            **settings.options.build,
         )
         resources.callback(session.close)
         if begins is not None:
             session.post(begins, server.message)
         server.show(session)
         session.start(solid=True)
-        return _attend(session, opened)
+        return _attend(session)
 
 
 def _display(settings: Settings) -> Display:
@@ -80,40 +79,41 @@ def _display(settings: Settings) -> Display:
 
 
 def _announce(address: str, settings: Settings) -> None:
-    """Print the page's address, say what to do with it, and open the page."""
-    listening = settings.listening
+    """Print the page's address with advice, and open the page."""
     terminal.say(address, err=False)
     if not settings.quiet:
-        what = "open this address in a browser" if listening.no_browser else "opens in your browser"
-        terminal.say(f"{what}; Ctrl-C ends it")
-    if not is_loopback(listening.host):
-        warning = f"other machines can reach {listening.host}, and read along"
+        advice = (
+            "open this address in a browser" if settings.no_browser else "opens in your browser"
+        )
+        terminal.say(f"{advice}; Ctrl-C ends it")
+    if not is_loopback(settings.host):
+        warning = f"other machines can reach {settings.host}, and read along"
         terminal.say(f"clpt: warning: {warning}")
-    if not listening.no_browser:
+    if not settings.no_browser:
         webbrowser.open(address)
 
 
 def _renderers(
-    settings: Settings, opened: Opened, shown: Progress, resources: ExitStack
+    settings: Settings, devices: list[dev.Device], shown: Progress, resources: ExitStack
 ) -> tuple[str, Any]:
-    """Return who renders, for people, and what makes renderers, None for a `Renderer`."""
-    device = opened.devices[0]
+    """Return the names of devices or workers, and a factory of renderers, None for `Renderer`."""
+    device = devices[0]
     if settings.workers.cluster is not None:
         with extra("cluster", "clpt view --cluster"):
             from ...cluster.cluster_renderer import ClusterRenderer
         workers = connected(settings.workers, settings.options.machine, shown)
         client = resources.enter_context(workers)
 
-        def of_cluster(scene: Scene, cancel_seconds: float, **made: Any) -> ClusterRenderer:
-            return ClusterRenderer(scene, client, device=device, mixed=True, **made)
+        def of_cluster(scene: Scene, cancel_seconds: float, **options: Any) -> ClusterRenderer:
+            return ClusterRenderer(scene, client, device=device, mixed=True, **options)
 
         return settings.workers.cluster, of_cluster
-    several = partial(MultiRenderer, devices=opened.devices) if len(opened.devices) > 1 else None
-    return " and ".join(one.info.label for one in opened.devices), several
+    several = partial(MultiRenderer, devices=devices) if len(devices) > 1 else None
+    return " and ".join(on.info.label for on in devices), several
 
 
 def _folder(file: Path, settings: Settings) -> Folder:
-    """Return what writes files of the page."""
+    """Return the folder that gets files of the page."""
 
     def write_exr(path: Path, renderer: Any, seconds: float) -> None:
         outputs.write(path, renderer, outputs.metadata(renderer, file, seconds), Grading())
@@ -122,14 +122,14 @@ def _folder(file: Path, settings: Settings) -> Folder:
 
 
 def _source(file: Path, options: SceneOptions) -> Source:
-    """Return what reads the scene's file again."""
+    """Return the scene's file, which is read again after changes."""
 
     def stamp() -> Any:
         try:
-            found = file.stat()
+            status = file.stat()
         except OSError:  # it is being replaced
             return None
-        return found.st_mtime_ns, found.st_size
+        return status.st_mtime_ns, status.st_size
 
     def read() -> Scene:
         return options.scene(file)
@@ -137,7 +137,7 @@ def _source(file: Path, options: SceneOptions) -> Source:
     return Source(stamp, read)
 
 
-def _attend(session: Session, opened: Opened) -> int:
+def _attend(session: Session) -> int:
     """Wait until a signal ends the session, or a fault, which is raised; return the status."""
     with stops() as stopped:
         while not stopped and session.error is None:

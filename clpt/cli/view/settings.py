@@ -1,4 +1,4 @@
-"""The records that `clpt view` takes in the place of options."""
+"""The record of the options of `clpt view`."""
 
 from __future__ import annotations
 
@@ -6,17 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..options.grading import GradingOptions
-from ..options.scene_options import SceneOptions
-from ..options.workers import Workers
-
-
-@dataclass(frozen=True)
-class Listening:
-    """Where the page is, and whether a browser opens it."""
-
-    host: str
-    port: int
-    no_browser: bool
+from ..options.scene_options import SceneOptions, Workers
 
 
 @dataclass(frozen=True)
@@ -26,7 +16,9 @@ class Settings:
     folder: gets what the page saves; opened: a view that it has saved, to begin with.
     """
 
-    listening: Listening
+    host: str
+    port: int
+    no_browser: bool
     folder: Path
     opened: Path | None
     workers: Workers

@@ -41,15 +41,15 @@ __all__ = ["load", "read_mesh"]
 
 
 def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
-    """Read a glTF file; a camera or light that it lacks is added, as for a bare mesh.
+    """Read a glTF file; a missing camera or light is added, as for a bare mesh.
 
     variables: `time` [s] of an animation (the first, or the `animation` of that number or name);
     without it nodes have their own transforms, and materials, lights and cameras their own numbers.
     `camera` and `scene` choose by number or name.
     `shutter` [s] is how long light comes to the film from `time` on, while nodes move.
     `variant` chooses among material variants. `lumens`: of a watt, see cameras_lights.py.
-    `multiple_scattering`: 1 keeps what facets reflect to each other.
-    missing: see clpt.load. Raises SceneError with the JSON path of what is wrong.
+    `multiple_scattering`: 1 keeps the light that facets reflect to each other.
+    missing: see clpt.load. Raises SceneError with the JSON path of the wrong value.
     """
     if "shutter" in variables:
         length = _seconds(path, variables.pop("shutter"), "shutter")
@@ -91,14 +91,14 @@ def _load(path: Path, missing: Missing, variables: dict[str, Any]) -> Scene:
 def _provenance(document: Document) -> dict[str, Any]:
     """Return the names of several scenes, and who made the file, for people."""
     scenes = document.root.children("scenes")
-    found: dict[str, Any] = {"scenes": [], "asset": {}}
+    provenance: dict[str, Any] = {"scenes": [], "asset": {}}
     with suppress(SceneError):  # texts that are none harm no picture
         if len(scenes) > 1:
-            found["scenes"] = [scene.text("name", str(i)) for i, scene in enumerate(scenes)]
+            provenance["scenes"] = [scene.text("name", str(i)) for i, scene in enumerate(scenes)]
     for key in ("generator", "copyright"):
         with suppress(SceneError):
-            found["asset"] |= {key: document.root.needed("asset").text(key)}
-    return found
+            provenance["asset"] |= {key: document.root.needed("asset").text(key)}
+    return provenance
 
 
 def read_mesh(path: Path) -> MeshFile:
@@ -156,10 +156,10 @@ def _text(value: object) -> str | None:
 
 
 def _number(
-    path: Path, given: dict[str, Any], name: str, usual: float, low: float, high: float
+    path: Path, variables: dict[str, Any], name: str, usual: float, low: float, high: float
 ) -> float:
     """A variable as a number within its limits. Raises SceneError."""
-    value = given.get(name, usual)
+    value = variables.get(name, usual)
     try:
         number = float(value)
     except (TypeError, ValueError):

@@ -48,8 +48,8 @@ def normalised(values: NDArray[Any], accessor: Element) -> NDArray[np.float32]:
     if not accessor.flag("normalized"):
         return values.astype(np.float32)
     largest = np.float32(np.iinfo(values.dtype).max)
-    made: NDArray[np.float32] = values.astype(np.float32) / largest
-    return np.maximum(made, np.float32(-1.0))
+    shares: NDArray[np.float32] = values.astype(np.float32) / largest
+    return np.maximum(shares, np.float32(-1.0))
 
 
 def width(accessor: Element, types: tuple[str, ...]) -> int:
@@ -58,11 +58,11 @@ def width(accessor: Element, types: tuple[str, ...]) -> int:
 
 
 def stored(accessor: Element, types: tuple[str, ...]) -> NDArray[Any]:
-    """Return an accessor's values (n, width) as they are stored, with the sparse ones."""
+    """Return an accessor's values (n, width) as they are stored, with sparse substitutions."""
     width(accessor, types)
     form = _form(accessor)
-    what = f"{accessor.path} of {form.count} elements"
-    budget.check(PER_NUMBER * form.count * form.columns, what, accessor.document.file)
+    described = f"{accessor.path} of {form.count} elements"
+    budget.check(PER_NUMBER * form.count * form.columns, described, accessor.document.file)
     sparse = accessor.child("sparse")
     if form.stride:
         data, _ = view(accessor)
@@ -73,7 +73,7 @@ def stored(accessor: Element, types: tuple[str, ...]) -> NDArray[Any]:
 
 
 def check(accessor: Element) -> None:
-    """Raise SceneError for an invalid accessor, or one that exceeds its buffer view."""
+    """Raise SceneError for an accessor that is invalid or exceeds its buffer view."""
     form = _form(accessor)
     sparse = accessor.child("sparse")
     if sparse is not None:
@@ -153,10 +153,10 @@ class _Form:
         """Return the elements (count, columns) that lie in a view's bytes."""
         inner, size = self.columns // self.rows, self.dtype.itemsize
         strides = (self.stride, inner * size + self.gap, size)
-        made: NDArray[Any] = np.ndarray(
+        values: NDArray[Any] = np.ndarray(
             (self.count, self.rows, inner), self.dtype, data, self.offset, strides
         )
-        return made.reshape(self.count, self.columns)
+        return values.reshape(self.count, self.columns)
 
 
 def _form(accessor: Element) -> _Form:
@@ -168,34 +168,34 @@ def _form(accessor: Element) -> _Form:
     count, offset = accessor.integer("count", low=1), accessor.integer("byteOffset", 0)
     rows = int(type_[3:]) if type_.startswith("MAT") else 1
     gap = -(rows * dtype.itemsize) % 4 if rows > 1 else 0
-    made = _Form(dtype, count, columns, rows, gap, offset, 0)
+    form = _Form(dtype, count, columns, rows, gap, offset, 0)
     buffer_view = accessor.entry("bufferView", "bufferViews")
     if buffer_view is None:
-        return made
+        return form
     compressed = meshopt.extension(buffer_view)
-    stride = (compressed or buffer_view).integer("byteStride", made.size)
-    if stride < made.size:
-        raise buffer_view.error(f"{stride} bytes hold no element of {made.size}", "byteStride")
+    stride = (compressed or buffer_view).integer("byteStride", form.size)
+    if stride < form.size:
+        raise buffer_view.error(f"{stride} bytes hold no element of {form.size}", "byteStride")
     length = buffer_view.integer("byteLength", low=1)
-    if offset + (count - 1) * stride + made.size - gap > length:
+    if offset + (count - 1) * stride + form.size - gap > length:
         message = f"{count} elements of {stride} bytes from {offset} lie outside of {length}"
         raise accessor.error(message, "count")
-    return replace(made, stride=stride)
+    return replace(form, stride=stride)
 
 
 def _with_sparse(accessor: Element, sparse: Element, values: NDArray[Any]) -> NDArray[Any]:
     count = sparse.integer("count", low=1, high=len(values))
-    where, what = sparse.needed("indices"), sparse.needed("values")
+    where, entries = sparse.needed("indices"), sparse.needed("values")
     number = where.integer("componentType")
     if number not in INDEX_TYPES:
         raise where.error("indices must be unsigned integers", "componentType")
     at = _part(where, COMPONENTS[number], count, 1)[:, 0].astype(np.int64)
-    new = _part(what, values.dtype, count, values.shape[1])
+    new = _part(entries, values.dtype, count, values.shape[1])
     if at.max() >= len(values):
         raise where.error(f"index {at.max()} lies outside of {len(values)} elements")
-    made = values.copy()
-    made[at] = new
-    return made
+    filled = values.copy()
+    filled[at] = new
+    return filled
 
 
 def _part(element: Element, dtype: np.dtype[Any], count: int, columns: int) -> NDArray[Any]:

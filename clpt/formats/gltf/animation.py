@@ -35,10 +35,10 @@ INTERPOLATIONS = ("LINEAR", "STEP", "CUBICSPLINE")
 def pose(document: Document, chosen: str | None, time: float) -> dict[tuple[int, str], Floats]:
     """Return the values by (node, "rotation" or the like) that an animation sets at a time [s].
 
-    chosen: its number or name; the first one if None. What pointers point to elsewhere is written
-    into the document. Raises SceneError if there is no such animation.
+    chosen: its number or name; None: the first animation. Values that pointers set elsewhere are
+    written into the document. Raises SceneError if there is no such animation.
     """
-    found: dict[tuple[int, str], Floats] = {}
+    pose_values: dict[tuple[int, str], Floats] = {}
     for channel in _chosen(document, chosen).children("channels"):
         target = channel.needed("target")
         node = target.index("node", "nodes", None)
@@ -47,15 +47,15 @@ def pose(document: Document, chosen: str | None, time: float) -> dict[tuple[int,
             names = parts(channel)
             on_node = node_path(names)
             if on_node is not None and on_node[0] < document.root.count("nodes"):
-                found[on_node] = _sampled(channel, on_node[1], time)
+                pose_values[on_node] = _sampled(channel, on_node[1], time)
             elif not put(document.root, names, _sampled(channel, path, time)):
                 channel.warn(f"left out: nothing is known to move at '/{'/'.join(names)}'")
             continue
         if node is None or path not in PATHS:
             channel.warn(f"left out: {path!r} of no node that is known")
             continue
-        found[node, path] = _sampled(channel, path, time)
-    return found
+        pose_values[node, path] = _sampled(channel, path, time)
+    return pose_values
 
 
 def descriptions(document: Document) -> list[str]:
@@ -67,7 +67,7 @@ def descriptions(document: Document) -> list[str]:
 def _length(animation: Element) -> str:
     """Return how long an animation takes, for people; nothing where the file does not say."""
     ends: list[float] = []
-    with suppress(SceneError):  # one that is broken is told when it is chosen
+    with suppress(SceneError):  # a broken animation is reported when it is chosen
         for sampler in animation.children("samplers"):
             times = sampler.entry("input", "accessors")
             ends += () if times is None else times.numbers("max", None, ())
@@ -148,8 +148,8 @@ def _values(sampler: Element, key: str, types: tuple[str, ...]) -> Floats:
     return floats(accessor, types).astype(np.float64)
 
 
-KEYS = 9  # in the time for which the shutter is open
-NEAR = 1e-3  # of a mesh's size, by which a vertex may be off its way between keys
+KEYS = 9  # while the shutter is open
+NEAR = 1e-3  # largest distance of a vertex from its path between keys, over the mesh's size
 
 
 def scene_over_shutter(load: Callable[[float], Scene], time: float, length: float) -> Scene:
@@ -165,23 +165,23 @@ def scene_over_shutter(load: Callable[[float], Scene], time: float, length: floa
         warnings.append("shutter: shapes come or go while it is open, so that nothing moves")
         return dataclasses.replace(scene, warnings=warnings)
     added = scene.extra["studio"]  # what stands still, see clpt.formats.framing
-    own = len(scene.shapes) - added["shapes"]
+    count = len(scene.shapes) - added["shapes"]
     groups: dict[int, Group] = {}
     shapes: list[Any] = []
-    for i in range(own):
-        ways = [one.shapes[i] for one in scenes]
+    for i in range(count):
+        ways = [each.shapes[i] for each in scenes]
         moved = _moving(ways, times, warnings, f"shapes[{i}]")
         shapes.append(_deforming(moved, ways, times, warnings, groups))
-    shapes += scene.shapes[own:]
+    shapes += scene.shapes[count:]
     lights: list[Any] = list(scene.lights)
     camera: Any = scene.camera
     if not added["lights"]:
         lights = [
-            _moving([one.lights[i] for one in scenes], times, warnings, f"lights[{i}]")
+            _moving([each.lights[i] for each in scenes], times, warnings, f"lights[{i}]")
             for i in range(len(lights))
         ]
     if not added["camera"]:
-        camera = _moving([one.camera for one in scenes], times, warnings, "camera")
+        camera = _moving([each.camera for each in scenes], times, warnings, "camera")
     shutter = Shutter(time, time + length)
     camera = dataclasses.replace(camera, shutter=shutter)
     return dataclasses.replace(
@@ -204,7 +204,7 @@ def _deforming(
         first = ways[0].group
         if id(first) not in groups:
             at_all = zip(*(way.group.shapes for way in ways), strict=False)
-            parts = [_deforming(one[0], one, times, warnings, groups) for one in at_all]
+            parts = [_deforming(shapes[0], shapes, times, warnings, groups) for shapes in at_all]
             same = all(new is old for new, old in zip(parts, first.shapes, strict=False))
             groups[id(first)] = first if same else dataclasses.replace(first, shapes=tuple(parts))
         return dataclasses.replace(shape, group=groups[id(first)])
@@ -213,6 +213,8 @@ def _deforming(
     name = f"shutter: {f'mesh {shape.name!r}' if shape.name else 'a mesh'} stays as at `time`"
     if any(not np.array_equal(way.faces, shape.faces) for way in ways):
         warnings.append(f"{name}: its triangles are others at other times")
+        return shape
+    if all(way.vertices is shape.vertices and way.normals is shape.normals for way in ways):
         return shape
     points = np.stack([np.asarray(way.vertices) for way in ways])
     normals = None
@@ -262,7 +264,7 @@ def _moving(ways: Sequence[Any], times: Matrix, warnings: list[str], where: str)
 POINTER = "KHR_animation_pointer"
 OF_NODES = ("translation", "rotation", "scale", "weights")
 TABLES = ("materials", "cameras", "meshes", "extensions")  # whose numbers may change
-LISTS = ("weights",)  # of which even a single number is a list
+LISTS = ("weights",)  # even a single number of them is a list
 
 
 def parts(channel: Element) -> list[str]:
@@ -284,10 +286,10 @@ def node_path(names: list[str]) -> tuple[int, str] | None:
 
 
 def put(root: Element, names: list[str], values: NDArray[np.float64]) -> bool:
-    """Write values where a pointer points to; return whether there is such a place.
+    """Write values where a pointer points to; return False if the document has no such member.
 
-    Objects on the way that the file leaves out, as their numbers are the usual ones, are added. A
-    texture that the file leaves out is not, as it needs an image.
+    Omitted objects on the path are added, as their numbers have defaults. An omitted texture is
+    not, as it needs an image.
     """
     if names[0] not in TABLES or len(names) < 3 or (names[0] == "meshes" and names[2:] != [*LISTS]):
         return False
@@ -302,11 +304,11 @@ def put(root: Element, names: list[str], values: NDArray[np.float64]) -> bool:
         else:
             return False
     last, single = names[-1], len(values) == 1 and names[-1] not in LISTS
-    given: Any = float(values[0]) if single else values.tolist()
+    stored: Any = float(values[0]) if single else values.tolist()
     if isinstance(at, list) and last.isdigit() and int(last) < len(at):
-        at[int(last)] = given
+        at[int(last)] = stored
         return True
     if not isinstance(at, dict) or isinstance(at.get(last), str | dict):
         return False
-    at[last] = values[0] > 0.5 if isinstance(at.get(last), bool) else given
+    at[last] = values[0] > 0.5 if isinstance(at.get(last), bool) else stored
     return True

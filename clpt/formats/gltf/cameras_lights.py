@@ -1,11 +1,11 @@
 """Cameras, and directional, point and spot lights (KHR_lights_punctual).
 
-A file with such lights has photometric units: candela, lux, and cd/m^2 of what emits. They become
-radiance by the spectrum of daylight, of which 1 has UNIT_LUMINANCE. Of a file that Blender wrote
-the watts are restored: its exporter multiplies them by 683 lm/W in its lighting mode "Standard",
-and by nothing in "Unitless"; a point or spot light of W watts has W / (4 pi) then, and emission has
-W m^-2 sr^-1. The film's `display_exposure` shows 1 cd/m^2, or 1 W m^-2 sr^-1, as 1. A file
-without lights has no unit: emission of 1 shows 1, beside the studio's light.
+A file with such lights has photometric units: candela, lux, and cd/m^2 of emission. They become
+radiance with the spectrum of daylight; a radiance of 1 has UNIT_LUMINANCE. In a file that Blender
+wrote the watts are restored: its exporter multiplies them by 683 lm/W in its lighting mode
+"Standard", and by 1 in "Unitless"; a point or spot light of W watts then has W / (4 pi), and
+emission has W m^-2 sr^-1. The film's `display_exposure` shows 1 cd/m^2, or 1 W m^-2 sr^-1, as 1. A
+file without lights has no unit: emission of 1 shows 1, beside the studio's light.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def cameras_of(graph: Graph) -> list[tuple[int, Element]]:
 
 
 def camera_descriptions(graph: Graph) -> list[str]:
-    """Return the kind and, where it has one, the name of every camera in the scene."""
+    """Return the kind of every camera in the scene, with its name if it has a name."""
     names = [c.text("name", None) or graph.node(i).text("name", None) for i, c in cameras_of(graph)]
     kinds = [camera.text("type") for _, camera in cameras_of(graph)]
     return [f"{kind} {name or ''}".strip() for kind, name in zip(kinds, names, strict=True)]
@@ -50,8 +50,8 @@ def camera_descriptions(graph: Graph) -> list[str]:
 def chosen_camera(graph: Graph, name: str | None) -> tuple[Camera, Size] | None:
     """Return a camera and the size of its film, or None where the scene has no camera.
 
-    name: its number in the scene, its own name or its node's; None for the first one. Raises
-    SceneError where there is none of that name.
+    name: its number in the scene, its own name or its node's; None: the first camera. Raises
+    SceneError for an unknown name.
     """
     cameras = cameras_of(graph)
     if name is None:
@@ -93,11 +93,7 @@ def rigid(element: Element, node: Matrix) -> Matrix:
     """Return a node's transform without its scale: the nearest rotation, and the translation."""
     if transforms.is_singular(node):
         raise element.error("its node's transform flattens space")
-    u, _, v = np.linalg.svd(node[:3, :3])
-    made = np.eye(4)
-    made[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
-    made[:3, 3] = node[:3, 3]
-    return made
+    return transforms.rigid(node)
 
 
 def _planes(lens: Element, needed: bool) -> dict[str, Any]:
@@ -116,24 +112,24 @@ DIMMEST = 100.0  # [cd], [lx] of a file's strongest light in that mode: 2 W, or 
 
 
 def lumens_of(document: Document) -> float | None:
-    """Return the lumens of a watt by which a file's exporter multiplied watts, None for candela.
+    """Return the factor [lm/W] that a file's exporter applied to watts; None: it wrote candela.
 
-    683 of Blender's, unless no light reaches DIMMEST: the file is then of its mode "Unitless", 1.
+    Blender's is 683; if no light reaches DIMMEST, the exporter was in mode "Unitless": 1.
     """
     extension, generator = document.root.extension(LIGHTS), ""
     with suppress(SceneError):
         generator = document.root.needed("asset").text("generator", "")
-    found = BLENDER.match(generator)
-    if extension is None or found is None or (int(found[1]), int(found[2])) < WITH_MODES:
+    version = BLENDER.match(generator)
+    if extension is None or version is None or (int(version[1]), int(version[2])) < WITH_MODES:
         return None
     strengths = [element.number("intensity", 1.0) for element in extension.children("lights")]
     return LUMENS if max(strengths, default=0.0) >= DIMMEST else 1.0
 
 
 def scale_of(graph: Graph, lumens: float | None) -> Scale:
-    """Return the scale of a file; lumens: of a watt, by which its lights were multiplied, or None.
+    """Return the scale of a file's light.
 
-    A file that shows no light has none.
+    lumens: the exporter's factor [lm/W], or None. A file without lights has no scale.
     """
     if all(graph.node(index).extension(LIGHTS) is None for index in graph.shown):
         return Scale()
@@ -149,12 +145,14 @@ def lights_of(graph: Graph) -> list[Light]:
     elements = [] if extension is None else extension.children("lights")
     lights = []
     for index in graph.shown:
-        own = graph.node(index).extension(LIGHTS)
-        if own is None:
+        reference = graph.node(index).extension(LIGHTS)
+        if reference is None:
             continue
-        number = own.integer("light")
+        number = reference.integer("light")
         if number >= len(elements):
-            raise own.error(f"there is no light {number}; the file has {len(elements)}", "light")
+            raise reference.error(
+                f"there is no light {number}; the file has {len(elements)}", "light"
+            )
         lights.append(light(elements[number], graph.to_world[index]))
     return lights
 

@@ -7,8 +7,6 @@ are not empty) is not.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from clpt.formats.gltf import accessors, cameras_lights
@@ -20,7 +18,7 @@ FLOAT = 5126
 
 
 def check(document: Document) -> None:
-    """Raise SceneError for what does not fit together, wherever it stands."""
+    """Raise SceneError for references and values that contradict each other."""
     for table, function in TABLES.items():
         for element in document.root.children(table):
             function(element)
@@ -130,7 +128,7 @@ def _form(accessor: Element, type_: str) -> None:
         raise accessor.error("must be of floats", "componentType")
 
 
-TABLES: dict[str, Callable[[Element], object]] = {
+TABLES = {
     "buffers": lambda buffer: buffer.integer("byteLength", low=1),
     "bufferViews": _view,
     "accessors": accessors.check,

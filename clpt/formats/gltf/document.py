@@ -1,7 +1,7 @@
 """A glTF 2.0 file: its JSON, every value with its JSON path, and its buffers.
 
-Accessors are read by numpy straight from the buffers: of the readers in use, trimesh passes over
-skins, morph targets, lights, fans and instances, and pygltflib checks nothing of what it hands on.
+Accessors are read by numpy straight from the buffers. Other readers do less: trimesh ignores
+skins, morph targets, lights, fans and instances; pygltflib does not check its values.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Element:
         return key in self.value
 
     def json_path(self, key: str | None = None) -> str:
-        """Return the path of this element, or of the value of one of its keys."""
+        """Return the JSON path of this element, or of the value of a key in it."""
         return ".".join(part for part in (self.path, key) if part)
 
     def error(self, message: str, key: str | None = None) -> SceneError:
@@ -54,7 +54,7 @@ class Element:
         return SceneError(message, file=self.document.file, where=self.json_path(key) or None)
 
     def warn(self, message: str, key: str | None = None) -> None:
-        """Warn of what is left out, once for each text."""
+        """Warn of an omission, once for each text."""
         self.document.warn(f"{self.json_path(key)}: {message}")
 
     def integer(
@@ -96,7 +96,7 @@ class Element:
         return tuple(self._number(v, f"{key}[{i}]", low, high) for i, v in enumerate(value))
 
     def text(self, key: str, default: object = REQUIRED, choices: Iterable[str] = ()) -> str:
-        """Return a text, one of `choices` where some are given."""
+        """Return a text; if `choices` are given, it must be among them."""
         value = self._get(key, default)
         if value is default:
             return default
@@ -145,12 +145,12 @@ class Element:
         return [Element(self.document, f"{path}[{i}]", value) for i, value in enumerate(values)]
 
     def index(self, key: str, table: str, default: object = REQUIRED) -> int:
-        """Return an index into one of the document's lists, such as "accessors"."""
+        """Return an index into a list of the document, such as "accessors"."""
         value = self.integer(key, default)
         return value if value is default else self._in_table(value, key, table)
 
     def indices(self, key: str, table: str) -> list[int]:
-        """Return a list of indices into one of the document's lists."""
+        """Return a list of indices into a list of the document."""
         self.count(key)
         indices = []
         for i, value in enumerate(self.value.get(key, [])):
@@ -228,12 +228,12 @@ class Document:
         self._check_version()
 
     def warn(self, text: str) -> None:
-        """Warn of what is left out, once for each text."""
+        """Warn of an omission, once for each text."""
         if text not in self.warnings:
             self.warnings.append(text)
 
     def entry(self, table: str, index: int) -> Element:
-        """Return an object of one of the lists at the top, such as meshes[2]."""
+        """Return an object of a list at the top, such as meshes[2]."""
         return Element(self, f"{table}[{index}]", self.root.value[table][index])
 
     def once(self, key: object, make: Callable[[], T]) -> T:
@@ -364,6 +364,6 @@ def _data(element: Element, key: str, uri: str) -> bytes:
 
 
 def _shown(value: object) -> str:
-    """A value in a message: short, on one line."""
+    """Return a value for a message: short, without line breaks."""
     text = json.dumps(value) if not isinstance(value, int) or abs(value) < 10**40 else "that"
     return text if len(text) <= 60 else text[:56] + " ..."

@@ -35,10 +35,10 @@ def attributes(primitive: Element, compressed: Element) -> Geometry:
         if name not in ids:
             arrays[name] = accessors.floats(accessor, types(name))
             continue
-        found = mesh.get_attribute_by_unique_id(ids.integer(name, high=2**32 - 1))
-        if found is None:
+        decoded = mesh.get_attribute_by_unique_id(ids.integer(name, high=2**32 - 1))
+        if decoded is None:
             raise ids.error("the compressed data has no such attribute", name)
-        values = np.asarray(found["data"])
+        values = np.asarray(decoded["data"])
         columns = accessors.width(accessor, types(name))
         if values.ndim != 2 or values.shape[1] != columns:
             raise ids.error(f"holds {values.shape[1:]} numbers a vertex, not {columns}", name)
@@ -64,8 +64,8 @@ def _decoded(compressed: Element) -> Any:
         faces = _claimed_faces(data)
     except IndexError:
         raise compressed.error("its data end before the triangles") from None
-    what = f"{compressed.path} of {faces} triangles"
-    budget.check(PER_TRIANGLE * faces, what, compressed.document.file)
+    described = f"{compressed.path} of {faces} triangles"
+    budget.check(PER_TRIANGLE * faces, described, compressed.document.file)
     try:
         mesh = DracoPy.decode(data)
     except Exception as error:  # DracoPy raises its own kinds, of no common base
@@ -94,7 +94,7 @@ def _claimed_faces(data: bytes) -> int:
 
 
 class _Stream:
-    """Reads a header's bytes one after the other; beyond the end is an IndexError."""
+    """Reads a header's bytes in order; beyond the end is an IndexError."""
 
     def __init__(self, data: bytes, at: int):
         self.data, self.at = data, at
@@ -119,7 +119,7 @@ class _Stream:
         if depth > DEEPEST:
             raise IndexError
         for _ in range(self.number()):
-            for length in (self.byte, self.number):  # of a name, and of what it names
+            for length in (self.byte, self.number):  # of a name, and of its value
                 size = length()
                 self.at += size
         for _ in range(self.number()):

@@ -13,7 +13,7 @@ from clpt.files import budget
 from clpt.formats.gltf.accessors import floats, normalised
 from clpt.formats.gltf.document import Element
 
-TYPES = {  # of the accessors of an attribute, by what its name begins with
+TYPES = {  # of the accessors of an attribute, by the first part of its name
     "POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TANGENT": ("VEC4",), "TEXCOORD": ("VEC2",),
     "COLOR": ("VEC3", "VEC4"), "JOINTS": ("VEC4",), "WEIGHTS": ("VEC4",),
 }  # fmt: skip
@@ -75,16 +75,16 @@ def joint_matrices(skin: Element, to_world: NDArray[np.float64]) -> NDArray[np.f
     return posed @ inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
 
 
-def skinned(primitive: Element, made: Geometry, joints: NDArray[np.float64]) -> None:
+def skinned(primitive: Element, geometry: Geometry, joints: NDArray[np.float64]) -> None:
     """Move a primitive's vertices, normals and tangents into the world, as joints take them."""
-    pairs = _influences(primitive, made, len(joints))
+    pairs = _influences(primitive, geometry, len(joints))
     if not pairs:
         primitive.warn("has a skin, but no JOINTS_0 and WEIGHTS_0; it stays as it is")
-        pairs = [(np.zeros((len(made.attributes["POSITION"]), 1), int), np.ones((1, 1)))]
-    normals = made.attributes.get("NORMAL")
-    positions = made.attributes["POSITION"].astype(np.float64)
+        pairs = [(np.zeros((len(geometry.attributes["POSITION"]), 1), int), np.ones((1, 1)))]
+    normals = geometry.attributes.get("NORMAL")
+    positions = geometry.attributes["POSITION"].astype(np.float64)
     turned = None if normals is None else normals.astype(np.float64)
-    along = made.attributes.get("TANGENT")
+    along = geometry.attributes.get("TANGENT")
     along = None if along is None else along.astype(np.float64)
     total = _total(primitive, pairs)
     for first in range(0, len(positions), CHUNK):
@@ -99,11 +99,11 @@ def skinned(primitive: Element, made: Geometry, joints: NDArray[np.float64]) -> 
             turned[part] = np.einsum("nij,nj->ni", _cofactors(blend[:, :3, :3]), turned[part])
         if along is not None:
             along[part, :3] = np.einsum("nij,nj->ni", blend[:, :3, :3], along[part, :3])
-    made.attributes["POSITION"] = positions.astype(np.float32)
+    geometry.attributes["POSITION"] = positions.astype(np.float32)
     if turned is not None:
-        made.attributes["NORMAL"] = turned.astype(np.float32)
+        geometry.attributes["NORMAL"] = turned.astype(np.float32)
     if along is not None:
-        made.attributes["TANGENT"] = along.astype(np.float32)
+        geometry.attributes["TANGENT"] = along.astype(np.float32)
 
 
 def _total(
@@ -124,18 +124,21 @@ def _total(
 
 
 def _influences(
-    primitive: Element, made: Geometry, count: int
+    primitive: Element, geometry: Geometry, count: int
 ) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
     """Joints (n, 4) and their weights (n, 4), as many pairs as the primitive has sets."""
     pairs: list[tuple[NDArray[np.int64], NDArray[np.float64]]] = []
-    while f"JOINTS_{len(pairs)}" in made.attributes and f"WEIGHTS_{len(pairs)}" in made.attributes:
+    while (
+        f"JOINTS_{len(pairs)}" in geometry.attributes
+        and f"WEIGHTS_{len(pairs)}" in geometry.attributes
+    ):
         name = f"JOINTS_{len(pairs)}"
-        vertices = len(made.attributes[name])
+        vertices = len(geometry.attributes[name])
         size = PER_VERTEX * vertices * (len(pairs) + 1)
         budget.check(size, f"{len(pairs) + 1} joints of its vertices", primitive.document.file)
         budget.take_parts(vertices // PER_PART, "joints of its vertices", primitive.document.file)
-        which = made.attributes[name].astype(np.int64)
-        weights = made.attributes[f"WEIGHTS_{len(pairs)}"].astype(np.float64)
+        which = geometry.attributes[name].astype(np.int64)
+        weights = geometry.attributes[f"WEIGHTS_{len(pairs)}"].astype(np.float64)
         which = np.where(weights == 0.0, 0, which)
         if which.max() >= count:
             message = f"joint {which.max()} is outside of the skin's {count}"

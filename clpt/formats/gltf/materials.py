@@ -15,13 +15,13 @@ from clpt.formats.gltf.document import ROUNDING, Document, Element
 from clpt.formats.gltf.textures import texture
 from clpt.scene import gltf_material
 from clpt.scene.gltf_material import WHITE
+from clpt.scene.insides import absorbed, dispersed
 from clpt.scene.lights import Area
 from clpt.scene.materials import Diffuse, GltfSurface, Material
 from clpt.scene.media import Homogeneous
-from clpt.scene.params import Texture
+from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product, turned
 from clpt.scene.values import Textured, TexturedNumber
-from clpt.spectra import Cauchy, RGBUnbounded
 
 CLEARCOAT = "KHR_materials_clearcoat"
 DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"
@@ -68,7 +68,7 @@ def base_color(element: Element) -> Any:
 def colour(
     owner: Element, factor: str, info: str, default: tuple[float, ...], count: int = 3
 ) -> Any:
-    """Return a factor, times the texture where there is one; of four numbers the first three."""
+    """Return a factor, times its texture if there is a texture; the first three of four numbers."""
     rgb = owner.numbers(factor, count, (*default, 1.0)[:count], low=0.0)[:3]
     rgb = tuple(1.0 if 1.0 < value <= 1.0 + ROUNDING else value for value in rgb)
     child = owner.child(info)
@@ -76,7 +76,7 @@ def colour(
 
 
 def number(owner: Element, factor: str, info: str, channel: str, default: float) -> Any:
-    """Return a factor in [0, 1], times a texture's channel where there is one."""
+    """Return a factor in [0, 1], times a texture's channel if there is a texture."""
     value = owner.number(factor, default, low=0.0, high=1.0)
     child = owner.child(info)
     image = None if child is None else texture(child, raw=True, channel=channel)
@@ -84,7 +84,7 @@ def number(owner: Element, factor: str, info: str, channel: str, default: float)
 
 
 def _rough(element: Element) -> dict[str, Any]:
-    """The core material; each of its factors is one where it is not given."""
+    """Return the parameters of the core material; omitted factors are 1."""
     owner = element.child("pbrMetallicRoughness")
     if owner is None:
         return {"base_color": WHITE, "metallic": 1.0, "roughness": 1.0}
@@ -227,7 +227,7 @@ OF_SURFACES = {
 
 
 def _body(element: Element, values: dict[str, Any]) -> None:
-    """Tell a thin sheet from a body: one with a thickness, which absorbs and disperses."""
+    """Return the parameters of a body: a surface with a thickness absorbs and disperses."""
     lets_through = any(values.get(k, 0.0) != 0.0 for k in ("transmission", "diffuse_transmission"))
     inside = body(element)
     values["thin"] = lets_through and inside is None
@@ -240,12 +240,11 @@ def _body(element: Element, values: dict[str, Any]) -> None:
     strength = 0.0 if dispersion is None else dispersion.number("dispersion", 0.0, low=0.0)
     ior = values.get("ior", 1.5)
     if strength > 0.0 and ior > 1.0:
-        spread = (ior - 1.0) / max(20.0 / strength, LEAST_ABBE)
-        values["ior"] = Cauchy(ior - 1.5168 * spread, 0.523655 * spread)
+        values["ior"] = dispersed(ior, max(20.0 / strength, LEAST_ABBE))
 
 
 def _specular_color(element: Element, values: dict[str, Any]) -> None:
-    """Move factors above one into the index of refraction, where nothing is refracted."""
+    """Move factors above 1 into the index of refraction, if the surface does not transmit."""
     rgb = values.get("specular_color")
     if not isinstance(rgb, tuple) or max(rgb) <= 1.0:
         return
@@ -267,18 +266,16 @@ SHARES = {  # of light that goes through a surface
     "KHR_materials_transmission": "transmissionFactor",
     "KHR_materials_diffuse_transmission": "diffuseTransmissionFactor",
 }
-DARKEST = 1e-4  # attenuation colour: black would absorb all at once
-DENSEST = 1e6  # [1/m]
 STEEPEST = 0.99  # mean cosine: at 1 nothing would be scattered
 
 
 def body(element: Element) -> Element | None:
-    """Return the volume of a material that has an inside; None of sheets and of what is opaque."""
+    """Return the volume of a material with an inside; None for thin and for opaque surfaces."""
     volume = element.extension(VOLUME)
     if volume is None or volume.number("thicknessFactor", 0.0, low=0.0) == 0.0:
         return None
-    given = {factor: element.extension(name) for name, factor in SHARES.items()}
-    shares = [e.number(factor, 0.0) for factor, e in given.items() if e is not None]
+    scattering = {factor: element.extension(name) for name, factor in SHARES.items()}
+    shares = [e.number(factor, 0.0) for factor, e in scattering.items() if e is not None]
     return volume if any(shares) else None
 
 
@@ -291,8 +288,7 @@ def extinction(volume: Element) -> Any:
     if distance == 0.0:
         raise volume.error("must be above 0", "attenuationDistance")
     left = volume.numbers("attenuationColor", 3, (1.0, 1.0, 1.0), low=0.0, high=1.0)
-    a = tuple(min(-math.log(max(v, DARKEST)) / distance, DENSEST) for v in left)
-    return a[0] if a[0] == a[1] == a[2] else RGBUnbounded(*a)
+    return absorbed(left, distance)
 
 
 def medium(element: Element | None) -> Homogeneous | None:
@@ -314,9 +310,12 @@ def medium(element: Element | None) -> Homogeneous | None:
     taken = extinction(volume)
     if not any(colour) or taken == 0.0:
         return None
-    made = Homogeneous.from_albedo(colour, 1.0, max(-STEEPEST, min(g, STEEPEST)))
+    unit_medium = Homogeneous.from_albedo(colour, 1.0, max(-STEEPEST, min(g, STEEPEST)))
     return Homogeneous(
-        name=element.text("name", ""), phase=made.phase, albedo=made.albedo, sigma_t=taken
+        name=element.text("name", ""),
+        phase=unit_medium.phase,
+        albedo=unit_medium.albedo,
+        sigma_t=taken,
     )
 
 
@@ -326,8 +325,8 @@ VARIANTS = "KHR_materials_variants"
 def variant_names(document: Document) -> list[str]:
     """Return the names of a file's variants."""
     extension = document.root.extension(VARIANTS)
-    found = [] if extension is None else extension.children("variants")
-    return [one.text("name", str(i)) for i, one in enumerate(found)]
+    variants = [] if extension is None else extension.children("variants")
+    return [variant.text("name", str(i)) for i, variant in enumerate(variants)]
 
 
 def chosen_variant(document: Document, wanted: str | None) -> int | None:
@@ -365,7 +364,7 @@ EXTENSIONS: tuple[str, ...] = (
 
 
 def material(element: Element | None, *, colours: bool = False) -> tuple[Material, Area | None]:
-    """Return a material and what it emits; the specification's default one if None.
+    """Return a material and its emission; for None the specification's default material.
 
     colours: the mesh has an attribute "vertex_color" that multiplies the base colour, and
     "vertex_alpha" its alpha.
@@ -390,7 +389,7 @@ def material(element: Element | None, *, colours: bool = False) -> tuple[Materia
 
 
 def _with_normal_map(element: Element, inner: Material) -> Material:
-    """Return the material with its normal map, if it has one."""
+    """Return the material with its normal map, if the element names a normal map."""
     info = element.child("normalTexture")
     if info is None:
         return inner

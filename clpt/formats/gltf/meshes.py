@@ -43,18 +43,18 @@ def primitive_geometry(primitive: Element) -> Geometry | None:
         primitive.warn("left out, since it has no positions")
         return None
     compressed = primitive.extension(draco.NAME)
-    made = _plain(attributes) if compressed is None else draco.attributes(primitive, compressed)
-    vertices = len(made.attributes["POSITION"])
-    for name, values in made.attributes.items():
+    decoded = _plain(attributes) if compressed is None else draco.attributes(primitive, compressed)
+    vertices = len(decoded.attributes["POSITION"])
+    for name, values in decoded.attributes.items():
         if len(values) != vertices:
             message = f"has {len(values)} elements, POSITION has {vertices}"
             raise attributes.error(message, name)
     if compressed is None:
         order = integers(primitive, "indices") if "indices" in primitive else np.arange(vertices)
-        made.faces = triangles(order.astype(np.int64), mode)
-    _check_indices(primitive, made.faces, vertices)
-    made.targets = [_target(target, vertices) for target in primitive.children("targets")]
-    return made
+        decoded.faces = triangles(order.astype(np.int64), mode)
+    _check_indices(primitive, decoded.faces, vertices)
+    decoded.targets = [_target(target, vertices) for target in primitive.children("targets")]
+    return decoded
 
 
 def triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
@@ -93,15 +93,15 @@ def _check_indices(primitive: Element, faces: NDArray[np.int64], vertices: int) 
 
 
 def _target(target: Element, vertices: int) -> dict[str, Floats32]:
-    found = {}
+    displacements = {}
     for name in filter(types, target.value):
         accessor = target.entry(name, "accessors")
         if accessor is None:
             continue
-        found[name] = floats(accessor, target_types(name))
-        if len(found[name]) != vertices:
-            raise target.error(f"has {len(found[name])} elements, not {vertices}", name)
-    return found
+        displacements[name] = floats(accessor, target_types(name))
+        if len(displacements[name]) != vertices:
+            raise target.error(f"has {len(displacements[name])} elements, not {vertices}", name)
+    return displacements
 
 
 PER_PART = 256  # moved vertices that count as a part
@@ -124,7 +124,7 @@ class Surface:
 
 @dataclass
 class Posed:
-    """A mesh's primitives in one pose, and each node that shows them, with its transform."""
+    """A mesh's primitives in a pose, and each node that shows them, with its transform."""
 
     parts: list[Mesh]
     copies: list[tuple[Element, Matrix]] = field(default_factory=list)
@@ -148,8 +148,8 @@ def shapes(graph: Graph, *, instances: bool = True) -> list[Shape]:
         if key not in posed:
             joints = None if skin is None else geometry.joint_matrices(skin, graph.to_world)
             posed[key] = Posed(_parts(mesh, weights, joints))
-        own = np.eye(4) if skin is not None else graph.to_world[index]
-        copies = _transforms(node, own)
+        node_to_world = np.eye(4) if skin is not None else graph.to_world[index]
+        copies = _transforms(node, node_to_world)
         parts = len(copies) * max(len(posed[key].parts), 1)
         budget.take_parts(parts, "copies of its meshes", graph.document.file)
         budget.take(BYTES * parts, "copies of its meshes", graph.document.file)
@@ -187,8 +187,8 @@ def _weights(graph: Graph, index: int, node: Element, mesh: Element) -> tuple[fl
     animated = graph.pose.get((index, "weights"))
     if animated is not None:
         return tuple(map(float, animated))
-    own = node.numbers("weights", None, None)
-    return own if own is not None else mesh.numbers("weights", None, ())
+    node_weights = node.numbers("weights", None, None)
+    return node_weights if node_weights is not None else mesh.numbers("weights", None, ())
 
 
 def _transforms(node: Element, to_world: Matrix) -> list[Matrix]:
@@ -202,8 +202,8 @@ def _transforms(node: Element, to_world: Matrix) -> list[Matrix]:
         "ROTATION": ("VEC4", [0.0, 0.0, 0.0, 1.0]),
         "SCALE": ("VEC3", [1.0, 1.0, 1.0]),
     }
-    given = {name: attributes.entry(name, "accessors") for name in rows}
-    values = {n: floats(a, (rows[n][0],)) for n, a in given.items() if a is not None}
+    columns = {name: attributes.entry(name, "accessors") for name in rows}
+    values = {n: floats(a, (rows[n][0],)) for n, a in columns.items() if a is not None}
     counts = {len(value) for value in values.values()}
     if len(counts) != 1:
         raise attributes.error("needs accessors of one length: TRANSLATION, ROTATION or SCALE")
@@ -221,47 +221,49 @@ def _parts(
     """Return a mesh's primitives in the node's space, or in world space where it is skinned."""
     parts = []
     for primitive in mesh.children("primitives"):
-        made = primitive_geometry(primitive)
-        if made is None:
+        primitive_arrays = primitive_geometry(primitive)
+        if primitive_arrays is None:
             continue
-        _morph(primitive, made, weights)
+        _morph(primitive, primitive_arrays, weights)
         if joints is not None:
-            geometry.skinned(primitive, made, joints)
-        part = _mesh(mesh, primitive, made)
+            geometry.skinned(primitive, primitive_arrays, joints)
+        part = _mesh(mesh, primitive, primitive_arrays)
         parts += [] if part is None else [part]
     return parts
 
 
-def _morph(primitive: Element, made: Geometry, weights: tuple[float, ...]) -> None:
+def _morph(primitive: Element, primitive_arrays: Geometry, weights: tuple[float, ...]) -> None:
     """Add the displacements of the targets, each times its weight."""
-    for weight, target in zip(weights, made.targets, strict=False):
+    for weight, target in zip(weights, primitive_arrays.targets, strict=False):
         for name, change in target.items():
             budget.take_parts(len(change) // PER_PART, "morph targets", primitive.document.file)
-            if weight != 0.0 and name in made.attributes:
-                base = made.attributes[name]
+            if weight != 0.0 and name in primitive_arrays.attributes:
+                base = primitive_arrays.attributes[name]
                 width = min(base.shape[1], change.shape[1])
                 moved = base.astype(np.float32)
                 moved[:, :width] += np.float32(weight) * change[:, :width]
-                made.attributes[name] = moved
-    if len(weights) > len(made.targets):
-        primitive.warn(f"{len(weights)} weights for {len(made.targets)} targets", "targets")
+                primitive_arrays.attributes[name] = moved
+    if len(weights) > len(primitive_arrays.targets):
+        primitive.warn(
+            f"{len(weights)} weights for {len(primitive_arrays.targets)} targets", "targets"
+        )
 
 
-def _mesh(owner: Element, primitive: Element, made: Geometry) -> Mesh | None:
-    arrays = made.attributes
+def _mesh(owner: Element, primitive: Element, primitive_arrays: Geometry) -> Mesh | None:
+    arrays = primitive_arrays.attributes
     colours = arrays.get("COLOR_0")
     surface = _surface(primitive, colours is not None)
-    uvs, second = _uvs(primitive, made, surface)
+    uvs, second = _uvs(primitive, primitive_arrays, surface)
     name = owner.text("name", "")
-    given = Arrays(
+    mesh_arrays = Arrays(
         arrays["POSITION"],
-        made.faces,
+        primitive_arrays.faces,
         arrays.get("NORMAL"),
         uvs,
         _attributes(colours, second, surface, len(arrays["POSITION"])) | _tangents(arrays, surface),
     )
     document = primitive.document
-    values = checked(document.file, name or primitive.path, given, document.warnings)
+    values = checked(document.file, name or primitive.path, mesh_arrays, document.warnings)
     values["tangents"] = values["attributes"].pop(TANGENTS, None)
     if not len(values["faces"]):
         return None
@@ -288,7 +290,9 @@ def _surface(primitive: Element, colours: bool) -> Surface:
     return document.once(("surface", element.path if element else "", colours), make)
 
 
-def _uvs(primitive: Element, made: Geometry, surface: Surface) -> list[NDArray[np.float32] | None]:
+def _uvs(
+    primitive: Element, primitive_arrays: Geometry, surface: Surface
+) -> list[NDArray[np.float32] | None]:
     """Return the two uv sets that the material looks up, with v upward, as clpt has it."""
     sets = surface.uv_sets or (0,)
     if len(sets) > 2:
@@ -298,7 +302,7 @@ def _uvs(primitive: Element, made: Geometry, surface: Surface) -> list[NDArray[n
         primitive.warn(message, "material")
     result: list[NDArray[np.float32] | None] = []
     for number in sets[:2]:
-        uvs = made.attributes.get(f"TEXCOORD_{number}")
+        uvs = primitive_arrays.attributes.get(f"TEXCOORD_{number}")
         if uvs is None and surface.uv_sets:
             primitive.warn(f"its textures need TEXCOORD_{number}, which is missing", "material")
         upward = None if uvs is None else uvs * FLIPPED + np.array([0, 1], np.float32)
@@ -308,10 +312,10 @@ def _uvs(primitive: Element, made: Geometry, surface: Surface) -> list[NDArray[n
 
 def _tangents(arrays: dict[str, NDArray[Any]], surface: Surface) -> dict[str, NDArray[Any]]:
     """Return the tangents that a file gives, where the material looks at them."""
-    given = arrays.get("TANGENT")
-    if given is None or "NORMAL" not in arrays or not _looks_at_tangents(surface.material):
+    tangents = arrays.get("TANGENT")
+    if tangents is None or "NORMAL" not in arrays or not _looks_at_tangents(surface.material):
         return {}
-    return {TANGENTS: given.astype(np.float32)}
+    return {TANGENTS: tangents.astype(np.float32)}
 
 
 def _looks_at_tangents(material: object) -> bool:
@@ -319,7 +323,11 @@ def _looks_at_tangents(material: object) -> bool:
     return (
         isinstance(material, NormalMap)
         or getattr(material, "uses_tangents", False)
-        or any(_looks_at_tangents(one) for one in inner if one is not None)
+        or any(
+            _looks_at_tangents(inner_material)
+            for inner_material in inner
+            if inner_material is not None
+        )
     )
 
 
@@ -327,11 +335,11 @@ def _attributes(
     colours: NDArray[Any] | None, second: NDArray[np.float32] | None, surface: Surface, count: int
 ) -> dict[str, NDArray[np.float32]]:
     """Return the attributes that the material reads: colours, alpha, and a second uv set."""
-    made = {} if colours is None else _colour_attributes(colours)
+    attributes = {} if colours is None else _colour_attributes(colours)
     if len(surface.uv_sets) > 1:
         uvs = np.zeros((count, 2), np.float32) if second is None else second
-        made |= dict(zip(SECOND_UV, (uvs[:, :1], uvs[:, 1:]), strict=True))
-    return made
+        attributes |= dict(zip(SECOND_UV, (uvs[:, :1], uvs[:, 1:]), strict=True))
+    return attributes
 
 
 def _colour_attributes(colours: NDArray[Any]) -> dict[str, NDArray[np.float32]]:

@@ -46,11 +46,11 @@ def decode_sequence(stream: Bytes, count: int) -> NDArray[np.uint32]:
         values += np.where(inside, part << np.uint64(7 * i), 0).astype(np.uint64)
     words = values.astype(np.uint32)
     delta = words >> np.uint32(2) ^ (0 - (words >> np.uint32(1) & np.uint32(1))).astype(np.uint32)
-    made = np.empty(count, np.uint32)
+    indices = np.empty(count, np.uint32)
     for baseline in (0, 1):
-        own = (words & np.uint32(1)) == baseline
-        made[own] = np.cumsum(delta[own], dtype=np.uint32)
-    return made
+        uses_baseline = (words & np.uint32(1)) == baseline
+        indices[uses_baseline] = np.cumsum(delta[uses_baseline], dtype=np.uint32)
+    return indices
 
 
 class _Triangles:
@@ -65,7 +65,7 @@ class _Triangles:
 
     def decoded(self, codes: list[int]) -> list[int]:
         """Return the indices of all triangles."""
-        made: list[int] = []
+        corners: list[int] = []
         edges, vertices = self.edges, self.vertices
         for code in codes:
             if code < 0xF0:
@@ -85,16 +85,16 @@ class _Triangles:
             else:
                 a, b, c = self.three(code)
                 edges += ((b, a), (c, b), (a, c))
-            made += (a, b, c)
+            corners += (a, b, c)
             if len(edges) > 1024:
                 del edges[:-16]
                 del vertices[:-16]
         if self.at > self.end:
             raise ValueError("it is cut short")
-        return made
+        return corners
 
     def three(self, code: int) -> tuple[int, int, int]:
-        """Return a triangle that shares no edge with those before."""
+        """Return a triangle that shares no edge with earlier triangles."""
         known = len(self.vertices)  # those that this triangle adds cannot be meant
         if code < 0xFE:
             pair = self.table[code & 15]
@@ -109,7 +109,7 @@ class _Triangles:
         return a, b, c
 
     def corner(self, number: int, known: int) -> int:
-        """Return a vertex: a new one, one spelled out, or one of the `known` first."""
+        """Return a vertex: a new vertex, an explicit vertex, or a vertex of the `known` first."""
         if number == 0:
             return self.fresh()
         if number == 15:
@@ -126,7 +126,7 @@ class _Triangles:
         return value
 
     def explicit(self, push: bool = False) -> int:
-        """Return an index given by its difference from the last such one."""
+        """Return an index that is stored as its difference from the last explicit index."""
         value = shift = 0
         for _ in range(5):
             byte = self.byte()
@@ -163,18 +163,18 @@ def apply_filter(values: Bytes, name: str) -> Bytes:
         return values
     if name == "EXPONENTIAL":
         words = values.view("<i4")
-        made = np.ldexp((words << 8 >> 8).astype(np.float32), words >> 24).astype("<f4")
-        return made.view(np.uint8)
-    made = {"OCTAHEDRAL": _octahedral, "QUATERNION": _quaternion, "COLOR": _colour}[name](
+        filtered = np.ldexp((words << 8 >> 8).astype(np.float32), words >> 24).astype("<f4")
+        return filtered.view(np.uint8)
+    filtered = {"OCTAHEDRAL": _octahedral, "QUATERNION": _quaternion, "COLOR": _colour}[name](
         values.view(f"<i{stride // 4}")
     )
-    return np.ascontiguousarray(made).view(np.uint8)
+    return np.ascontiguousarray(filtered).view(np.uint8)
 
 
 def _octahedral(values: NDArray[Any]) -> NDArray[Any]:
     largest = np.iinfo(values.dtype).max
-    one = np.maximum(values[:, 2].astype(np.float64), 1.0)
-    x, y = values[:, 0] / one, values[:, 1] / one
+    scale = np.maximum(values[:, 2].astype(np.float64), 1.0)
+    x, y = values[:, 0] / scale, values[:, 1] / scale
     z = 1.0 - np.abs(x) - np.abs(y)
     t = np.minimum(z, 0.0)
     unit = np.stack([x - np.copysign(t, x), y - np.copysign(t, y), z], axis=1)
@@ -183,14 +183,14 @@ def _octahedral(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _quaternion(values: NDArray[Any]) -> NDArray[Any]:
-    one = np.maximum((values[:, 3:] | 3).astype(np.float64), 1.0)
-    rest = values[:, :3] / one / math.sqrt(2.0)
-    w = np.sqrt(np.maximum(1.0 - (rest**2).sum(axis=1), 0.0))
+    unit = np.maximum((values[:, 3:] | 3).astype(np.float64), 1.0)
+    components = values[:, :3] / unit / math.sqrt(2.0)
+    w = np.sqrt(np.maximum(1.0 - (components**2).sum(axis=1), 0.0))
     # The largest component, which is left out, stands before the others in turn.
     order = ((values[:, 3:] & 3) + np.arange(4)) % 4
-    made = np.empty((len(values), 4))
-    np.put_along_axis(made, order.astype(np.int64), np.column_stack([w, rest]), axis=1)
-    return _rounded(made * 32767.0, values.dtype)
+    quaternion = np.empty((len(values), 4))
+    np.put_along_axis(quaternion, order.astype(np.int64), np.column_stack([w, components]), axis=1)
+    return _rounded(quaternion * 32767.0, values.dtype)
 
 
 def _colour(values: NDArray[Any]) -> NDArray[Any]:
@@ -201,8 +201,8 @@ def _colour(values: NDArray[Any]) -> NDArray[Any]:
     bits = np.floor(np.log2(np.maximum(alpha, 1))).astype(np.int64)
     scale = (1 << bits + 1) - 1
     a = alpha & scale >> 1
-    made = np.stack([y + co - cg, y + cg, y - co - cg, a << 1 | a & 1], axis=1)
-    return _rounded(made * (np.iinfo(unsigned).max / scale[:, None]), unsigned)
+    rgba = np.stack([y + co - cg, y + cg, y - co - cg, a << 1 | a & 1], axis=1)
+    return _rounded(rgba * (np.iinfo(unsigned).max / scale[:, None]), unsigned)
 
 
 def _rounded(values: NDArray[np.float64], dtype: np.dtype[Any]) -> NDArray[Any]:
@@ -266,11 +266,11 @@ def _attributes(stream: Bytes, count: int, stride: int) -> Bytes:
     deltas = _unpacked(stream, where, bits).reshape(stride, -1)[:, :count]
     last = stream[len(stream) - tail :]
     modes = last[stride:] if version else np.zeros(stride // 4, np.uint8)
-    made = np.empty((count, stride), np.uint8)
+    vertices = np.empty((count, stride), np.uint8)
     for channel, mode in enumerate(modes.tolist()):
         part = slice(4 * channel, 4 * channel + 4)
-        made[:, part] = _undone(deltas[part], last[part], mode)
-    return made
+        vertices[:, part] = _undone(deltas[part], last[part], mode)
+    return vertices
 
 
 def _groups(
@@ -316,7 +316,7 @@ def _groups(
 
 
 def _sentinels(stream: Bytes, bits: int) -> list[int]:
-    """Count the deltas before each byte, `bits` wide, whose bits are all one."""
+    """Count the deltas before each byte, `bits` wide, whose bits are all 1."""
     values = np.arange(256)
     per_byte = sum(
         (values >> shift & (1 << bits) - 1) == (1 << bits) - 1 for shift in range(0, 8, bits)
@@ -327,9 +327,9 @@ def _sentinels(stream: Bytes, bits: int) -> list[int]:
 def _unpacked(stream: Bytes, where: NDArray[np.int64], bits: NDArray[np.int8]) -> Bytes:
     """The deltas of all groups, (groups, 16)."""
     begins, widths = where.reshape(-1), bits.reshape(-1)
-    made = np.zeros((len(begins), GROUP), np.uint8)
+    groups = np.zeros((len(begins), GROUP), np.uint8)
     literal = widths == 8
-    made[literal] = stream[begins[literal, None] + np.arange(GROUP)]
+    groups[literal] = stream[begins[literal, None] + np.arange(GROUP)]
     for width in (1, 2, 4):
         chosen = np.flatnonzero(widths == width)
         packed = stream[begins[chosen, None] + np.arange(2 * width)]
@@ -340,8 +340,8 @@ def _unpacked(stream: Bytes, where: NDArray[np.int64], bits: NDArray[np.int8]) -
         group, element = np.nonzero(full)
         order = np.cumsum(full, axis=1)[full] - 1
         deltas[group, element] = stream[begins[chosen[group]] + 2 * width + order]
-        made[chosen] = deltas
-    return made
+        groups[chosen] = deltas
+    return groups
 
 
 def _undone(deltas: Bytes, base: Bytes, mode: int) -> Bytes:
@@ -357,7 +357,7 @@ def _undone(deltas: Bytes, base: Bytes, mode: int) -> Bytes:
     if kind > 2 or turn:
         raise ValueError(f"there is no channel mode {mode}")
     steps: Array = raw if kind == 0 else raw.view("<u2")
-    one = steps.dtype.type(1)
-    steps = steps >> one ^ (0 - (steps & one)).astype(steps.dtype)
+    bit = steps.dtype.type(1)
+    steps = steps >> bit ^ (0 - (steps & bit)).astype(steps.dtype)
     steps[0] += base if kind == 0 else base.copy().view("<u2")
     return np.cumsum(steps, axis=0, dtype=steps.dtype).view(np.uint8)

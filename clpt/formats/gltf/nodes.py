@@ -34,7 +34,7 @@ class Graph:
 
 
 def graph(document: Document, chosen: str | None, pose: Pose) -> Graph:
-    """Return the nodes of the chosen scene, or of the default one; `pose` overrides transforms.
+    """Return the nodes of the chosen or default scene; `pose` overrides transforms.
 
     Without any scene all nodes are shown. Raises SceneError for a node that has two parents or is
     its own ancestor, and for an invalid transform.
@@ -72,11 +72,11 @@ def compose(translation: Matrix, rotation: Matrix, scale: Matrix) -> Matrix:
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
-    made = np.zeros((*x.shape, 4, 4))
-    made[..., :3, :3] = np.stack([np.stack(row, -1) for row in rows], -2) * scale[..., None, :]
-    made[..., :3, 3] = translation
-    made[..., 3, 3] = 1.0
-    return made
+    matrices = np.zeros((*x.shape, 4, 4))
+    matrices[..., :3, :3] = np.stack([np.stack(row, -1) for row in rows], -2) * scale[..., None, :]
+    matrices[..., :3, 3] = translation
+    matrices[..., 3, 3] = 1.0
+    return matrices
 
 
 def _scene(document: Document, chosen: str | None) -> Element | None:
@@ -94,8 +94,8 @@ def _scene(document: Document, chosen: str | None) -> Element | None:
 
 def _parents(document: Document, children: list[list[int]]) -> list[int]:
     parents = [-1] * len(children)
-    for parent, own in enumerate(children):
-        for child in own:
+    for parent, node_children in enumerate(children):
+        for child in node_children:
             if parents[child] >= 0:
                 message = f"nodes[{child}] is already a child of nodes[{parents[child]}]"
                 raise document.entry("nodes", parent).error(message, "children")
@@ -132,10 +132,10 @@ def _locals(nodes: list[Element], pose: Pose) -> Matrix:
         raise nodes[int(np.argmin(length))].error(
             "a quaternion of length 0 is no rotation", "rotation"
         )
-    made = compose(values[:, :3], values[:, 3:7] / length, values[:, 7:])
+    matrices = compose(values[:, :3], values[:, 3:7] / length, values[:, 7:])
     for i, node in enumerate(nodes):
         if "matrix" in node:
-            made[i] = np.array(node.numbers("matrix", 16)).reshape(4, 4).T
-            if not np.allclose(made[i, 3], [0.0, 0.0, 0.0, 1.0]):
+            matrices[i] = np.array(node.numbers("matrix", 16)).reshape(4, 4).T
+            if not np.allclose(matrices[i, 3], [0.0, 0.0, 0.0, 1.0]):
                 raise node.error("its last row must be 0 0 0 1", "matrix")
-    return made
+    return matrices

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from clpt import images
 from clpt.errors import SceneError
 from clpt.files import budget
+from clpt.formats.colours import EVEN, GREY, grey_for
 from clpt.formats.gltf import accessors
 from clpt.formats.gltf.document import Document, Element
-from clpt.formats.reading import EVEN, GREY, grey_for
 from clpt.scene.textures import Bitmap
 
 FORMATS = ("PNG", "JPEG", "WEBP")
@@ -28,9 +28,8 @@ FLIP = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]])
 def texture(info: Element, *, raw: bool = False, channel: str | None = None) -> Bitmap:
     """Return the texture that a textureInfo names; `raw`: numbers, not sRGB colours.
 
-    channel: "r", "g", "b" or "a", what a real parameter takes of it. Which set of texture
-    coordinates it wants is added to `info.document.uv_sets`: the first two there are a mesh's uvs
-    and its second ones.
+    channel: "r", "g", "b" or "a", for a real parameter. The texture's set of coordinates is added
+    to `info.document.uv_sets`: the first two sets there are a mesh's uvs and its second uvs.
     """
     element = info.entry("index", "textures")
     if element is None:
@@ -62,7 +61,7 @@ def _source(texture: Element) -> Element | None:
 
 
 def _stand_in(info: Element, texture: Element) -> NDArray[np.float32] | None:
-    """Grey where the file of a texture's image is not there and missing ones are grey."""
+    """Return grey if a texture's image file is missing and missing images are grey; else None."""
     source, document = _source(texture), info.document
     if source is None or document.missing == "error" or "uri" not in source:
         return None
@@ -74,7 +73,7 @@ def _stand_in(info: Element, texture: Element) -> NDArray[np.float32] | None:
 
 
 def _image(texture: Element, raw: bool) -> NDArray[Any]:
-    """The pixels (h, w, 1, 3 or 4) that a texture shows; one white one where there are none."""
+    """Return the pixels (h, w, 1, 3 or 4) of a texture; a white pixel if it has no image."""
     source = _source(texture)
     if source is None:
         reason = "its image is of a kind that is not supported" if "extensions" in texture else None
@@ -86,12 +85,12 @@ def _image(texture: Element, raw: bool) -> NDArray[Any]:
 
 
 def _all(document: Document) -> dict[str, Future[images.Stored]]:
-    """The images of all textures, decoded side by side; one that fails does where it is used."""
+    """Decode the images of all textures in parallel; a broken image raises where it is used."""
     sources = [_source(texture) for texture in document.root.children("textures")]
     distinct = {source.path: source for source in sources if source is not None}
     decode = budget.carried(_decoded)
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        return {path: pool.submit(decode, one) for path, one in distinct.items()}
+        return {path: pool.submit(decode, shared) for path, shared in distinct.items()}
 
 
 def _decoded(source: Element) -> images.Stored:
@@ -99,9 +98,9 @@ def _decoded(source: Element) -> images.Stored:
     inside = "uri" not in source
     data = bytes(accessors.view(source)[0]) if inside else source.document.resource(source)
     try:
-        made = images.decoded(data, FORMATS, profiled=False)
-        budget.take(made.values.nbytes, "the images", source.document.file)
-        return made
+        image = images.decoded(data, FORMATS, profiled=False)
+        budget.take(image.values.nbytes, "the images", source.document.file)
+        return image
     except SceneError as error:
         raise error if error.where else source.error(error.message) from None
     except Exception as error:  # Pillow raises its own, from struct.error to SyntaxError
@@ -120,12 +119,12 @@ def _sampling(texture: Element) -> dict[str, str]:
         if number not in WRAPS:
             raise sampler.error(f"{number} is no way to wrap", key)
         wraps[key] = WRAPS[number]
-    found: dict[str, str] = {"wrap": wraps["wrapS"]}
+    settings: dict[str, str] = {"wrap": wraps["wrapS"]}
     if wraps["wrapT"] != wraps["wrapS"]:
-        found["wrap_v"] = wraps["wrapT"]
+        settings["wrap_v"] = wraps["wrapT"]
     if sampler.integer("magFilter", 9729) == NEAREST:
-        found["filter"] = "nearest"
-    return found
+        settings["filter"] = "nearest"
+    return settings
 
 
 def _transform(element: Element) -> NDArray[np.float64]:

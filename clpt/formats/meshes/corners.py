@@ -17,10 +17,10 @@ DENSE = 8  # numbers between a mesh's first and last vertex, per corner, that a 
 
 @dataclass
 class Part:
-    """The triangles of one material: its number, -1 for none; faces (m, 3) name the vertices.
+    """The triangles of a material: its number, -1 for none; faces (m, 3) name the vertices.
 
-    vertices, colours (n, 3), normals (n, 3) and uvs (n, 2), the last three None where the file has
-    none. bare: how many triangles have no uvs where others have some; their uvs are 0.
+    vertices, colours (n, 3), normals (n, 3) and uvs (n, 2); the last three are None if the file has
+    none. bare: number of triangles without uvs beside others with uvs; their uvs are 0.
     """
 
     material: int
@@ -33,7 +33,7 @@ class Part:
 
 
 def parts(contents: Contents, *, whole: bool = False) -> Iterator[Part]:
-    """Yield the triangles of each material; whole: all of them as one, smoothing groups ignored."""
+    """Yield the triangles of each material; whole: yield all together, without smoothing groups."""
     triangles, polygon = triangulate(contents.vertices, contents.counts, contents.corners[:, 0])
     if not len(triangles):
         return
@@ -44,9 +44,9 @@ def parts(contents: Contents, *, whole: bool = False) -> Iterator[Part]:
         yield _part(contents, int(material[0]), contents.corners[triangles], groups)
         return
     order = np.argsort(material, kind="stable")
-    for own in np.split(order, np.flatnonzero(np.diff(material[order])) + 1):
-        named = contents.corners[triangles[own]]
-        yield _part(contents, int(material[own[0]]), named, groups[own])
+    for members in np.split(order, np.flatnonzero(np.diff(material[order])) + 1):
+        named = contents.corners[triangles[members]]
+        yield _part(contents, int(material[members[0]]), named, groups[members])
 
 
 def _part(
@@ -101,8 +101,8 @@ def _with_normals(
     flat = np.flatnonzero(lacking.any(axis=1) & ~smooth)
     a, b, c = (contents.vertices[named[flat, i, 0]].astype(np.float64) for i in range(3))
     normals.append(np.cross(b - a, c - a).astype(np.float32))
-    own = first + np.arange(len(flat))[:, None]
-    named[flat, :, 2] = np.where(lacking[flat], own, named[flat][..., 2])
+    flat_normals = first + np.arange(len(flat))[:, None]
+    named[flat, :, 2] = np.where(lacking[flat], flat_normals, named[flat][..., 2])
     return np.concatenate(normals), named
 
 
@@ -114,21 +114,21 @@ def _unique(corners: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.i
         vertex = np.unique(vertex, return_inverse=True)[1].reshape(-1)
     else:
         vertex -= low
-    # Most vertices have one uv and one normal: a table finds them without sorting.
+    # Most vertices have a single uv and normal: a table finds them without sorting.
     table = np.full(int(vertex.max()) + 1, -1, np.int64)
     table[vertex] = np.arange(len(vertex))
     like = table[vertex]
     same = (corners[like, 1] == corners[:, 1]) & (corners[like, 2] == corners[:, 2])
     used = table >= 0
-    made = (np.cumsum(used) - 1)[vertex]
+    numbers = (np.cumsum(used) - 1)[vertex]
     rows = corners[table[used]]
     if same.all():
-        return rows, made
+        return rows, numbers
     others = np.flatnonzero(~same)
     uv, normal = (corners[others, i].astype(np.int64) + 1 for i in (1, 2))
     pairs = np.unique(vertex[others] * (uv.max() + 1) + uv, return_inverse=True)[1].reshape(-1)
     _, first, like = np.unique(
         pairs * (normal.max() + 1) + normal, return_index=True, return_inverse=True
     )
-    made[others] = len(rows) + like.reshape(-1)
-    return np.concatenate([rows, corners[others[first]]]), made
+    numbers[others] = len(rows) + like.reshape(-1)
+    return np.concatenate([rows, corners[others[first]]]), numbers

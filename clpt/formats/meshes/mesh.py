@@ -39,7 +39,7 @@ GREY = TwoSided(front=Diffuse(reflectance=0.6, name="grey"))
 
 @dataclass
 class MeshFile:
-    """The meshes of a file, and warnings of what was left out."""
+    """The meshes of a file, and warnings of omissions."""
 
     meshes: list[Mesh]
     warnings: list[str] = field(default_factory=list)
@@ -59,17 +59,17 @@ def read_mesh(path: Path, *, materials: bool = True, missing: Missing = "error")
         raise SceneError(f"unknown mesh suffix {suffix!r}; known: {', '.join(SUFFIXES)}", file=path)
     if suffix == ".obj":
         library = mtl.Library(path.parent, missing) if materials else None
-        made = _obj(path, library, warnings)
+        meshes = _obj(path, library, warnings)
     else:
-        found = READERS[suffix](path)
-        made = [mesh for part in found for mesh in _meshes(path, part, materials, warnings)]
-    if not made:
+        soups = READERS[suffix](path)
+        meshes = [mesh for part in soups for mesh in _meshes(path, part, materials, warnings)]
+    if not meshes:
         raise SceneError("holds no triangles", file=path)
-    return MeshFile(made, list(dict.fromkeys(warnings)))
+    return MeshFile(meshes, list(dict.fromkeys(warnings)))
 
 
 def join(meshes: list[Mesh]) -> Mesh:
-    """Return one mesh that holds all triangles, in world space, with the first one's material."""
+    """Return a mesh of all triangles, in world space, with the material of the first mesh."""
     first = meshes[0]
     if len(meshes) == 1 and np.array_equal(np.asarray(first.to_world), np.eye(4)):
         return first
@@ -95,7 +95,7 @@ def join(meshes: list[Mesh]) -> Mesh:
 
 
 def has_area(mesh: Mesh) -> bool:
-    """Return whether one of a mesh's triangles has an area."""
+    """Return whether any triangle of a mesh has an area."""
     for first in range(0, len(mesh.faces), CHUNK):
         corners = mesh.vertices[mesh.faces[first : first + CHUNK]].astype(np.float64)
         if np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any():
@@ -107,7 +107,8 @@ def has_area(mesh: Mesh) -> bool:
 class Arrays:
     """The arrays of a mesh in a file: vertices (n, 3), faces (m, 3), normals (n, 3), uvs (n, 2).
 
-    attributes: further ones (n, width), one row a vertex, or a face where face_ begins the name.
+    attributes: further arrays (n, width) with a row for each vertex, or face if face_ begins the
+    name.
     """
 
     vertices: NDArray[Any]
@@ -128,25 +129,25 @@ def _fault(faces: NDArray[Any], finite: NDArray[np.bool_]) -> str:
     return ""
 
 
-def checked(path: Path | None, name: str, given: Arrays, warnings: list[str]) -> dict[str, Any]:
+def checked(path: Path | None, name: str, source: Arrays, warnings: list[str]) -> dict[str, Any]:
     """Return a mesh's arrays without unused vertices; `warnings` get what else was left out.
 
     Triangles without an area stay: lowering leaves them out. Raises SceneError for indices out of
     range and vertices that are not finite.
     """
-    faces = given.faces
+    faces = source.faces
     with np.errstate(over="ignore", invalid="ignore"):
-        points = np.ascontiguousarray(given.vertices, np.float32)
+        points = np.ascontiguousarray(source.vertices, np.float32)
         finite = np.asarray(np.isfinite(points).all(axis=1))
     if fault := _fault(faces, finite):
         raise SceneError(fault, file=path, where=name or None)
     used = np.zeros(len(points), bool)
     used[faces.reshape(-1)] = True
-    arrays: dict[str, Any] = {"vertices": points, "normals": given.normals, "uvs": given.uvs}
-    own = dict(given.attributes or {})
+    arrays: dict[str, Any] = {"vertices": points, "normals": source.normals, "uvs": source.uvs}
+    attributes = dict(source.attributes or {})
     if not used.all():
         arrays = {key: None if a is None else a[used] for key, a in arrays.items()}
-        own = {k: a if k.startswith("face_") else a[used] for k, a in own.items()}
+        attributes = {k: a if k.startswith("face_") else a[used] for k, a in attributes.items()}
         faces = (np.cumsum(used) - 1)[faces]
     if (normals := arrays["normals"]) is not None:
         arrays["normals"] = _usable_normals(arrays["vertices"], faces, normals)
@@ -154,52 +155,58 @@ def checked(path: Path | None, name: str, given: Arrays, warnings: list[str]) ->
         warnings.append(f"{name or 'mesh'}: left out texture coordinates that are not finite")
         arrays["uvs"] = None
     whole = {**arrays, "faces": np.ascontiguousarray(faces, np.uint32)}
-    held = [a for a in (*whole.values(), *own.values()) if a is not None]
+    held = [a for a in (*whole.values(), *attributes.values()) if a is not None]
     budget.take(sum(a.nbytes for a in held), f"the mesh {name!r}" if name else "a mesh", path)
     budget.take_parts(1, "meshes", path)
-    return whole if given.attributes is None else {**whole, "attributes": own}
+    return whole if source.attributes is None else {**whole, "attributes": attributes}
 
 
-def _meshes(path: Path, made: Triangles, materials: bool, warnings: list[str]) -> list[Mesh]:
+def _meshes(path: Path, triangles: Triangles, materials: bool, warnings: list[str]) -> list[Mesh]:
     """Return the triangles that a reader has found, a mesh for each image that they show."""
-    warnings += made.warnings
-    if not materials or not made.textures:
-        parts = [_plain(path, made, materials, warnings)]
+    warnings += triangles.warnings
+    if not materials or not triangles.textures:
+        parts = [_plain(path, triangles, materials, warnings)]
     else:
-        parts = [_plain(path, part, True, warnings) for part in _by_texture(made, warnings)]
+        parts = [_plain(path, part, True, warnings) for part in _by_texture(triangles, warnings)]
     return [mesh for mesh in parts if mesh is not None]
 
 
-def _plain(path: Path, made: Triangles, materials: bool, warnings: list[str]) -> Mesh | None:
-    name, own = made.name or path.name, attributes(made)
-    given = Arrays(made.vertices, made.faces, made.normals, made.uvs, own)
-    arrays = checked(path, name, given, warnings)
+def _plain(path: Path, triangles: Triangles, materials: bool, warnings: list[str]) -> Mesh | None:
+    name, colours = triangles.name or path.name, attributes(triangles)
+    arrays_read = Arrays(
+        triangles.vertices, triangles.faces, triangles.normals, triangles.uvs, colours
+    )
+    arrays = checked(path, name, arrays_read, warnings)
     if not len(arrays["faces"]):
         return None
-    material = _coloured(own) if materials else GREY
-    if materials and made.textures and made.uvs is not None:
-        material = _pictured(path, made.textures[0], material, warnings)
+    material = _coloured(colours) if materials else GREY
+    if materials and triangles.textures and triangles.uvs is not None:
+        material = _pictured(path, triangles.textures[0], material, warnings)
     arrays["tangents"] = arrays["attributes"].pop(TANGENTS, None)
     return Mesh(name=name, material=material, **arrays)
 
 
-def _by_texture(made: Triangles, warnings: list[str]) -> list[Triangles]:
+def _by_texture(triangles: Triangles, warnings: list[str]) -> list[Triangles]:
     """Return the triangles that show each image, by their column texnumber; last those of none."""
-    if made.uvs is None:
-        warnings.append(f"image {made.textures[0]!r} left out, as there are no texture coordinates")
-        return [made]
-    number = made.columns["face"].get("texnumber")
+    if triangles.uvs is None:
+        warnings.append(
+            f"image {triangles.textures[0]!r} left out, as there are no texture coordinates"
+        )
+        return [triangles]
+    number = triangles.columns["face"].get("texnumber")
     if number is None:
-        for image in made.textures[1:]:
+        for image in triangles.textures[1:]:
             warnings.append(f"image {image!r} left out, as no face names it")
-        return [made]
+        return [triangles]
     parts = []
-    shown = np.where((number >= 0) & (number < len(made.textures)), number, -1)
-    for i, images_ in enumerate([*([image] for image in made.textures), []]):
-        own = shown == (i if images_ else -1)
-        columns = {n: values[own] for n, values in made.columns["face"].items()}
-        columns = {"vertex": made.columns["vertex"], "face": columns}
-        parts.append(replace(made, faces=made.faces[own], columns=columns, textures=images_))
+    shown = np.where((number >= 0) & (number < len(triangles.textures)), number, -1)
+    for i, images_ in enumerate([*([image] for image in triangles.textures), []]):
+        members = shown == (i if images_ else -1)
+        columns = {n: values[members] for n, values in triangles.columns["face"].items()}
+        columns = {"vertex": triangles.columns["vertex"], "face": columns}
+        parts.append(
+            replace(triangles, faces=triangles.faces[members], columns=columns, textures=images_)
+        )
     return parts
 
 
@@ -213,7 +220,7 @@ def _pictured(path: Path, image: str, otherwise: Material, warnings: list[str]) 
 
 
 def _obj(path: Path, library: mtl.Library | None, warnings: list[str]) -> list[Mesh]:
-    """Read an OBJ file: a mesh for each material, or all in one where there is no library."""
+    """Read an OBJ file: a mesh for each material, or a single mesh without a library."""
     contents = obj.read(path)
     if library is not None:
         for names in contents.libraries:
@@ -228,14 +235,14 @@ def _obj(path: Path, library: mtl.Library | None, warnings: list[str]) -> list[M
     if contents.colours is not None:
         scale = 255.0 if np.nanmax(contents.colours, initial=0.0) > 1.0 else 1.0
     unknown: list[str] = []
-    made: list[Mesh] = []
+    meshes: list[Mesh] = []
     for part in parts:
         label = contents.materials[part.material] if part.material >= 0 else ""
-        own = _vertex_colours(part.colours, scale, warnings)
+        colours = _vertex_colours(part.colours, scale, warnings)
         name = label if label and len(parts) > 1 else path.name
-        given = Arrays(part.vertices, part.faces, part.normals, part.uvs, own)
-        arrays = checked(path, name, given, warnings)
-        material, emission = _coloured(own) if library is not None else GREY, None
+        arrays_read = Arrays(part.vertices, part.faces, part.normals, part.uvs, colours)
+        arrays = checked(path, name, arrays_read, warnings)
+        material, emission = _coloured(colours) if library is not None else GREY, None
         if library is not None and label:
             if (known := library.known(label)) is None:
                 unknown.append(label)
@@ -243,14 +250,14 @@ def _obj(path: Path, library: mtl.Library | None, warnings: list[str]) -> list[M
                 material, emission = library.material(known)
                 if part.uvs is None and any(map(_is_image, textures_in(material))):
                     warnings.append(f"material {label!r} has images, but its faces no coordinates")
-        made.append(Mesh(name=name, material=material, emission=emission, **arrays))
+        meshes.append(Mesh(name=name, material=material, emission=emission, **arrays))
     if bare := sum(part.bare for part in parts):
         warnings.append(f"{bare} triangles have no texture coordinates; (0, 0) stands for them")
     if unknown:
         warnings.append(f"no library holds the material {_some(unknown)}; grey stands for it")
     if library is not None:
         warnings += library.warnings()
-    return made
+    return meshes
 
 
 def _some(names: list[str]) -> str:
@@ -260,14 +267,14 @@ def _some(names: list[str]) -> str:
 
 
 def _is_image(texture: Texture) -> bool:
-    """Return whether a texture is one of a file."""
+    """Return whether a texture is an image file."""
     return isinstance(texture, Bitmap) and isinstance(texture.image, Path)
 
 
 def _vertex_colours(
     colours: NDArray[np.float32] | None, scale: float, warnings: list[str]
 ) -> dict[str, NDArray[np.float32]]:
-    """Return sRGB colours of vertices up to `scale` as an attribute, linear; none where no one."""
+    """Return sRGB colours of vertices up to `scale` as a linear attribute, if there are any."""
     if colours is None or np.isnan(colours).all():
         return {}
     if np.isnan(colours).any():
@@ -282,7 +289,7 @@ def _usable_normals(
     """Return unit normals; those of adjacent faces where the file's are zero or not finite."""
     length = np.linalg.norm(normals.astype(np.float64), axis=1, keepdims=True)
     bad = ~(np.isfinite(length) & (length > 0.0))[:, 0]
-    # What is of length one stays as it is to the last bit, so that a saved mesh is read unchanged.
+    # Unit normals stay as they are to the last bit, so that a saved mesh is read unchanged.
     exact = np.abs(length - 1.0) < 1e-6
     with np.errstate(divide="ignore", invalid="ignore"):
         unit = np.where(exact, normals, normals / length)

@@ -19,8 +19,8 @@ from clpt import images, spectra
 from clpt.choices import Missing
 from clpt.errors import SceneError
 from clpt.files import input_files, text
+from clpt.formats.colours import EVEN, GREY, grey_for
 from clpt.formats.meshes.named_files import find
-from clpt.formats.reading import EVEN, GREY, grey_for
 from clpt.scene.lights import Area
 from clpt.scene.materials import (
     Blend,
@@ -52,7 +52,7 @@ OPTIONS = {  # how many words follow
     "-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-bm": 1, "-boost": 1, "-texres": 1,
     **dict.fromkeys(WORDS, 1),
 }  # fmt: skip
-WHOLE = {"-s": WHITE, "-o": BLACK, "-t": BLACK}  # of which the last numbers may be left out
+WHOLE = {"-s": WHITE, "-o": BLACK, "-t": BLACK}  # defaults of their last numbers
 UNUSED = {  # options that are left out, and their values that ask for nothing
     "-t": (BLACK,), "-boost": ((0.0,),), "-cc": ("off",), "-type": (), "-imfchan": (*CHANNELS,),
 }  # fmt: skip
@@ -112,18 +112,18 @@ def uncommented(line: str) -> str:
 def read(path: Path) -> dict[str, Statements]:
     """Read the statements of each material by its name. Raises SceneError."""
     data = text.plain(input_files.read_bytes(path))
-    made: dict[str, Statements] = {}
-    own: Statements = {}
+    materials: dict[str, Statements] = {}
+    statements: Statements = {}
     for number, line in enumerate(data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")):
         words = text.decode(line.replace(b"\0", b" ")).strip().split(None, 1)
         if not words or words[0].startswith("#"):
             continue
-        key, rest = words[0].lower(), words[1] if len(words) > 1 else ""
+        key, value = words[0].lower(), words[1] if len(words) > 1 else ""
         if key == "newmtl":
-            own = made[rest] = {}
+            statements = materials[value] = {}
         else:
-            own[ALIKE.get(key, key)] = Statement(words[0], rest, path, number + 1)
-    return made
+            statements[ALIKE.get(key, key)] = Statement(words[0], value, path, number + 1)
+    return materials
 
 
 @dataclass
@@ -133,7 +133,7 @@ class Library:
     folder: Path
     missing: Missing = "error"
     statements: dict[str, Statements] = field(default_factory=dict)
-    short: dict[str, str] = field(default_factory=dict)  # names without comments -> whole ones
+    short: dict[str, str] = field(default_factory=dict)  # names without comments -> whole names
     absent: list[str] = field(default_factory=list)
     left_out: dict[str, None] = field(default_factory=dict)
     remarks: dict[str, list[str]] = field(default_factory=dict)  # to the materials' names
@@ -174,18 +174,20 @@ class Library:
 
     def warnings(self) -> list[str]:
         """Return what was left out, in a line for each kind."""
-        found = [f"there is no library {name!r}: what it holds is left out" for name in self.absent]
+        messages = [
+            f"there is no library {name!r}: what it holds is left out" for name in self.absent
+        ]
         if self.left_out:
-            found.append(f"left out of its materials: {', '.join(self.left_out)}")
+            messages.append(f"left out of its materials: {', '.join(self.left_out)}")
         for remark, names in self.remarks.items():
             more = f" and {len(names) - 1} more" if len(names) > 1 else ""
-            found.append(f"material {names[0]!r}{more}: {remark}")
-        return found
+            messages.append(f"material {names[0]!r}{more}: {remark}")
+        return messages
 
 
 @dataclass
 class _Maker:
-    """Makes one material of its statements."""
+    """Makes a material of its statements."""
 
     library: Library
     name: str
@@ -273,14 +275,14 @@ class _Maker:
             self.remark(f"illum {value:g} is unknown; as without it")
             return None
         if value in (0, 10):
-            what = "colour without shading" if value == 0 else "shadows on what is not seen"
-            self.remark(f"illum {value:g}, {what}, is rendered as the other statements say")
+            effect = "colour without shading" if value == 0 else "shadows on what is not seen"
+            self.remark(f"illum {value:g}, {effect}, is rendered as the other statements say")
         return int(value)
 
     def index(self, otherwise: float) -> float:
         """Return Ni where it is above 1, and else `otherwise`."""
-        given = self.number("ni", otherwise)
-        return given if given is not None and 1.0 < given < math.inf else otherwise
+        index = self.number("ni", otherwise)
+        return index if index is not None and 1.0 < index < math.inf else otherwise
 
     def glass_index(self, model: int) -> float:
         """Return the index of glass; 1 where the material is none."""
@@ -365,14 +367,14 @@ class _Maker:
             return None
         value = 1.0
         if "d" in self.statements:
-            own = self.statements["d"]
-            words = own.words()
+            statement_d = self.statements["d"]
+            words = statement_d.words()
             if words[:1] == ["-halo"]:
                 self.remark("d -halo is rendered as d, the same from all sides")
                 words = words[1:]
-            value = own.numbers(words)[0]
+            value = statement_d.numbers(words)[0]
         elif (through := self.number("tr", None)) is not None:
-            if through >= 1.0:  # MeshLab and others write it of what is opaque
+            if through >= 1.0:  # MeshLab and others write it for opaque materials
                 self.remark("Tr 1 without d is taken as opaque")
             value = 1.0 - through if through < 1.0 else 1.0
         value = min(max(value, 0.0), 1.0)
@@ -394,9 +396,9 @@ class _Maker:
     def emission(self) -> Area | None:
         """Return the light that Ke and map_Ke give out, from both sides."""
         image = self.take("map_ke")
-        given = self.colour("ke")
-        radiance = WHITE if given is None else given
-        if image is None and (given is None or radiance == BLACK):
+        colour = self.colour("ke")
+        radiance = WHITE if colour is None else colour
+        if image is None and (colour is None or radiance == BLACK):
             return None
         if image is not None:
             radiance = self.product(image, radiance, "Ke")
@@ -442,8 +444,8 @@ class _Maker:
 
     def curve(self, statement: Statement) -> Spectrum:
         """Return a spectrum from a file, times a factor."""
-        rest = uncommented(statement.rest).split(None, 1)[1:]
-        name, factor = (rest or [""])[0], 1.0
+        operands = uncommented(statement.rest).split(None, 1)[1:]
+        name, factor = (operands or [""])[0], 1.0
         path = self.find(statement, name)
         if path is None and len(words := name.rsplit(None, 1)) == 2:
             path = self.find(statement, words[0])
@@ -484,22 +486,22 @@ class _Maker:
         """Return a number in [0, 1], times its image."""
         value = self.number(key, None)
         statement = self.take(f"map_{key}") if image else None
-        given = min(max(default if value is None else value, 0.0), 1.0)
+        factor = min(max(default if value is None else value, 0.0), 1.0)
         if statement is None:
-            return given
+            return factor
         map_, _ = self.bitmap(statement, raw=True)
         if map_.image is GREY:
-            return given
+            return factor
         if value == 0.0:
             self.remark(f"{self.statements[key].key} is 0 beside {statement.key}: the image counts")
-        return map_ if value in (None, 0.0, 1.0) else Product(first=map_, second=given)
+        return map_ if value in (None, 0.0, 1.0) else Product(first=map_, second=factor)
 
     def bitmap(
         self, statement: Statement, *, raw: bool = False, even: bool = False
     ) -> tuple[Bitmap, Options]:
-        """Return the image of a statement and its options; grey where missing ones are grey.
+        """Return the image of a statement and its options; grey if missing images are grey.
 
-        even: grey is a normal map that bends nothing.
+        even: the stand-in is a flat normal map.
         """
         name, options = _options(statement, statement.rest)
         path = self.find(statement, name)
@@ -525,29 +527,29 @@ class _Maker:
         return _placed(path, options, raw), options
 
 
-def _options(statement: Statement, rest: str) -> tuple[str, Options]:
+def _options(statement: Statement, unread: str) -> tuple[str, Options]:
     """Return the name of an image, and the options before it. Raises SceneError."""
     options: Options = {}
-    while (match := re.match(r"(-[a-z]+)(\s+|$)", rest, re.IGNORECASE)) is not None:
+    while (match := re.match(r"(-[a-z]+)(\s+|$)", unread, re.IGNORECASE)) is not None:
         option = match[1].lower()
         if option not in OPTIONS:
             break
-        rest = rest[match.end() :]
+        unread = unread[match.end() :]
         taken: list[str] = []
-        while len(taken) < OPTIONS[option] and (word := re.match(r"(\S+)(\s+|$)", rest)):
+        while len(taken) < OPTIONS[option] and (word := re.match(r"(\S+)(\s+|$)", unread)):
             if option not in WORDS and not NUMBER.fullmatch(word[1]):
                 break
             taken.append(word[1])
-            rest = rest[word.end() :]
+            unread = unread[word.end() :]
         if option in WORDS and taken:
             options[option] = taken[0].lower()
         elif taken and (option in WHOLE or len(taken) == OPTIONS[option]):
             values = statement.numbers(taken)
             options[option] = (*values, *WHOLE.get(option, ())[len(values) :])
         else:
-            message = text.comma_message(rest) or f"{option} needs {OPTIONS[option]} numbers"
+            message = text.comma_message(unread) or f"{option} needs {OPTIONS[option]} numbers"
             raise statement.error(message)
-    return rest.strip(), options
+    return unread.strip(), options
 
 
 def _placed(path: Path, options: Options, raw: bool) -> Bitmap:

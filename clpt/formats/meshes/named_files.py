@@ -12,19 +12,19 @@ from clpt.files import input_files
 def find(folder: Path, name: str) -> Path | None:
     """Return the file that `name` means in `folder`, None where there is none.
 
-    The name may be quoted, its blanks may follow backslashes, and these may divide its folders.
-    Where no name is the same to the letter, the only one that differs in upper and lower case is
-    taken; of a path of another machine, the file of that name in the folder.
+    The name may be quoted; backslashes may precede its blanks and divide its folders. If no name
+    matches exactly, a single name that differs in case is taken; for a path of another machine,
+    the file of that name in the folder.
     """
     name = name.strip()
     if len(name) > 1 and name[0] == name[-1] and name[0] in "\"'":
         name = name[1:-1].strip()
     for known in dict.fromkeys((name, name.replace("\\ ", " "), name.replace("\\", "/"))):
-        if known and (found := _resolved(folder, known)) is not None:
-            return input_files.named("mesh", folder, found)
+        if known and (path := _resolved(folder, known)) is not None:
+            return input_files.named("mesh", folder, path)
     last = name.replace("\\", "/").rpartition("/")[2]
-    found = _resolved(folder, last) if last else None
-    return None if found is None else input_files.named("mesh", folder, found)
+    path = _resolved(folder, last) if last else None
+    return None if path is None else input_files.named("mesh", folder, path)
 
 
 def _resolved(folder: Path, name: str) -> Path | None:

@@ -110,10 +110,10 @@ class _Reader:
     def __post_init__(self) -> None:
         if b"\r" in self.data:
             self.data = self.data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-        # Each line has a newline on both sides, even if the last one is continued.
+        # Each line has a newline on both sides, even if the last line is continued.
         self.data = b"".join((b"\n", self.data, b"\n\n")).translate(BLANKS)
         self.lines = self.data
-        if b"\\\n" in self.data:  # the same length: a place in the one is that in the other
+        if b"\\\n" in self.data:  # the same length: positions agree
             self.data = CONTINUED.sub(_joined, self.data)
 
     def read(self) -> None:
@@ -133,7 +133,7 @@ class _Reader:
             colours = np.full((self.found[VERTEX], 3), np.nan, np.float32)
             for start, values in self.colours:
                 colours[start : start + len(values)] = values
-        made = Contents(
+        contents = Contents(
             vertices=np.concatenate([np.zeros((0, 3), np.float32), *self.rows[VERTEX]]),
             colours=colours,
             uvs=np.concatenate([np.zeros((0, 2), np.float32), *self.rows[UV]]),
@@ -146,32 +146,34 @@ class _Reader:
             warnings=[],
         )
         if self.left_out:
-            made.warnings.append(f"left out: {_listed(self.left_out)}")
+            contents.warnings.append(f"left out: {_listed(self.left_out)}")
         if self.unknown:
-            made.warnings.append(f"left out what OBJ does not know: {_listed(self.unknown)}")
-        if short := int((made.counts < 3).sum()):
-            made.warnings.append(f"left out {short} faces of fewer than three corners")
-        self.check(made)
-        return made
+            contents.warnings.append(f"left out what OBJ does not know: {_listed(self.unknown)}")
+        if short := int((contents.counts < 3).sum()):
+            contents.warnings.append(f"left out {short} faces of fewer than three corners")
+        self.check(contents)
+        return contents
 
-    def check(self, made: Contents) -> None:
+    def check(self, contents: Contents) -> None:
         """Raise SceneError for indices out of range and vertices that are not finite."""
         for column, kind in enumerate(NAMES):
-            named = made.corners[:, column]
+            named = contents.corners[:, column]
             if not len(named) or named.max() < self.found[kind]:
                 continue
             if kind != VERTEX and not self.found[kind]:
-                made.warnings.append(f"left out the numbers of {NAMES[kind]!r}: the file has none")
+                contents.warnings.append(
+                    f"left out the numbers of {NAMES[kind]!r}: the file has none"
+                )
                 named[:] = -1
                 continue
             bad = int(np.argmax(named >= self.found[kind]))
             count = self.found[kind]
             message = f"'f' names the {NAMES[kind]!r} {named[bad] + 1} of {count}"
-            face = int(np.searchsorted(np.cumsum(made.counts), bad, "right"))
+            face = int(np.searchsorted(np.cumsum(contents.counts), bad, "right"))
             self.fail(self.place(FACE, face), message)
-        finite: NDArray[Any] = np.asarray(np.isfinite(made.vertices).all(axis=1))
-        if not finite.all() and not (good := np.take(finite, made.corners[:, 0])).all():
-            vertex = int(made.corners[np.argmin(good), 0])
+        finite: NDArray[Any] = np.asarray(np.isfinite(contents.vertices).all(axis=1))
+        if not finite.all() and not (good := np.take(finite, contents.corners[:, 0])).all():
+            vertex = int(contents.corners[np.argmin(good), 0])
             self.fail(self.place(VERTEX, vertex), "'v' is not finite")
 
     def place(self, kind: int, number: int) -> int:
@@ -201,27 +203,27 @@ class _Reader:
         self.now = {name: labels[-1] for name, (_, labels) in changes.items()}
 
     def numbers(self, at: int, kind: int, plain: Bytes, lines: _Lines) -> None:
-        """Read the lines of one kind of numbers."""
-        own = np.flatnonzero(lines.kind == kind)
-        if not len(own):
+        """Read the lines of a kind of numbers."""
+        rows = np.flatnonzero(lines.kind == kind)
+        if not len(rows):
             return
-        words = lines.words[own] - 1
-        values = _parsed(_cut(plain, lines, own), NUMBERS, np.float32, int(words.sum()))
+        words = lines.words[rows] - 1
+        values = _parsed(_cut(plain, lines, rows), NUMBERS, np.float32, int(words.sum()))
         if values is None or words.min() < LEAST[kind]:
-            values = self.each_number(at, kind, plain, lines, own)
+            values = self.each_number(at, kind, plain, lines, rows)
         self.rows[kind].append(_columns(values, words, 0, 2 if kind == UV else 3))
         if kind == VERTEX and words.max() >= 6:
             colours = _columns(values, words, 3, 6)
             colours[words < 6] = np.nan
             self.colours.append((self.found[kind], colours))
-        self.found[kind] += len(own)
+        self.found[kind] += len(rows)
 
     def each_number(
-        self, at: int, kind: int, plain: Bytes, lines: _Lines, own: Integers
+        self, at: int, kind: int, plain: Bytes, lines: _Lines, rows: Integers
     ) -> Floats32:
-        """Return the numbers of lines, read one by one. Raises SceneError for the first bad one."""
+        """Return the numbers of lines, read singly. Raises SceneError for the first bad number."""
         values: list[float] = []
-        for start, stop in zip(lines.start[own].tolist(), lines.stop[own].tolist(), strict=True):
+        for start, stop in zip(lines.start[rows].tolist(), lines.stop[rows].tolist(), strict=True):
             line = plain[start:stop].tobytes()
             words = [b"nan" if NOT_FINITE.fullmatch(word) else word for word in line.split()]
             for word in words:
@@ -244,12 +246,12 @@ class _Reader:
         changes: dict[str, tuple[list[int], list[int]]],
     ) -> None:
         """Read the faces of a piece; before: how many of each kind of numbers precede the piece."""
-        own = np.flatnonzero(lines.kind == FACE)
-        cut = _cut(plain, lines, own)
+        rows = np.flatnonzero(lines.kind == FACE)
+        cut = _cut(plain, lines, rows)
         fields, counts = _fields(cut)
         values = _parsed(cut.replace(b"/", b" "), INDICES, np.int64, len(fields))
         if values is None or (fields < 0).any() or not values.all():
-            self.explain(at, plain, lines, own)
+            self.explain(at, plain, lines, rows)
         is_vertex = fields == 0
         corners = np.empty((int(counts.sum()), 3), np.int32)
         for column, kind in enumerate(NAMES):
@@ -259,23 +261,23 @@ class _Reader:
                 named = np.zeros(len(corners), np.int64)
                 named[(np.cumsum(is_vertex) - 1)[mine]] = values[mine]
             if named.min(initial=0) < 0:
-                precede = before[kind] + np.cumsum(lines.kind == kind)[own]
+                precede = before[kind] + np.cumsum(lines.kind == kind)[rows]
                 counted = np.repeat(precede, counts) + named + 1
                 if ((named < 0) & (counted < 1)).any():
                     bad = int(np.argmax((named < 0) & (counted < 1)))
                     face = np.searchsorted(np.cumsum(counts), bad, "right")
                     message = f"'f' counts {-named[bad]} back, beyond the first {NAMES[kind]!r}"
-                    self.fail(at + int(lines.start[own[face]]) - 1, message)
+                    self.fail(at + int(lines.start[rows[face]]) - 1, message)
                 named = np.where(named < 0, counted, named)
             corners[:, column] = np.minimum(named, 2**31 - 1) - 1
         for name, (places, labels) in changes.items():
-            self.labels[name].append(np.array(labels, np.int64)[np.searchsorted(places, own)])
+            self.labels[name].append(np.array(labels, np.int64)[np.searchsorted(places, rows)])
         self.counts.append(counts)
         self.corners.append(corners)
 
-    def explain(self, at: int, plain: Bytes, lines: _Lines, own: Integers) -> NoReturn:
+    def explain(self, at: int, plain: Bytes, lines: _Lines, rows: Integers) -> NoReturn:
         """Raise SceneError for the first corner of faces that is wrong."""
-        for start, stop in zip(lines.start[own].tolist(), lines.stop[own].tolist(), strict=True):
+        for start, stop in zip(lines.start[rows].tolist(), lines.stop[rows].tolist(), strict=True):
             for word in plain[start:stop].tobytes().split():
                 first, *more = word.split(b"/")
                 whole = len(more) < 3 and all(INDEX.fullmatch(part) for part in more if part)
@@ -289,38 +291,38 @@ class _Reader:
         raise AssertionError("every corner is right")
 
     def names(self, piece: Bytes, lines: _Lines) -> dict[str, tuple[list[int], list[int]]]:
-        """Read the other lines of a piece.
+        """Read the lines of a piece that are neither numbers nor faces.
 
-        Return the lines at which materials and smoothing groups change, and what holds before the
-        first and after each.
+        Return the lines of changes of materials and smoothing groups, and the labels before the
+        first change and after each change.
         """
         changes: dict[str, tuple[list[int], list[int]]]
         changes = {name: ([], [label]) for name, label in self.now.items()}
         others = np.flatnonzero((lines.kind == OTHER) & (piece[lines.head] != HASH))
         for line in others.tolist():
             words = piece[lines.head[line] : lines.stop[line]].tobytes().split(None, 1)
-            name, rest = text.decode(words[0]), words[1] if len(words) > 1 else b""
+            name, operands = text.decode(words[0]), words[1] if len(words) > 1 else b""
             if name in changes:
                 changes[name][0].append(line)
-                changes[name][1].append(self.label(name, text.decode(rest).strip()))
+                changes[name][1].append(self.label(name, text.decode(operands).strip()))
             elif name == "mtllib":
-                self.libraries.append(text.decode(rest).strip())
+                self.libraries.append(text.decode(operands).strip())
             elif name in LEFT_OUT:
                 self.left_out[f"{LEFT_OUT[name]} ({name})"] = None
             elif name not in SILENT:
                 self.unknown[name[:20]] = None
         return changes
 
-    def label(self, name: str, rest: str) -> int:
+    def label(self, name: str, operand: str) -> int:
         """Return the number of a material or a smoothing group."""
         if name == "usemtl":
-            return self.materials.setdefault(rest, len(self.materials)) if rest else -1
-        word = rest.split()[0] if rest else "off"
+            return self.materials.setdefault(operand, len(self.materials)) if operand else -1
+        word = operand.split()[0] if operand else "off"
         return 0 if word == "off" else int(word) if word.isdecimal() and len(word) < 18 else 1
 
 
 def _joined(match: re.Match[bytes]) -> bytes:
-    """Return blanks for what continues a line, and a comment as it is."""
+    """Return blanks for the continuation of a line, and a comment as it is."""
     return b"  " if match[0].startswith(b"\\") else match[0]
 
 
@@ -364,11 +366,11 @@ def _without_comments(piece: Bytes, lines: _Lines) -> tuple[Bytes, _Lines]:
     return piece, _split(piece)
 
 
-def _cut(plain: Bytes, lines: _Lines, own: Integers) -> bytes:
+def _cut(plain: Bytes, lines: _Lines, rows: Integers) -> bytes:
     """Return the text of some lines."""
-    start, stop = lines.start[own], lines.stop[own]
+    start, stop = lines.start[rows], lines.stop[rows]
     breaks = np.flatnonzero(start[1:] != stop[:-1])
-    begins, ends = start[np.r_[0, breaks + 1]].tolist(), stop[np.r_[breaks, len(own) - 1]].tolist()
+    begins, ends = start[np.r_[0, breaks + 1]].tolist(), stop[np.r_[breaks, len(rows) - 1]].tolist()
     view = plain.data
     return b"".join([view[a:b] for a, b in zip(begins, ends, strict=True)])
 
@@ -391,11 +393,11 @@ def _columns(values: Floats32, words: Integers, first: int, last: int) -> Floats
     if words.min() == words.max() >= last:
         return values.reshape(len(words), -1)[:, first:last]
     begins = np.cumsum(words) - words
-    made = np.zeros((len(words), last - first), np.float32)
+    columns = np.zeros((len(words), last - first), np.float32)
     for column in range(first, last):
         has = words > column
-        made[has, column - first] = values[begins[has] + column]
-    return made
+        columns[has, column - first] = values[begins[has] + column]
+    return columns
 
 
 def _fields(cut: bytes) -> tuple[NDArray[np.int8], Integers]:

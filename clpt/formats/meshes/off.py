@@ -47,22 +47,22 @@ class _Numbers:
     ends: Integers
     at: int = 0
 
-    def take(self, count: int, what: str) -> Floats:
+    def take(self, count: int, quantity: str) -> Floats:
         """Return the next numbers."""
         if count > len(self.values) - self.at:
-            raise SceneError(f"it ends within its {what}")
+            raise SceneError(f"it ends within its {quantity}")
         self.at += count
         return self.values[self.at - count : self.at]
 
-    def count(self, what: str) -> int:
+    def count(self, quantity: str) -> int:
         """Return the next number, which says how many of something follow."""
-        value = float(self.take(1, what)[0])
+        value = float(self.take(1, quantity)[0])
         if not (0.0 <= value < 2.0**31 and value == int(value)):
-            raise SceneError(f"it has {value:g} {what}")
+            raise SceneError(f"it has {value:g} {quantity}")
         return int(value)
 
     def rest(self) -> int:
-        """Return how many numbers are left on the line of the last one taken."""
+        """Return how many numbers are left on the line of the last number taken."""
         return int(self.ends[np.searchsorted(self.ends, self.at)]) - self.at
 
     def width(self) -> int:
@@ -88,18 +88,18 @@ def _read(data: bytes) -> Triangles:
     if numbers.rest() or numbers.width() == 1:  # some programs leave it out
         numbers.count("edges")
     warnings: list[str] = []
-    points, made = _vertices(numbers, kind, dimensions, vertices, warnings)
+    points, attributes = _vertices(numbers, kind, dimensions, vertices, warnings)
     counts, corners, colours = _faces(numbers, faces, warnings)
     triangles, polygon = triangulate(points, counts, corners)
     return Triangles(
         vertices=points,
         faces=corners[triangles],
         columns={
-            "vertex": made.pop("colours"),
+            "vertex": attributes.pop("colours"),
             "face": {n: c[polygon] for n, c in colours.items()},
         },
         warnings=warnings,
-        **made,
+        **attributes,
     )
 
 
@@ -122,16 +122,16 @@ def _vertices(
     points = np.zeros((count, 3))
     with np.errstate(all="ignore"):
         points[:, :dimensions] = places[:, :dimensions] / (places[:, -1:] if homogeneous else 1.0)
-        made = {
+        attributes = {
             "normals": normals.astype(np.float32) if sizes[1] else None,
             "uvs": uvs.astype(np.float32) if sizes[3] else None,
             "colours": _columns(colours, bool((colours > 1.0).any()), "vertex", warnings),
         }
-        return points.astype(np.float32), made
+        return points.astype(np.float32), attributes
 
 
 def _lines(numbers: _Numbers, count: int) -> Integers:
-    """Return where the next lines begin, and the last one ends; fewer where the file ends."""
+    """Return where the next lines begin, and the last line ends; fewer at the end of the file."""
     line = int(np.searchsorted(numbers.ends, numbers.at, "right"))
     return np.r_[numbers.at, numbers.ends[line : line + count]]
 
@@ -143,8 +143,8 @@ def _faces(
     begins, ends = _places(numbers, count)
     counts = numbers.values[begins].astype(np.int64)
     starts = np.cumsum(counts) - counts
-    own = np.repeat(begins + 1 - starts, counts) + np.arange(counts.sum())
-    corners = indices(numbers.values[own])
+    places = np.repeat(begins + 1 - starts, counts) + np.arange(counts.sum())
+    corners = indices(numbers.values[places])
     more = ends - begins - 1 - counts
     if (more == 1).any():
         warnings.append("colours of faces by their number in a list left out")
@@ -170,15 +170,15 @@ def _places(numbers: _Numbers, count: int) -> tuple[Integers, Integers]:
         begins, widths = lines[:-1], np.diff(lines)
         if ((values[begins] >= 0) & (values[begins] < widths)).all():
             return begins, lines[1:]
-    found = []
+    rows = []
     for _ in range(count):
         begin = numbers.at
         numbers.take(numbers.count("corners"), f"{count} faces")
-        rest = numbers.rest()
-        numbers.at += rest if rest in (1, 3, 4) else 0
-        found.append((begin, numbers.at))
-    made = np.array(found, np.int64).reshape(-1, 2)
-    return made[:, 0], made[:, 1]
+        remaining = numbers.rest()
+        numbers.at += remaining if remaining in (1, 3, 4) else 0
+        rows.append((begin, numbers.at))
+    extents = np.array(rows, np.int64).reshape(-1, 2)
+    return extents[:, 0], extents[:, 1]
 
 
 def _columns(

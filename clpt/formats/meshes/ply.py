@@ -27,11 +27,11 @@ ELEMENTS = ("vertex", "face", "tristrips")
 RESTART = -1  # between the strips of a list
 LEFT_OUT = ("material_index", "ambient_red", "specular_red", "specular_power")
 PER_BYTE = 8  # bytes of memory for each of the file, while it is read
-MOST_CORNERS = 1 << 16  # of one polygon
+MOST_CORNERS = 1 << 16  # of a polygon
 
 
 def read(path: Path) -> Triangles:
-    """Read a file. Raises SceneError for one that is broken, or has no vertices or faces."""
+    """Read a file. Raises SceneError if it is broken, or has no vertices or faces."""
     data = text.plain(read_bytes(path))
     budget.check(PER_BYTE * len(data), "its tables", path)
     try:
@@ -56,7 +56,7 @@ def _triangles(header: Header, tables: Columns) -> Triangles:
         held = ", ".join(repr(element.name[:40]) for element in header.elements[:5])
         raise SceneError(f"it holds no triangles: its elements are {held}")
     rows = np.r_[polygon, np.full(len(strips), len(counts))]
-    made = Triangles(
+    mesh = Triangles(
         vertices=vertices,
         faces=np.concatenate([corners[triangles], strips]),
         normals=None if normals is None else _columns(vertex, normals),
@@ -70,8 +70,8 @@ def _triangles(header: Header, tables: Columns) -> Triangles:
         warnings=_left_out(tables),
     )
     if "texcoord" in face and (uvs is None or header.textures):
-        _with_corner_uvs(made, counts, face["texcoord"], triangles, len(strips))
-    return made
+        _with_corner_uvs(mesh, counts, face["texcoord"], triangles, len(strips))
+    return mesh
 
 
 def _of_faces(values: NDArray[Any]) -> NDArray[Any]:
@@ -81,38 +81,38 @@ def _of_faces(values: NDArray[Any]) -> NDArray[Any]:
 
 def _corners(face: dict[str, Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return how many corners each polygon has, and the vertices of all."""
-    found = next((face[name] for name in CORNERS if name in face), None)
-    if not isinstance(found, tuple):
+    lists = next((face[name] for name in CORNERS if name in face), None)
+    if not isinstance(lists, tuple):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    counts = found[0].astype(np.int64)
+    counts = lists[0].astype(np.int64)
     if len(counts) and counts.max() > MOST_CORNERS:
         raise SceneError(f"a polygon has {counts.max()} corners, more than {MOST_CORNERS}")
-    return counts, indices(found[1])
+    return counts, indices(lists[1])
 
 
 def _strips(table: dict[str, Any]) -> NDArray[np.int64]:
-    """Return the triangles (m, 3) of lists of strips: each vertex makes one with the two before it.
+    """Return the triangles (m, 3) of lists of strips: of each vertex with the two before it.
 
     -1 begins another strip; triangles that name a vertex twice only join two parts.
     """
-    found = next((table[name] for name in CORNERS if name in table), None)
-    if not isinstance(found, tuple) or not len(found[1]):
+    lists = next((table[name] for name in CORNERS if name in table), None)
+    if not isinstance(lists, tuple) or not len(lists[1]):
         return np.zeros((0, 3), np.int64)
-    values = indices(found[1])
+    values = indices(lists[1])
     begins = np.zeros(len(values), np.bool_)
-    begins[(np.cumsum(found[0]) - found[0]).astype(np.int64)[found[0] > 0]] = True
+    begins[(np.cumsum(lists[0]) - lists[0]).astype(np.int64)[lists[0] > 0]] = True
     begins[1:] |= values[:-1] == RESTART
     at = np.arange(len(values))
     place = at - np.maximum.accumulate(np.where(begins, at, 0))  # in the strip
     last = np.flatnonzero((place >= 2) & (values != RESTART))
     odd = place[last] % 2 == 1
     a, b, c = values[last - 2], values[last - 1], values[last]
-    made = np.stack([np.where(odd, b, a), np.where(odd, a, b), c], axis=1)
-    return made[(a != b) & (b != c) & (c != a)]
+    corners = np.stack([np.where(odd, b, a), np.where(odd, a, b), c], axis=1)
+    return corners[(a != b) & (b != c) & (c != a)]
 
 
 def _with_corner_uvs(
-    made: Triangles,
+    mesh: Triangles,
     counts: NDArray[np.int64],
     texcoord: Any,
     triangles: NDArray[np.int32],
@@ -120,38 +120,38 @@ def _with_corner_uvs(
 ) -> None:
     """Give a mesh the uvs that its faces list for their corners; split vertices with several."""
     lengths, values = texcoord
-    given = (lengths == 2 * counts) & (counts > 0)
-    if (~given & (counts > 2)).any() or strips:
-        made.warnings.append("faces without texture coordinates have those of one point")
-    if not given.any():
+    complete = (lengths == 2 * counts) & (counts > 0)
+    if (~complete & (counts > 2)).any() or strips:
+        mesh.warnings.append("faces without texture coordinates have those of one point")
+    if not complete.any():
         return
     uvs = np.zeros((int(counts.sum()), 2), np.float32)
     with np.errstate(over="ignore", invalid="ignore"):
-        own = values[np.repeat(given, lengths)].reshape(-1, 2).astype(np.float32)
-    uvs[np.repeat(given, counts)] = own
+        face_uvs = values[np.repeat(complete, lengths)].reshape(-1, 2).astype(np.float32)
+    uvs[np.repeat(complete, counts)] = face_uvs
     uvs = np.concatenate([uvs[triangles.reshape(-1)], np.zeros((3 * strips, 2), np.float32)])
     _, uv = np.unique(np.ascontiguousarray(uvs).view(np.uint64), return_inverse=True)
-    vertex = made.faces.reshape(-1)
-    if len(vertex) and (vertex.min() < 0 or vertex.max() >= len(made.vertices)):
+    vertex = mesh.faces.reshape(-1)
+    if len(vertex) and (vertex.min() < 0 or vertex.max() >= len(mesh.vertices)):
         return  # refused later, by its number
     _, first, faces = np.unique(
         vertex * (uv.max(initial=0) + 1) + uv.reshape(-1), return_index=True, return_inverse=True
     )
     named = vertex[first]
-    made.vertices, made.faces, made.uvs = made.vertices[named], faces.reshape(-1, 3), uvs[first]
-    made.normals = None if made.normals is None else made.normals[named]
-    made.columns["vertex"] = {n: column[named] for n, column in made.columns["vertex"].items()}
+    mesh.vertices, mesh.faces, mesh.uvs = mesh.vertices[named], faces.reshape(-1, 3), uvs[first]
+    mesh.normals = None if mesh.normals is None else mesh.normals[named]
+    mesh.columns["vertex"] = {n: column[named] for n, column in mesh.columns["vertex"].items()}
 
 
 def _left_out(tables: Columns) -> list[str]:
-    """Return warnings of what a file has that would be seen, and that is not read."""
-    found = [f"element {name[:40]!r} left out" for name in tables if name not in ELEMENTS]
+    """Return warnings of a file's visible properties that are not read."""
+    messages = [f"element {name[:40]!r} left out" for name in tables if name not in ELEMENTS]
     for element in ("vertex", "face"):
         columns = _plain(tables.get(element, {}))
-        found += [f"{element} {name} left out" for name in LEFT_OUT if name in columns]
+        messages += [f"{element} {name} left out" for name in LEFT_OUT if name in columns]
         if see_through(columns):
-            found.append(f"{element} alpha left out")
-    return found
+            messages.append(f"{element} alpha left out")
+    return messages
 
 
 def _plain(table: dict[str, Any]) -> dict[str, NDArray[Any]]:

@@ -1,6 +1,6 @@
 """Tables of PLY files (Turk 1994): ascii and binary of both byte orders.
 
-Rows of the same length are read in one go. A table is {column: values}; a list column is a pair of
+Rows of equal length are read at once. A table is {column: values}; a list column is a pair of
 lengths, and all values in a row.
 """
 
@@ -30,7 +30,7 @@ HEADER = re.compile(
     re.DOTALL,
 )
 LONGEST_HEADER = 1 << 16
-EVEN = 1 << 12  # values of a list whose rows are read in one go
+EVEN = 1 << 12  # values of a list whose rows are read at once
 
 
 @dataclass
@@ -72,11 +72,11 @@ def read_tables(data: bytes) -> tuple[Header, Columns]:
 
 
 def _header(data: bytes) -> Header:
-    found = HEADER.match(data[:LONGEST_HEADER])
-    if found is None:
+    header = HEADER.match(data[:LONGEST_HEADER])
+    if header is None:
         raise SceneError("it has no header")
     order, elements, textures = None, [], []
-    for number, line in enumerate(data[: found.start("end")].splitlines()[1:], 2):
+    for number, line in enumerate(data[: header.start("end")].splitlines()[1:], 2):
         words = text.decode(line).split()
         match words:
             case ["format", name, _] if name in FORMATS:
@@ -100,11 +100,11 @@ def _header(data: bytes) -> Header:
         names = [column.name for column in element.properties]
         if len(set(names)) < len(names) or (element.count and not names):
             raise SceneError(f"its element {element.name[:40]!r} has no columns, or one twice")
-    return Header(order, elements, textures, found.end())
+    return Header(order, elements, textures, header.end())
 
 
 def _whole(name: str) -> bool:
-    """Return whether a type is one of whole numbers."""
+    """Return whether a type is a whole number."""
     return TYPES.get(name, "f")[0] != "f"
 
 
@@ -158,7 +158,7 @@ def _even_rows(
 
 
 def _number(data: bytes, at: int, dtype: str, size: int) -> int:
-    """Return how many values a list has; size: bytes of one, all of which must be in the file."""
+    """Return how many values a list has, all within the file; size: bytes of each value."""
     first = at + np.dtype(dtype).itemsize
     if first > len(data):
         raise SceneError("it ends too early")
@@ -168,7 +168,7 @@ def _number(data: bytes, at: int, dtype: str, size: int) -> int:
 
 
 def _check_length(count: int, size: int, left: int) -> None:
-    """Raise SceneError for a list that is longer than what is left of the file [bytes]."""
+    """Raise SceneError for a list that is longer than the rest of the file [bytes]."""
     if count < 0:
         raise SceneError(f"a list has {count} values")
     if count * size > left:
@@ -228,7 +228,7 @@ def _gathered(
     """Return the columns of rows that have been walked over; at: where each row begins."""
     raw = np.frombuffer(data, np.uint8)
     lists = iter(rows.lists)
-    made: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
     for column in element.properties:
         dtype = np.dtype(order + column.type)
         size = dtype.itemsize
@@ -236,13 +236,13 @@ def _gathered(
             *_, places, lengths = next(lists)
             first, counts = np.array(places, np.int64), np.array(lengths, np.int64)
             total, starts = int(counts.sum()), np.cumsum(counts) - counts
-            own = np.repeat(first - size * starts, counts) + size * np.arange(total)
-            made[column.name] = counts, _at(raw, own, dtype)
+            positions = np.repeat(first - size * starts, counts) + size * np.arange(total)
+            columns[column.name] = counts, _at(raw, positions, dtype)
             at = first + size * counts
         else:
-            made[column.name] = _at(raw, at, dtype)
+            columns[column.name] = _at(raw, at, dtype)
             at = at + size
-    return made
+    return columns
 
 
 def _at(raw: NDArray[np.uint8], places: NDArray[np.int64], dtype: np.dtype[Any]) -> NDArray[Any]:
@@ -282,8 +282,8 @@ def _told_words(lines: list[bytes], elements: list[Element]) -> NDArray[np.float
     for element in elements:
         row = dataclasses.replace(element, count=1)
         for line in lines[at : at + element.count]:
-            own = np.array(line.split(), np.float64)
-            words.append(own[: _ascii_rows(own, row)[1]])
+            numbers = np.array(line.split(), np.float64)
+            words.append(numbers[: _ascii_rows(numbers, row)[1]])
         at += element.count
     return np.concatenate([*words, np.zeros(0)])
 
@@ -322,13 +322,13 @@ def _empty(element: Element) -> dict[str, Any]:
 
 def _joined(element: Element, rows: dict[str, Any]) -> dict[str, Any]:
     """Columns of lengths and values, row by row, as `_binary` has them."""
-    made: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
     for column in element.properties:
         lengths, values = rows[column.name]
         joined = np.concatenate(values or [np.zeros(0)])
         whole = (np.array(lengths, np.int64), joined)
-        made[column.name] = whole if column.length else _typed(joined, column)
-    return made
+        columns[column.name] = whole if column.length else _typed(joined, column)
+    return columns
 
 
 def _typed(values: NDArray[Any], column: Property) -> NDArray[Any]:

@@ -17,17 +17,17 @@ ARRAYS = ("centers", "radii")
 
 def read_spheres(path: Path) -> dict[str, Any]:
     """Return the parameters of `spheres` that are in a file. Raises SceneError."""
-    found = numpy_files.arrays(path)
-    for name in found:
+    arrays = numpy_files.arrays(path)
+    for name in arrays:
         if name not in ARRAYS and not name.startswith(ATTRIBUTES):
             message = (
                 f"holds {name!r}; there may be centers, radii and attributes {ATTRIBUTES[0]}..."
             )
             raise SceneError(message, file=path)
-    if "centers" not in found:
+    if "centers" not in arrays:
         raise SceneError("has no array 'centers'", file=path)
-    given: dict[str, Any] = {name: found.pop(name) for name in ARRAYS if name in found}
-    return {**given, "attributes": found}
+    geometry: dict[str, Any] = {name: arrays.pop(name) for name in ARRAYS if name in arrays}
+    return {**geometry, "attributes": arrays}
 
 
 def write_spheres(path: Path, spheres: Spheres) -> None:
@@ -42,7 +42,7 @@ PER_BYTE = 64  # bytes of memory for each of the file, while it is read
 def read_strands(path: Path) -> dict[str, Any]:
     """Return `points` (n, 4) float32 and `lengths` (k,) int64, as `Curves` takes them.
 
-    Raises SceneError with the line for what is no row of four numbers, and for an empty file.
+    Raises SceneError with the line that is not four numbers, and for an empty file.
     """
     data = text.plain(input_files.read_bytes(path))
     budget.check(PER_BYTE * len(data), "its points", path)
@@ -52,8 +52,8 @@ def read_strands(path: Path) -> dict[str, Any]:
     if short.any():
         line = 1 + int(np.argmax(short))
         raise SceneError("needs x, y, z and a radius", file=path, line=line)
-    given = columns > 0
-    if not given.any():
+    occupied = columns > 0
+    if not occupied.any():
         raise SceneError("has no points", file=path)
     words = [word for row in rows for word in row[:4]]
     try:
@@ -62,8 +62,8 @@ def read_strands(path: Path) -> dict[str, Any]:
         line = _wrong(rows)
         comma = text.comma_message(text.decode(b" ".join(rows[line - 1])))
         raise SceneError(comma or "is not all numbers", file=path, line=line) from None
-    starts = np.flatnonzero(given & ~np.r_[False, given[:-1]])
-    ends = np.flatnonzero(given & ~np.r_[given[1:], False])
+    starts = np.flatnonzero(occupied & ~np.r_[False, occupied[:-1]])
+    ends = np.flatnonzero(occupied & ~np.r_[occupied[1:], False])
     with np.errstate(over="ignore"):  # lowering refuses what is not finite
         budget.take(4 * points.size, "its points", path)
         return {"points": points.astype(np.float32), "lengths": ends - starts + 1}

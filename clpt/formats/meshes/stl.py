@@ -21,7 +21,7 @@ from clpt.geometry.polygons import triangulate
 HEAD = 84  # bytes of a binary file before its triangles: a comment, and their number
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 CHUNK = 1 << 24  # bytes of a text whose words are told apart at a time
-BEGINNING = 1 << 12  # bytes in which a text has its first words
+BEGINNING = 1 << 12  # bytes that hold the first words of a text
 WORDS = re.compile(rb"\b(solid|facet)\b", re.IGNORECASE)
 # "solid", or "endsolid", and a name up to the end of the line or the first facet; in lower case.
 SOLID = re.compile(rb"solid(?:(?<!\Ssolid)|(?<=endsolid))\b((?:(?!\bfacet[ \t]+normal\b)[^\n])*)")
@@ -37,7 +37,7 @@ OWN, RED, GREEN, BLUE = 1 << 15, 10, 5, 0  # of an attribute: a flag, and shifts
 
 
 def read(path: Path) -> list[Triangles]:
-    """Read the solids of a file. Raises SceneError with the line of what is broken."""
+    """Read the solids of a file. Raises SceneError with the broken line."""
     data = read_bytes(path)
     budget.check(PER_BYTE * len(data), "its triangles", path)
     try:
@@ -65,15 +65,15 @@ def _binary(data: bytes) -> Triangles:
     if held < count:
         raise SceneError(f"it ends early: it holds {held} of {count} triangles")
     facets = np.frombuffer(data, FACET, count, HEAD)
-    made = _soup(facets["corners"].reshape(-1, 3))
+    mesh = _soup(facets["corners"].reshape(-1, 3))
     more = len(data) - HEAD - count * FACET.itemsize
     if more and data[HEAD + count * FACET.itemsize :].strip(b"\0\r\n \t"):
-        made.warnings.append(f"{more} bytes after the {count} triangles left out")
+        mesh.warnings.append(f"{more} bytes after the {count} triangles left out")
     colours = _colours(data[: HEAD - 4], facets["attribute"])
     if colours is not None:
         names = ("red", "green", "blue")
-        made.columns["face"] = {name: colours[:, i] for i, name in enumerate(names)}
-    return made
+        mesh.columns["face"] = {name: colours[:, i] for i, name in enumerate(names)}
+    return mesh
 
 
 def _colours(head: bytes, attributes: NDArray[np.uint16]) -> NDArray[np.uint8] | None:
@@ -87,18 +87,18 @@ def _colours(head: bytes, attributes: NDArray[np.uint16]) -> NDArray[np.uint8] |
     if magics < 0 and not flagged.any():
         return None
     shifts = (BLUE, GREEN, RED) if magics >= 0 else (RED, GREEN, BLUE)
-    own = ~flagged if magics >= 0 else flagged
+    specific = ~flagged if magics >= 0 else flagged
     fives = np.stack([attributes >> shift & 31 for shift in shifts], axis=1).astype(np.int64)
     default = np.frombuffer(head[magics + 6 : magics + 9].ljust(3, b"\0"), np.uint8)
     other = default if magics >= 0 else np.full(3, PLAIN, np.uint8)
-    return np.where(own[:, None], (fives * 255 + 15) // 31, other).astype(np.uint8)
+    return np.where(specific[:, None], (fives * 255 + 15) // 31, other).astype(np.uint8)
 
 
 def _text(data: bytes) -> list[Triangles]:
     """Return a mesh for each solid of a text."""
     data = data.rstrip(text.FILLING).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     lower = data.lower()
-    made, name, start = [], "", 0
+    solids, name, start = [], "", 0
     for solid in [*SOLID.finditer(lower), None]:
         stop = len(data) if solid is None else solid.start()
         closes = END.search(lower[max(start, stop - 8) : stop])
@@ -106,17 +106,17 @@ def _text(data: bytes) -> list[Triangles]:
         if lower[part].strip():
             corners = _facets(lower[part])
             first = 1 + data.count(b"\n", 0, start)
-            made.append(_loops(data[part], first) if corners is None else _soup(corners))
-            made[-1].name = name
+            solids.append(_loops(data[part], first) if corners is None else _soup(corners))
+            solids[-1].name = name
         if solid is not None:
             start = solid.end()
             name = name if closes else text.decode(data[slice(*solid.span(1))]).strip()
-    return made
+    return solids
 
 
 def _facets(data: bytes) -> NDArray[np.float64] | None:
     """Return the corners (3n, 3) of a text of whole facets, in lower case; None for any other."""
-    at, found = 0, []
+    at, vertices = 0, []
     while at < len(data):
         end = data.find(ROW[-1], at + CHUNK)
         end = len(data) if end < 0 else end + len(ROW[-1])
@@ -129,12 +129,12 @@ def _facets(data: bytes) -> NDArray[np.float64] | None:
             places = [np.array(columns[i], np.float64) for i in PLACES]
         except ValueError:
             return None
-        found.append(np.stack(places, axis=1).reshape(-1, 3))
-    return np.concatenate(found)
+        vertices.append(np.stack(places, axis=1).reshape(-1, 3))
+    return np.concatenate(vertices)
 
 
 def _loops(data: bytes, line: int) -> Triangles:
-    """As `_facets`, line by line; loops may have more corners than 3. line: the first one's number.
+    """As `_facets`, line by line; loops may have more than 3 corners. line: number of the first.
 
     Raises SceneError with the line.
     """

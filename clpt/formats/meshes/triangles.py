@@ -50,29 +50,33 @@ def attributes(triangles: Triangles) -> dict[str, NDArray[np.float32]]:
     Colours are vertex_color or face_color: whole numbers are shares of the largest, decoded from
     sRGB, floats are linear. x_0, x_1, x_2 or x_r, x_g, x_b are vertex_x.
     """
-    made: dict[str, NDArray[np.float32]] = {}
+    values_by_name: dict[str, NDArray[np.float32]] = {}
     for element in ("vertex", "face"):
         columns = dict(triangles.columns.get(element, {}))
         colour = next((names for names in COLOURS if all(n in columns for n in names)), ())
         if colour:
             values = np.column_stack([columns.pop(name) for name in colour])
-            made[f"{element}_color"] = linear(values)
+            values_by_name[f"{element}_color"] = linear(values)
         for name, parts in _grouped(columns).items():
             values = np.column_stack(parts)
-            if values.shape[1] in (1, 3) and f"{element}_{name}" not in made:
+            if values.shape[1] in (1, 3) and f"{element}_{name}" not in values_by_name:
                 bytes_ = values.dtype == np.uint8
-                made[f"{element}_{name}"] = linear(values) if bytes_ else values.astype(np.float32)
+                values_by_name[f"{element}_{name}"] = (
+                    linear(values) if bytes_ else values.astype(np.float32)
+                )
     vertex = triangles.columns.get("vertex", {})
     if all(name in vertex for name in TANGENT_COLUMNS):
-        made[TANGENTS] = np.column_stack([vertex[n] for n in TANGENT_COLUMNS]).astype(np.float32)
-    return made
+        values_by_name[TANGENTS] = np.column_stack([vertex[n] for n in TANGENT_COLUMNS]).astype(
+            np.float32
+        )
+    return values_by_name
 
 
 def linear(colours: NDArray[Any]) -> NDArray[np.float32]:
-    """Return colours as they are stored as linear ones: floats are linear already.
+    """Return stored colours as linear colours: floats are linear already.
 
-    Whole numbers are shares of 255 if their type or their values are those of a byte, else of 65535
-    or of their type's largest number.
+    Whole numbers are shares of 255 if their type or their values fit a byte, else of 65535 or of
+    their type's largest number.
     """
     if colours.dtype.kind not in "iu":
         return colours.astype(np.float32)

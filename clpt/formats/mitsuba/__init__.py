@@ -1,9 +1,8 @@
 """Scenes in the XML of Mitsuba 2 and 3, and in that of Mitsuba 0.3 to 0.6.
 
-The version of the file decides: one below 2 has the words and defaults of Mitsuba 0.x. An
-unsupported element or an unknown parameter is an error that names the element, the file and the
-line. In files of Mitsuba 0.x, which nobody corrects, an unknown parameter or integrator is told
-instead.
+The version of the file decides: below 2 the words and defaults of Mitsuba 0.x hold. An unsupported
+element or an unknown parameter is an error that names the element, the file and the line. In files
+of Mitsuba 0.x, which nobody corrects, an unknown parameter or integrator gives a warning.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ REFERENCED = ("spectrum", "volume", "film", "sampler", "rfilter", "medium", "pha
 def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scene:
     """Read a Mitsuba scene; `variables` stand for its `$names`; missing: see clpt.load.
 
-    Of several sensors the variable `camera` chooses one by its number or id, unless the file has a
+    The variable `camera` chooses among several sensors by number or id, unless the file has a
     $camera of its own. Raises SceneError with file, line and element for anything broken or not
     supported.
     """
@@ -139,7 +138,7 @@ def _scene(path: Path, document: Document, context: Context) -> Scene:
 
 
 def _lights(props: Properties, context: Context) -> list[Light]:
-    lamps = [attempt(partial(emitter, one, context), None) for one in props.objects("emitter")]
+    lamps = [attempt(partial(emitter, e, context), None) for e in props.objects("emitter")]
     return [lamp for lamp in lamps if lamp is not None]
 
 

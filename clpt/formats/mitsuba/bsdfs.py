@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from clpt import measured, spectra
+from clpt.formats.colours import EVEN, GREY
 from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.principled import (
     at_yellow,
@@ -17,7 +17,7 @@ from clpt.formats.mitsuba.principled import (
     principled,
     principled_thin,
 )
-from clpt.formats.mitsuba.properties import Context, Properties, numbers, unknown
+from clpt.formats.mitsuba.properties import Context, PluginReader, Properties, numbers, unknown
 from clpt.formats.mitsuba.spectra import (
     coefficient,
     factor,
@@ -32,7 +32,7 @@ from clpt.formats.mitsuba.spectra import (
 from clpt.formats.mitsuba.xml import Element
 from clpt.formats.pbrt import scattering
 from clpt.formats.pbrt.textures import map_values
-from clpt.formats.reading import EVEN, GREY, attempt
+from clpt.formats.reading import attempt
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.params import defaults, fields_of, params
@@ -158,7 +158,7 @@ def _old_metal(props: Properties, around: float) -> Parameters:
 
 
 def _around(props: Properties) -> float:
-    """Take Mitsuba 0.6's index around a metal, by which eta and k are divided."""
+    """Take Mitsuba 0.6's index around a metal; eta and k are relative to it."""
     child = props.named.get("ext_eta")
     if child is None:
         return AIR if props.context.old else 1.0
@@ -170,7 +170,7 @@ def _around(props: Properties) -> float:
 
 
 def _named_metal(child: Element, context: Context) -> tuple[Spectrum, Spectrum]:
-    """A metal by its name; a grey one where there are no free data."""
+    """Return a metal by its name; grey metal if no free data exist."""
     name = child.attribute("value")
     if name.removesuffix("_palik") not in WITHOUT_DATA:
         return spectra.metal(name)
@@ -258,12 +258,12 @@ def _rough_plastic(props: Properties) -> Parameters:
 
 
 def _polarized_plastic(props: Properties) -> Parameters:
-    """As Mitsuba's without polarisation, but for what its boundary reflects inwards."""
+    """As Mitsuba's without polarisation, except for the internal reflection of its boundary."""
     props.context.warn(props.element, "light has no polarisation here: taken as roughplastic")
     return {**_rough_plastic(props), "nonlinear": False}
 
 
-def _polarizing(share: float) -> Callable[[Properties], Parameters]:
+def _polarizing(share: float) -> PluginReader[Parameters]:
     """Return the reader of a plate that lets a share of unpolarised light straight through."""
 
     def read(props: Properties) -> Parameters:
@@ -443,7 +443,7 @@ def _nested(props: Properties, low: int, high: int) -> list[Material]:
     return [bsdf(element, props.context) for element in inner]
 
 
-PLUGINS: dict[str, tuple[type[Material], Callable[[Properties], Parameters]]] = {
+PLUGINS: dict[str, tuple[type[Material], PluginReader[Parameters]]] = {
     "diffuse": (materials.Diffuse, _diffuse),
     "phong": (materials.Phong, _phong),
     "roughdiffuse": (materials.OrenNayar, _rough_diffuse),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from clpt.errors import SceneError
 from clpt.formats import ies
 from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.media import around
-from clpt.formats.mitsuba.properties import Context, Properties, unknown
+from clpt.formats.mitsuba.properties import Context, PluginReader, Properties, unknown
 from clpt.formats.mitsuba.sensors import from_focal_length
 from clpt.formats.mitsuba.spectra import TOP_DOWN, emission, reflectance
 from clpt.formats.mitsuba.xml import Element
@@ -95,7 +94,7 @@ def _make(
     element: Element,
     context: Context,
     cls: type[Light],
-    read: Callable[[Properties], Parameters],
+    read: PluginReader[Parameters],
 ) -> Light:
     props = Properties(element, context)
     props.ignore("sampling_weight")
@@ -164,7 +163,7 @@ def _projector(props: Properties) -> Parameters:
 
 
 def _aspect(image: object) -> float:
-    """Width over height of an image; 1 for what is none."""
+    """Return width over height of an image; 1 for any other value."""
     if not isinstance(image, Bitmap):
         return 1.0
     entries: Any = image.image
@@ -279,11 +278,11 @@ def _collimated(props: Properties) -> Parameters:
     )
 
 
-ON_SHAPES: dict[str, tuple[type[Light], Callable[[Properties], Parameters]]] = {
+ON_SHAPES: dict[str, tuple[type[Light], PluginReader[Parameters]]] = {
     "area": (lights.Area, _area),
     "directionalarea": (lights.DirectionalArea, _directional_area),
 }
-PLUGINS: dict[str, tuple[type[Light], Callable[[Properties], Parameters]]] = {
+PLUGINS: dict[str, tuple[type[Light], PluginReader[Parameters]]] = {
     "point": (lights.Point, _point),
     "spot": (lights.Spot, _spot),
     "projector": (lights.Projector, _projector),

@@ -1,8 +1,8 @@
 """<volume>s of a Mitsuba scene: constants, and numbers on grids, brought to the points of a medium.
 
-A medium of ours has all its numbers at the points of one lattice, in a box outside of which it is
-not. In Mitsuba each volume has its own, and goes on beyond it as at its outermost points; a
-heterogeneous medium ends with the box of `sigma_t`, a homogeneous one does not end.
+A medium of clpt has all its numbers at the points of a single lattice, and ends with its box. In
+Mitsuba each volume has its own lattice, and continues beyond the lattice with its outermost
+values; a heterogeneous medium ends with the box of `sigma_t`, a homogeneous medium does not end.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from clpt.scene.volumes import Volume, resampled
 
 Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
 THICKER = 3  # an odd multiple: the points of the coarser lattice are among those of the finer
-MOST_POINTS = 1 << 23  # of a lattice that is made finer, or larger, for the sake of another one
+MOST_POINTS = 1 << 23  # of a lattice that is refined or enlarged to match another lattice
 
 
 def grid(props: Properties, name: str) -> Element | None:
@@ -36,7 +36,7 @@ def grid(props: Properties, name: str) -> Element | None:
 
 
 def one_channel(element: Element, context: Context) -> Volume:
-    """Return the numbers of a grid of one channel."""
+    """Return the numbers of a grid with a single channel."""
     return _kept("numbers", element, context, _one_channel)
 
 
@@ -121,10 +121,10 @@ def even_box(props: Properties, name: str) -> NDArray[np.float64]:
 
 
 def together(first: Volume, *others: Volume) -> list[Volume]:
-    """Return grids at the points of one lattice in the box of the first, beyond theirs held.
+    """Return grids resampled at the points of a common lattice in the box of the first grid.
 
-    Exact where all have one box and the same number of points along each axis, or one. Else the
-    lattice is finer than they are, as long as that is not too large.
+    Beyond its box a grid has its outermost values. The result is exact if all share a box and each
+    axis has equal numbers of points, or 1. Else the lattice is finer, up to MOST_POINTS.
     """
     box = np.asarray(first.to_world, float)
     size = np.array(first.values.shape[:3])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba import grids, spectra
 from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.principled import dye, fluorescent
-from clpt.formats.mitsuba.properties import Context, Properties, numbers, unknown
+from clpt.formats.mitsuba.properties import Context, PluginReader, Properties, numbers, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.formats.pbrt.scattering import MEDIA as MEASURED
 from clpt.scene import media, phases
@@ -160,7 +159,7 @@ def _plain_name(name: str) -> str:
 
 
 def _weight(props: Properties) -> Element | None:
-    """The grid that is the weight of the medium's `blendphase`, if it is one."""
+    """Return the weight of the medium's `blendphase` if it is a grid; else None."""
     blend = _own_blend(props)
     return None if blend is None else grids.grid(Properties(blend, props.context), "weight")
 
@@ -340,7 +339,7 @@ def _dyed(props: Properties) -> media.Dyed:
 
 
 def _mixture(props: Properties) -> media.Mixture:
-    """Several media in one place, a plugin of our own."""
+    """Read several media in the same space, clpt's own plugin."""
     parts = [medium(item, props.context) for item in props.objects("medium")]
     name = props.element.attributes.get("id", "")
     return media.Mixture(parts=tuple(parts), to_world=props.placement(), name=name)
@@ -374,7 +373,7 @@ def _more(props: Properties) -> dict[str, Any]:
     return matches
 
 
-MEDIA: dict[str, Callable[[Properties], Medium]] = {
+MEDIA: dict[str, PluginReader[Medium]] = {
     "homogeneous": _homogeneous,
     "heterogeneous": _heterogeneous,
     "soot": _soot,
@@ -382,7 +381,7 @@ MEDIA: dict[str, Callable[[Properties], Medium]] = {
     "dyed": _dyed,
     "mixture": _mixture,
 }
-PHASES: dict[str, Callable[[Properties], Phase]] = {
+PHASES: dict[str, PluginReader[Phase]] = {
     "mixturephase": _mixed_phase,
     "isotropic": lambda props: phases.Isotropic(),
     "hg": lambda props: phases.HenyeyGreenstein(g=props.number("g", 0.8)),

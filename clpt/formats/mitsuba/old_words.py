@@ -1,4 +1,4 @@
-"""Words of Mitsuba 0.3 to 0.6 in those of Mitsuba 3, as data: each row names its source.
+"""Words of Mitsuba 0.3 to 0.6 and their names in Mitsuba 3; each row names its source.
 
 Sources are files of the repository mitsuba-renderer/mitsuba (0.6), which read the same files.
 """
@@ -71,7 +71,7 @@ def rename(root: Element) -> list[tuple[Element, str, str]]:
 
 
 def _join(step: Element) -> None:
-    """Join the nine numbers by which 0.3 writes a lookAt."""
+    """Join the nine numbers of a lookAt of version 0.3."""
     for name, parts in LOOK_AT.items():
         if name not in step.attributes and all(part in step.attributes for part in parts):
             step.attributes[name] = " ".join(step.attributes[part] for part in parts)

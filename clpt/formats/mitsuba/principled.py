@@ -12,7 +12,7 @@ from clpt.scene.materials import pigment
 from clpt.scene.textures import Product
 from clpt.spectra import Constant, RGBUnbounded, Spectrum
 
-LEAST_SPECULAR, LEAST_ETA = 1e-3, 1.001  # Mitsuba's, of what transmits light
+LEAST_SPECULAR, LEAST_ETA = 1e-3, 1.001  # Mitsuba's, for surfaces that transmit
 MOST_SPECULAR = 12.5  # where the index that it stands for is infinite
 SHARED = (
     "anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness",
@@ -46,7 +46,7 @@ def _shared(props: Properties) -> dict[str, Any]:
 def _eta(props: Properties, *, transmits: bool) -> Any:
     """Take the index of refraction, by itself or as Mitsuba's `specular`.
 
-    transmits: whether light is refracted; an index of one would refract nothing.
+    transmits: whether light is refracted; an index of 1 would not refract.
     """
     if "eta" in props.named and "specular" in props.named:
         raise props.element.error("give either 'eta' or 'specular', not both")

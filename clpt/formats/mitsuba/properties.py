@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.choices import Missing
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
+from clpt.formats.colours import GREY, grey_for
 from clpt.formats.mitsuba.xml import MAX_NESTING, Document, Element
-from clpt.formats.reading import GREY, grey_for, note
+from clpt.formats.reading import note
 from clpt.scene.motion import Keys
 
 OLD_VALUES, OLD_OBJECTS = {"blackbody"}, {"subsurface"}  # of Mitsuba 0.x alone
@@ -38,6 +39,7 @@ FLAT_SIZE = 1e-5  # thickness over size of a shape that is flattened
 SEPARATOR = re.compile(r"[\s,]+")
 LARGEST_INTEGER = 2**31 - 1
 T = TypeVar("T")
+PluginReader = Callable[["Properties"], T]  # reads the parameters of a plugin
 
 
 class Context:
@@ -113,7 +115,7 @@ class Context:
         return self._made[key]
 
     def warn(self, element: Element, message: str) -> None:
-        """Warn of what the picture will lack."""
+        """Warn of something that the picture will lack."""
         self.warnings.append(f"{element.file.name}:{element.line}: {element.label()}: {message}")
 
     def leave_out(self, element: Element, words: str) -> None:
@@ -121,18 +123,18 @@ class Context:
         self.left_out.setdefault(words, []).append(element.line)
 
     def read_as(self, element: Element, words: str, today: str) -> None:
-        """Note a plugin of an old file for which another stands, for `grouped`."""
+        """Note an old file's plugin and its replacement, for `grouped`."""
         self.replaced.setdefault(f"{words} as {today}", []).append(element.line)
 
     def stand_in(self, error: SceneError, element: Element, grey: T) -> T:
-        """Return what stands for an unknown plugin where missing ones are grey; else raise."""
+        """Return the stand-in for an unknown plugin if missing plugins are grey; else raise."""
         if self.missing == "error":
             raise error
         self.warn(element, f"{error.message}; {'grey stands for it' if grey else 'left out'}")
         return grey
 
     def grouped(self) -> list[str]:
-        """Return one warning of all notes, or none."""
+        """Return a single warning of all notes, if there are any."""
         version = self.document.root.attributes.get("version", "")
         groups = (("read", self.replaced), ("left out", self.left_out))
         texts = [f"{verb}: {_with_lines(notes)}" for verb, notes in groups if notes]
@@ -212,7 +214,7 @@ class Properties:
         return matching
 
     def object(self, tag: str) -> Element | None:
-        """Take the one nested object of a tag, or None."""
+        """Take the single nested object of a tag, or None."""
         objects = self.objects(tag)
         if len(objects) > 1:
             raise self.element.error(f"holds more than one <{tag}>")
@@ -250,7 +252,7 @@ class Properties:
         return text == "true"
 
     def text(self, name: str, default: str, choices: Sequence[str] = ()) -> str:
-        """Take a string, one of `choices` if there are any."""
+        """Take a string; if `choices` are given, it must be among them."""
         child = self.take(name)
         if child is None:
             return default
@@ -277,7 +279,7 @@ class Properties:
         return self.context.document.find_file(child, child.attribute("value"))
 
     def image(self) -> Path | NDArray[np.float32]:
-        """Take the name of an image; grey where there is none and missing ones are grey.
+        """Take the name of an image; grey if it is missing and missing images are grey.
 
         A dictionary may have an array in its place, (h, w) or (h, w, c).
         """
@@ -347,8 +349,8 @@ class Properties:
     def placement(self, name: str = "to_world", *, thin: bool = False) -> transforms.Matrix:
         """Take a transform that can be inverted.
 
-        thin: one that flattens space leaves a thickness of FLAT_SIZE; raises NoArea for one that
-        leaves a line or a point.
+        thin: a transform that flattens space leaves a thickness of FLAT_SIZE. Raises NoArea for a
+        transform that leaves a line or a point.
         """
         child = self.named.get(name)
         matrix = self.matrix(name)
@@ -365,9 +367,9 @@ class Properties:
         return matrix
 
     def finish(self) -> None:
-        """Raise UnusedParameterError or SceneError for what nothing has read.
+        """Raise UnusedParameterError or SceneError for parameters and objects that were not read.
 
-        Parameters of old files are told instead.
+        In old files unread parameters give a warning.
         """
         label = f"{self.element.tag} {self.element.type!r}".replace(" ''", "")
         for name, child in self.named.items():
@@ -391,7 +393,7 @@ class NoArea(Exception):
 
 
 def unknown(element: Element, known: Iterable[str]) -> SceneError:
-    """Return the error for a plugin that is none of the `known` ones."""
+    """Return the error for a plugin that is not `known`."""
     if element.type in UNSUPPORTED:
         return element.error("is a plugin of Mitsuba that is not supported")
     return UnknownKindError(element.tag, element.type, known, **element.location())
@@ -419,7 +421,7 @@ def numbers(child: Element, attribute: str, count: int = 0) -> list[float]:
 
 
 def triple(child: Element, attribute: str, default: float) -> np.ndarray:
-    """Return (3,) from one attribute, or from x, y and z that fall back on `default`."""
+    """Return (3,) from a single attribute, or from x, y and z with `default` for missing axes."""
     if attribute in child.attributes:
         values = numbers(child, attribute)
         if len(values) == 1:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +12,7 @@ from clpt import lenses
 from clpt.choices import AUTO
 from clpt.errors import UnknownKindError
 from clpt.formats.mitsuba.media import around
-from clpt.formats.mitsuba.properties import Context, Properties, unknown
+from clpt.formats.mitsuba.properties import Context, PluginReader, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.scene import cameras, integrators
 from clpt.scene.integrators import Film, Filter, Integrator
@@ -34,7 +33,7 @@ FILTERS = ("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos")
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
 HOLDERS = ("adaptive", "irrcache", "multichannel")  # integrators of Mitsuba 0.6 around another
 NO_LIGHT = ("ao", "field", "motion")  # integrators of Mitsuba 0.6 whose values are no light
-REPLAYED_DEPTH = 6  # default of what differentiates
+REPLAYED_DEPTH = 6  # default of integrators that differentiate
 DEFAULT_SAMPLER = "independent"
 LAYERS = {  # of the values that the integrator aov names
     "depth": "depth",
@@ -168,7 +167,7 @@ def _orthographic(props: Properties, _: Film) -> cameras.Camera:
     return cameras.Orthographic(to_world=props.placement(), near=near, far=far)
 
 
-CAMERAS: dict[str, Callable[[Properties, Film], cameras.Camera]] = {
+CAMERAS = {
     "perspective": _perspective,
     "thinlens": _thin_lens,
     "lens": _lens,
@@ -275,26 +274,29 @@ def _own_film(props: Properties) -> dict[str, Any]:
 
 def _filter(element: Element, context: Context) -> Filter:
     props = Properties(element, context)
-    makers: dict[str, Callable[[], Filter]] = {
-        "box": lambda: integrators.Box(),
-        "tent": lambda: integrators.Tent(radius=props.number("radius", 1.0)),
-        "gaussian": lambda: integrators.Gaussian(stddev=props.number("stddev", 0.5)),
-        "mitchell": lambda: integrators.Mitchell(
-            b=props.number("b", 1 / 3), c=props.number("c", 1 / 3)
-        ),
-        "catmullrom": lambda: integrators.Mitchell(b=0.0, c=0.5),
-        "lanczos": lambda: _lanczos(float(props.integer("lobes", 3, 1))),
-    }
-    if element.type not in makers:
-        raise unknown(element, makers)
+    if element.type not in RECONSTRUCTION:
+        raise unknown(element, RECONSTRUCTION)
     with element.locating():
-        chosen = makers[element.type]()
+        chosen = RECONSTRUCTION[element.type](props)
     props.finish()
     return chosen
 
 
-def _lanczos(lobes: float) -> Filter:
+def _lanczos(props: Properties) -> Filter:
+    lobes = float(props.integer("lobes", 3, 1))
     return integrators.Lanczos(radius=lobes, lobes=lobes)
+
+
+RECONSTRUCTION: dict[str, PluginReader[Filter]] = {
+    "box": lambda _: integrators.Box(),
+    "tent": lambda props: integrators.Tent(radius=props.number("radius", 1.0)),
+    "gaussian": lambda props: integrators.Gaussian(stddev=props.number("stddev", 0.5)),
+    "mitchell": lambda props: integrators.Mitchell(
+        b=props.number("b", 1 / 3), c=props.number("c", 1 / 3)
+    ),
+    "catmullrom": lambda _: integrators.Mitchell(b=0.0, c=0.5),
+    "lanczos": _lanczos,
+}
 
 
 def _crop(props: Properties, width: int, height: int) -> tuple[int, int, int, int] | None:
@@ -344,7 +346,7 @@ def _integrator(element: Element, context: Context) -> Integrator:
 
 
 def _inner(props: Properties) -> Integrator:
-    """Make the integrator that one of Mitsuba 0.6 holds: its picture, faster or in parts."""
+    """Make the integrator inside an integrator of Mitsuba 0.6 that speeds it up or divides it."""
     nested = props.object("integrator")
     if nested is None:
         raise props.element.error("needs a nested <integrator>")
@@ -413,7 +415,7 @@ def _volume_path(props: Properties) -> Integrator:
     return integrators.Path(**_depths(props), light_paths=_light_paths(props), free_panes=True)
 
 
-def _replayed(free_panes: bool) -> Callable[[Properties], Integrator]:
+def _replayed(free_panes: bool) -> PluginReader[Integrator]:
     """Return the reader of an integrator for derivatives, whose picture is that of `path`."""
 
     def read(props: Properties) -> Integrator:
@@ -462,7 +464,7 @@ def _moment(props: Properties) -> Integrator:
     return integrator(nested, props.context)
 
 
-INTEGRATORS: dict[str, Callable[[Properties], Integrator]] = {
+INTEGRATORS: dict[str, PluginReader[Integrator]] = {
     "path": _path,
     "auto": lambda props: integrators.Auto(**_depths(props)),
     "vcm": _vcm,

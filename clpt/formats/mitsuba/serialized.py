@@ -21,11 +21,11 @@ from clpt.scene.shapes import Mesh
 MAGIC = 0x041C
 VERSIONS = (3, 4)
 NORMALS, UVS, COLOURS, FLAT, DOUBLE = 0x0001, 0x0002, 0x0008, 0x0010, 0x2000
-DEFLATE = 1032  # bytes at most that one of deflate stands for
+DEFLATE = 1032  # most bytes that a compressed byte of deflate stands for
 
 
 class _Stream:
-    """The decompressed bytes of one mesh, read in their order."""
+    """The decompressed bytes of a mesh, read in their order."""
 
     def __init__(self, path: Path, packed: bytes):
         self.path, self.packed, self.inflate = path, packed, zlib.decompressobj()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -19,7 +19,7 @@ from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import area
 from clpt.formats.mitsuba.media import body, side
-from clpt.formats.mitsuba.properties import Context, NoArea, Properties, unknown
+from clpt.formats.mitsuba.properties import Context, NoArea, PluginReader, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.formats.reading import attempt
 from clpt.geometry.polygons import smooth_normals
@@ -34,8 +34,8 @@ def creased(mesh: Mesh, angle: float) -> Mesh:
     """Return a mesh without normals whose triangles share a vertex where they lie within an angle.
 
     angle: of the triangles' normals [degrees]. As src/librender/trimesh.cpp (rebuildTopology):
-    around each place the first triangle without a group begins one, which takes all triangles
-    within the angle to it.
+    at each position the first triangle without a group begins a group of all triangles within the
+    angle to it.
     """
     faces = np.asarray(mesh.faces, np.int64)
     corners = faces.reshape(-1)
@@ -103,7 +103,7 @@ def shapes_of(elements: Iterable[Element], context: Context) -> list[Shape]:
 
 
 def _single(element: Element, context: Context) -> list[Shape]:
-    """Make the shape of an element; none of an unknown kind where missing ones are grey."""
+    """Make the shape of an element; None for an unknown kind if missing kinds are grey."""
     if element.type == "instance":
         return [_instance(element, context)]
     if element.type not in PLUGINS:
@@ -171,7 +171,7 @@ def _instance(element: Element, context: Context) -> Shape:
 
 
 def _group(element: Element, context: Context) -> Group:
-    """Return the group that an element describes, one for all its instances."""
+    """Return the group that an element describes, shared by all its instances."""
 
     def make(element: Element) -> Group:
         props = Properties(element, context)
@@ -347,7 +347,7 @@ def _sdf_grid(props: Properties) -> Parameters:
     return {"values": values, "to_world": props.placement(thin=True), "pieces": SDF_PIECES}
 
 
-PLUGINS: dict[str, tuple[type[Shape], Callable[[Properties], Parameters]]] = {
+PLUGINS: dict[str, tuple[type[Shape], PluginReader[Parameters]]] = {
     "obj": (shapes.Mesh, _obj),
     "ply": (shapes.Mesh, _ply),
     "serialized": (shapes.Mesh, _serialized),

@@ -6,7 +6,6 @@ Mitsuba's bitmaps have v = 0 in their top row, ours in the bottom row; `to_uv` f
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,8 +13,10 @@ import numpy as np
 
 from clpt import images, spectra
 from clpt.errors import UnknownKindError
+from clpt.formats.colours import GREY, colour
 from clpt.formats.mitsuba.properties import (
     Context,
+    PluginReader,
     Properties,
     number,
     numbers,
@@ -24,7 +25,7 @@ from clpt.formats.mitsuba.properties import (
 )
 from clpt.formats.mitsuba.spectrum_plugins import PLAIN
 from clpt.formats.mitsuba.xml import Element
-from clpt.formats.reading import GREY, attempt, colour
+from clpt.formats.reading import attempt
 from clpt.scene.roles import COEFFICIENT, EMISSION, FACTOR, INDEX, REFLECTANCE, Spectral
 from clpt.scene.textures import (
     ATTRIBUTES,
@@ -216,7 +217,7 @@ def _spectrum(child: Element, role: Spectral, props: Properties, name: str) -> A
 def _old_numbers(child: Element, role: Spectral) -> Any:
     """Read a <spectrum> of Mitsuba 0.x without wavelengths: src/librender/scenehandler.cpp.
 
-    One number is a multiple of D65 in a light. Three are linear RGB, as the public builds have
+    A single number is a multiple of D65 in a light. Three are linear RGB, as the public builds have
     three samples of a spectrum.
     """
     values = numbers(child, "value")
@@ -295,7 +296,7 @@ def _needed_colour(props: Properties) -> list[float]:
 
 
 def _raw_constant(props: Properties) -> Any:
-    """A number or three, by a <vector>; of three a colour is made as of <rgb>, where one is asked.
+    """Read a <vector>: a number, or three that become a colour like <rgb> if a colour is needed.
 
     Mitsuba refuses three in spectral mode.
     """
@@ -309,7 +310,7 @@ def _raw_constant(props: Properties) -> Any:
     return RGBUnbounded(*triple(child, "value", 0.0).tolist())
 
 
-PLUGINS: dict[str, Callable[[Properties], Any]] = {
+PLUGINS: dict[str, PluginReader[Any]] = {
     **PLAIN,
     "d65": _d65,
     "srgb": _srgb,
@@ -410,7 +411,7 @@ def _to_uv(props: Properties) -> np.ndarray:
     if "to_uv" in props.named:
         matrix = props.matrix("to_uv")
         return matrix[np.ix_([0, 1, 3], [0, 1, 3])]
-    # Mitsuba 0.6's, in the order in which Mitsuba 3 reads these.
+    # Mitsuba 0.6's lists, in the order of Mitsuba 3's.
     offsets = [props.number(name, 0.0) for name in ("uoffset", "voffset")]
     both = props.number("uvscale", 1.0)
     scales = [props.number(name, both) for name in ("uscale", "vscale")]
@@ -444,7 +445,7 @@ def _grid(props: Properties) -> Mix:
     )
 
 
-TEXTURES: dict[str, Callable[[Properties], Any]] = {
+TEXTURES: dict[str, PluginReader[Any]] = {
     "scale": _scale,
     "gridtexture": _grid,
     "bitmap": _bitmap,

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from clpt import spectra
-from clpt.formats.mitsuba.properties import Properties, numbers
+from clpt.formats.mitsuba.properties import PluginReader, Properties, numbers
 from clpt.spectra import LED, Blackbody, Cauchy, Constant, Lines, Sellmeier, Spectrum, Tabulated
 
 
@@ -70,7 +69,7 @@ def _list(props: Properties, name: str) -> list[float]:
     return numbers(child, "value")
 
 
-PLAIN: dict[str, Callable[[Properties], Any]] = {
+PLAIN: dict[str, PluginReader[Any]] = {
     "uniform": _uniform,
     "blackbody": _blackbody,
     "irregular": _irregular,

@@ -7,7 +7,7 @@ the loader sees objects and values only. Document types are refused, and with th
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ OLD_VERSION = re.compile(r"\s*[01]\.\d")
 
 @dataclass(eq=False)
 class Element(Located):
-    """One XML element: tag, attributes, children, and its location; of a dictionary an array."""
+    """An XML element: tag, attributes, children, and its location; of a dictionary an array."""
 
     tag: str
     attributes: dict[str, str]
@@ -76,7 +76,7 @@ class Element(Located):
 class Document:
     """An expanded scene file: its root, and the folders of file names: the scene's, its <path>s.
 
-    camera: a number or id by which one of several sensors is chosen; variables: values by name;
+    camera: number or id of the chosen sensor; variables: values by name;
     renamed: plugins of old files, each with its old and its new name.
     """
 
@@ -92,9 +92,9 @@ class Document:
         return OLD_VERSION.match(self.root.attributes.get("version", "")) is not None
 
     def find_file(self, element: Element, name: str) -> Path:
-        """Resolve a file name that `element` gives: <path>s come first, the last one before all.
+        """Resolve a file name that `element` gives: <path>s come first, the last <path> before all.
 
-        Raises SceneError where there is no such file.
+        Raises SceneError if there is no such file.
         """
         return _find(element, name, self.folders)
 
@@ -122,17 +122,15 @@ def parse(path: Path, variables: Mapping[str, object]) -> Document:
 
 def _find(element: Element, name: str, folders: list[Path]) -> Path:
     places = [*folders[:0:-1], element.file.parent, folders[0]]
-    return _first(element, name, places, "file", Path.is_file)
+    return _first(element, name, places, "file")
 
 
-def _first(
-    element: Element, name: str, places: list[Path], label: str, is_one: Callable[[Path], bool]
-) -> Path:
+def _first(element: Element, name: str, places: list[Path], label: str) -> Path:
     """Return the first of the places joined with a name that is a file, or a folder."""
     for place in places:
         candidate = place / name
         try:
-            matches = is_one(candidate)
+            matches = candidate.is_file() if label == "file" else candidate.is_dir()
         except (OSError, ValueError):
             break
         if matches and label == "file":
@@ -144,7 +142,7 @@ def _first(
 
 
 def _read(path: Path) -> Element:
-    """Parse one file into raw elements."""
+    """Parse a file into raw elements."""
     top = Element("", {}, path, 0)
     stack = [top]
     parser = expat.ParserCreate()
@@ -230,10 +228,10 @@ class _Expander:
         self.longest = max(self.longest, len(name))
 
     def add_folder(self, element: Element) -> None:
-        """Add a folder that lies beside the file, or else in one of the folders so far."""
+        """Add a folder that lies beside the file, or else in an earlier folder."""
         places = [element.file.parent, *self.folders[::-1]]
         name = element.attribute("value")
-        self.folders.append(_first(element, name, places, "folder", Path.is_dir))
+        self.folders.append(_first(element, name, places, "folder"))
 
     def include(self, element: Element, depth: int) -> list[Element]:
         if depth > MAX_INCLUDES:

@@ -112,16 +112,16 @@ def _surface(cursor: Cursor) -> Surface:
     cursor.check_keys(
         "surface", (*LENGTHS, "glass", "aspheric", "coating", "stop"), ("semi_diameter",)
     )
-    given: dict[str, Any] = {k: cursor.at(k).number() for k in LENGTHS if k in cursor.value}
+    fields: dict[str, Any] = {k: cursor.at(k).number() for k in LENGTHS if k in cursor.value}
     if "glass" in cursor.value:
-        given["glass"] = _glass(cursor.at("glass"))
+        fields["glass"] = _glass(cursor.at("glass"))
     if "aspheric" in cursor.value:
-        given["aspheric"] = tuple(cursor.at("aspheric").numbers())
+        fields["aspheric"] = tuple(cursor.at("aspheric").numbers())
     if "coating" in cursor.value:
-        given["coating"] = tuple(_coat(each) for each in cursor.at("coating").entries())
+        fields["coating"] = tuple(_coat(each) for each in cursor.at("coating").entries())
     if "stop" in cursor.value:
-        given["stop"] = cursor.at("stop").expect(bool)
-    surface = Surface(**{"radius": 0.0, "thickness": 0.0, **given})
+        fields["stop"] = cursor.at("stop").expect(bool)
+    surface = Surface(**{"radius": 0.0, "thickness": 0.0, **fields})
     with cursor.locating():
         surface.check()
     return surface
@@ -132,14 +132,14 @@ def _glass(cursor: Cursor) -> Spectrum:
     if isinstance(cursor.value, list) and len(cursor.value) == 2:
         with cursor.locating():
             return by_number(*cursor.numbers(2))
-    found = json_spectra.read(cursor, INDEX)
-    return Constant(found) if isinstance(found, (int, float)) else spectra.index(found)
+    index = json_spectra.read(cursor, INDEX)
+    return Constant(index) if isinstance(index, (int, float)) else spectra.index(index)
 
 
 def _coat(cursor: Cursor) -> Coat:
     cursor.check_keys("film", ("index", "thickness"), ("index", "thickness"))
-    found = json_spectra.read(cursor.at("index"), INDEX)
-    index = Constant(found) if isinstance(found, (int, float)) else spectra.index(found)
+    read = json_spectra.read(cursor.at("index"), INDEX)
+    index = Constant(read) if isinstance(read, (int, float)) else spectra.index(read)
     return Coat(index, cursor.at("thickness").number())
 
 
@@ -148,23 +148,23 @@ def write_lens(lens: Prescription | str) -> Any:
     if isinstance(lens, str):
         return lens
     texts = {"name": lens.name, "source": lens.source}
-    told = {key: text for key, text in texts.items() if text}
-    return {**told, "surfaces": [_written(surface) for surface in lens.surfaces]}
+    labels = {key: text for key, text in texts.items() if text}
+    return {**labels, "surfaces": [_written(surface) for surface in lens.surfaces]}
 
 
 def _written(surface: Surface) -> dict[str, Any]:
-    made: dict[str, Any] = {k: getattr(surface, k) for k in LENGTHS}
-    made["glass"] = json_spectra.write(surface.glass, INDEX)
+    fields: dict[str, Any] = {k: getattr(surface, k) for k in LENGTHS}
+    fields["glass"] = json_spectra.write(surface.glass, INDEX)
     if surface.aspheric:
-        made["aspheric"] = list(surface.aspheric)
+        fields["aspheric"] = list(surface.aspheric)
     if surface.coating:
-        made["coating"] = [
+        fields["coating"] = [
             {"index": json_spectra.write(film.index, INDEX), "thickness": film.thickness}
             for film in surface.coating
         ]
     if surface.stop:
-        made["stop"] = True
-    return made
+        fields["stop"] = True
+    return fields
 
 
 def _lens_schema() -> Schema:

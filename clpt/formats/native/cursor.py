@@ -32,7 +32,7 @@ NAMES = {
 
 @dataclass(frozen=True)
 class DuplicateKey:
-    """Stands for an object in which a key is given twice."""
+    """Stands for an object with a repeated key."""
 
     key: str
 
@@ -63,7 +63,7 @@ class Cursor(Located):
         return (self.at(key) if named else self).error(error.message)
 
     def check_keys(self, kind: str, known: Collection[str], needed: Collection[str] = ()) -> None:
-        """Raise UnusedParameterError for a key that is not known, SceneError for one missing."""
+        """Raise UnusedParameterError for an unknown key, SceneError for a missing key."""
         for key in self.expect(dict):
             if key not in known:
                 raise UnusedParameterError(kind, key, known, **self.at(key).location())
@@ -71,13 +71,13 @@ class Cursor(Located):
             if key not in self.value:
                 raise self.error(f"needs the parameter {key!r}")
 
-    def expect(self, kind: type, what: str = "") -> Any:
+    def expect(self, kind: type, expected: str = "") -> Any:
         """Return the value, which must be of a type."""
         if isinstance(self.value, DuplicateKey):
             raise self.error(f"the key {self.value.key!r} is given twice")
         if not isinstance(self.value, kind):
-            found = NAMES.get(type(self.value), "something else")
-            raise self.error(f"must be {what or NAMES[kind]}, not {found}")
+            actual = NAMES.get(type(self.value), "something else")
+            raise self.error(f"must be {expected or NAMES[kind]}, not {actual}")
         return self.value
 
     def at(self, key: str | int) -> Cursor:
@@ -124,8 +124,8 @@ class Cursor(Located):
 def parse(path: Path, confined: bool = False) -> Cursor:
     """Read a JSON file whose outermost value is an object.
 
-    confined: whether it can name only files of its own folder. Raises SceneError with the line for
-    what is not JSON.
+    confined: whether it can name only files of its own folder. Raises SceneError with the line that
+    is not JSON.
     """
     text = text_files.read(path)
     try:
@@ -162,7 +162,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any] | DuplicateKey:
 
 
 def _line(text: str, path: tuple[str | int, ...]) -> int:
-    """Return the line on which the value at `path` begins, in a text that is valid JSON."""
+    """Return the line where the value at `path` begins, in a text that is valid JSON."""
     decoder = json.JSONDecoder()
     at = _skip(text, 0)
     for wanted in path:

@@ -13,7 +13,7 @@ TRIPLE: Schema = {**NUMBERS, "minItems": 3, "maxItems": 3}
 
 
 def ref(name: str) -> Schema:
-    """Return a reference to one of the schema's definitions."""
+    """Return a reference to a definition of the schema."""
     return {"$ref": f"#/$defs/{name}"}
 
 

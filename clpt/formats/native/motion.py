@@ -55,16 +55,16 @@ def keys(cursor: Cursor) -> Keys | None:
     """Return the keys of a motion, None for null. Raises SceneError."""
     if cursor.value is None:
         return None
-    times, found = [], []
+    times, matrices = [], []
     for entry in cursor.entries():
         entry.check_keys("key", ("time", "transform"), ("time", "transform"))
         times.append(entry.at("time").number())
-        found.append(matrix(entry.at("transform"), 4))
+        matrices.append(matrix(entry.at("transform"), 4))
         if len(times) > 1 and not times[-1] > times[-2]:
             message = f"must be later than {times[-2]:g} s, the key before"
             raise entry.at("time").error(message)
     with cursor.locating():
-        return Keys(times, np.array(found))
+        return Keys(times, np.array(matrices))
 
 
 def write_keys(value: Keys) -> list[dict[str, Any]]:
@@ -130,14 +130,14 @@ def shutter(cursor: Cursor) -> Shutter | None:
         return None
     cursor.expect(dict)
     cursor.check_keys("shutter", MEMBERS)
-    given: dict[str, Any] = {}
+    fields: dict[str, Any] = {}
     for name, child in cursor.items():
         listed = isinstance(child.value, list)
         shape = child.numbers() if listed else child.expect(str) if name == "shape" else None
-        given[name] = shape if name == "shape" else child.number()
-    given.setdefault("close", given.get("open", 0.0))
+        fields[name] = shape if name == "shape" else child.number()
+    fields.setdefault("close", fields.get("open", 0.0))
     with cursor.locating():
-        return Shutter(**given)
+        return Shutter(**fields)
 
 
 def write_shutter(value: Shutter) -> dict[str, Any]:
@@ -164,7 +164,7 @@ FIELDS: dict[str, dict[str, Any]] = {  # what steps of several values have, with
 
 
 def matrix(cursor: Cursor, size: int) -> transforms.Matrix:
-    """Return a transform, (size, size) float64; one of 3x3 acts on (u, v, 1)."""
+    """Return a transform, (size, size) float64; 3x3 acts on (u, v, 1)."""
     value = cursor.value
     if isinstance(value, list) and all(isinstance(row, list) for row in value):
         rows = np.array([row.numbers(size) for row in cursor.entries(size)])
@@ -183,7 +183,7 @@ def matrix(cursor: Cursor, size: int) -> transforms.Matrix:
 
 
 def _one_step(value: dict[str, Any]) -> str:
-    """Return what to say of a step that does not have one name."""
+    """Return the error message for a step without a single name."""
     names = [name for name in value if name in STEPS]
     inside = [name for name in value if name not in STEPS]
     for name in names:

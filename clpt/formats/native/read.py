@@ -1,4 +1,4 @@
-"""scene.json, one-to-one with the dataclasses of clpt.scene: a kind reads what it declares."""
+"""Reader of scene.json, a mirror of clpt.scene: the parameters that a kind declares are read."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from clpt import measured
 from clpt.choices import Missing
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.files import budget
-from clpt.formats import volumes
+from clpt.formats import materialx, volumes
+from clpt.formats.colours import EVEN, GREY, grey_for
 from clpt.formats.native import forms, shape_files
 from clpt.formats.native.cursor import Cursor, parse
 from clpt.formats.native.spectra import find_file, kind_name
-from clpt.formats.reading import EVEN, GREY, grey_for
 from clpt.scene import Scene, checked_noise, integrators, kinds, lights, materials, media, shapes
 from clpt.scene.params import Kind, params, shorthands
 from clpt.scene.volumes import Volume
@@ -51,8 +51,11 @@ def load(
     return _Reader(parse(path, confined), outside, missing).scene()
 
 
+MATERIALX = "materialx"  # the type of a material that stands in a document
+
+
 class _Reader:
-    """Reads one file; keeps materials and groups by name, so that shapes share them."""
+    """Reads a file; keeps materials and groups by name, so that shapes share them."""
 
     def __init__(self, root: Cursor, outside: Iterable[type[materials.Material]], missing: Missing):
         self.root, self.missing = root, missing
@@ -61,11 +64,12 @@ class _Reader:
             if cls.kind in {**kinds("material"), **self.outside}:
                 raise SceneError(f"there are two kinds of materials {cls.kind!r}; rename yours")
             self.outside[cls.kind] = cls
-        # None while one is being read: it refers to itself then
+        # None while an entry is being read: it then refers to itself
         self.materials: dict[str, materials.Material | None] = {}
         self.media: dict[str, media.Medium | None] = {}
         self.volumes: dict[str, Volume] = {}
         self.measurements: dict[str, Any] = {}
+        self.surfaces: dict[int, Any] = {}  # of MaterialX, by the ids of their materials' parts
         self.groups: dict[str, shapes.Group | None] = {}
         self.version = _version(root)
         self.warnings: list[str] = []
@@ -104,10 +108,12 @@ class _Reader:
             return Scene(**parts, warnings=self.warnings, extra={"format": "native"})
 
     def kind(self, cursor: Cursor, category: str) -> Any:
-        """Read an object of one of a category's kinds."""
+        """Read an object of any kind of a category."""
         table = kinds(category)
         if category == "material":
             table |= self.outside
+            if isinstance(cursor.value, dict) and cursor.value.get("type") == MATERIALX:
+                return self.materialx(cursor)
         return self.object_of(cursor, table[kind_name(cursor, category, table)], ("type",))
 
     def object_of(self, cursor: Cursor, cls: type[Kind], other_keys: tuple[str, ...] = ()) -> Any:
@@ -127,7 +133,7 @@ class _Reader:
             return cls(**values)
 
     def image(self, cursor: Cursor) -> Any:
-        """Return the path of an image; grey where there is none and missing ones are grey."""
+        """Return the path of an image; grey if it is missing and missing images are grey."""
         try:
             return find_file(cursor)
         except SceneError:
@@ -177,15 +183,15 @@ class _Reader:
         cls = kinds("light")[kind_name(cursor, "light", kinds("light"))]
         if cls in shape_files.FILES and "file" in cursor.value:
             shape_files.check_only_in_file(cursor, cls)
-            made, file = self.object_of(cursor, cls, ("type", "file")), cursor.at("file")
+            light, file = self.object_of(cursor, cls, ("type", "file")), cursor.at("file")
             path, known = find_file(file), shape_files.FILES[cls]
             with file.locating():
                 values = known.read(path) if known.read else {}
                 if self.version == 1:
-                    return dataclasses.replace(made, **{**values, "candela": None})
+                    return dataclasses.replace(light, **{**values, "candela": None})
                 if self.version is None and CANDELA not in self.warnings:
                     self.warnings.append(CANDELA)
-                return known.join(made, values)
+                return known.join(light, values)
         return self.kind(cursor, "light")
 
     def area_light(self, cursor: Cursor) -> Any:
@@ -197,7 +203,7 @@ class _Reader:
         return self.kind(cursor, "light")
 
     def material(self, cursor: Cursor) -> Any:
-        """Read a material, or find the one of that name; null is none."""
+        """Read a material, or find it by its name; null is None."""
         if cursor.value is None:
             return None
         if not isinstance(cursor.value, dict):
@@ -206,12 +212,35 @@ class _Reader:
             return self.named_material(str(cursor.path[1]), cursor)
         return self.kind(cursor, "material")
 
+    def materialx(self, cursor: Cursor) -> Any:
+        """Read a material of a document of MaterialX; null chooses the only one."""
+        cursor.check_keys(MATERIALX, ("type", "file", "material"))
+        if "file" not in cursor.value:
+            raise cursor.error("needs a 'file'")
+        path = find_file(cursor.at("file"))
+        name = cursor.at("material").expect(str) if "material" in cursor.value else None
+        with cursor.locating():
+            surface, warnings = materialx.load_material(path, name)
+        self.warnings += [text for text in warnings if text not in self.warnings]
+        self.surfaces |= {id(part): surface for part in materials.parts(surface.material)}
+        return surface.material
+
+    def _with_surface(self, shape: shapes.Shape) -> Any:
+        """Return a shape with the light and the inside that a material of MaterialX has."""
+        parts = materials.parts(shape.material)
+        surface = next((self.surfaces[id(p)] for p in parts if id(p) in self.surfaces), None)
+        if surface is None:
+            return shape
+        emission = shape.emission or surface.emission
+        interior = surface.interior if shape.interior is None else shape.interior
+        return dataclasses.replace(shape, emission=emission, interior=interior)
+
     def named_material(self, name: str, referrer: Cursor) -> Any:
         """Read the material of that name, once."""
         return self._named(self.materials, "materials", "material", name, referrer)
 
     def medium(self, cursor: Cursor) -> Any:
-        """Read a medium, or find the one of that name; null is none."""
+        """Read a medium, or find it by its name; null is None."""
         if cursor.value is None:
             return None
         if isinstance(cursor.value, dict):
@@ -229,8 +258,10 @@ class _Reader:
         if name not in known:
             cursor = self._entry(table, f"{family} name", name, referrer)
             known[name] = None
-            made = self.kind(cursor, family)
-            known[name] = made if "name" in cursor.value else dataclasses.replace(made, name=name)
+            kind = self.kind(cursor, family)
+            known[name] = kind if "name" in cursor.value else dataclasses.replace(kind, name=name)
+            if id(kind) in self.surfaces:
+                self.surfaces[id(known[name])] = self.surfaces[id(kind)]
         if known[name] is None:
             raise referrer.error(f"the {family} {name!r} refers to itself")
         return known[name]
@@ -254,12 +285,12 @@ class _Reader:
             raise referrer.error(f"the group {name!r} contains itself")
         return group
 
-    def _entry(self, table: str, what: str, name: str, referrer: Cursor) -> Cursor:
+    def _entry(self, table: str, noun: str, name: str, referrer: Cursor) -> Cursor:
         """Return the entry of a table of the scene. Raises UnknownKindError."""
         entries = self.root.value.get(table, {})
         known = entries if isinstance(entries, dict) else ()
         if name not in known:
-            raise UnknownKindError(what, name, known, **referrer.location())
+            raise UnknownKindError(noun, name, known, **referrer.location())
         return self.root.at(table).at(name)
 
     def shape(self, cursor: Cursor) -> list[shapes.Shape]:
@@ -272,12 +303,13 @@ class _Reader:
         shape = self.object_of(cursor, cls, ("type",))
         if cls is shapes.Mesh:
             shape = shape_files.checked_arrays(cursor, shape, self.warnings)
-        return [shape]
+        return [self._with_surface(shape) if self.surfaces else shape]
 
     def _from_file(self, cursor: Cursor, cls: type[Kind]) -> list[shapes.Shape]:
         """Read a shape whose file holds its arrays, several meshes, or transforms of instances."""
         shape_files.check_only_in_file(cursor, cls)
         shape = self.object_of(cursor, cls, ("type", "file"))
+        shape = self._with_surface(shape) if self.surfaces else shape
         file = cursor.at("file")
         if cls is shapes.Instance:
             return [

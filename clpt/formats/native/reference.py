@@ -166,7 +166,7 @@ def _spectra() -> list[str]:
         'Metals (`"metal": name` or `{"file": name}`)': spectra.metals(),
     }
     lists = [
-        f"{what}: {', '.join(f'`{name}`' for name in known)}." for what, known in names.items()
+        f"{role}: {', '.join(f'`{name}`' for name in known)}." for role, known in names.items()
     ]
     return ["\n".join(rows) + "\n", "\n\n".join(lists) + "\n", *_reradiations()]
 
@@ -200,8 +200,8 @@ def example(cls: type[Kind]) -> list[tuple[str, str]]:
     if cls in FILES or cls is shapes.Instance:
         return []
     chosen = _chosen(cls)
-    given = ", ".join(f"{name}={value!r}" for name, value in chosen.items())
-    code = f"{cls.__module__.rpartition('.')[2]}.{cls.__name__}({given})"
+    arguments = ", ".join(f"{name}={value!r}" for name, value in chosen.items())
+    code = f"{cls.__module__.rpartition('.')[2]}.{cls.__name__}({arguments})"
     return [(json.dumps({"type": cls.kind, **chosen}), code)]
 
 
@@ -210,7 +210,7 @@ def xml(cls: type[Kind]) -> str:
     if cls not in MITSUBA:
         return ""
     lines = [f'<{MITSUBA[cls]} type="{cls.kind.replace("_", "")}">']
-    if "distribution" in params(cls):  # Mitsuba's default is another one
+    if "distribution" in params(cls):  # Mitsuba has another default
         lines.append(f'    <string name="distribution" value="{defaults(cls)["distribution"]}"/>')
     for name, value in _chosen(cls).items():
         number = params(cls)[name].role.name == "real" or name.endswith("_ior")
@@ -221,15 +221,15 @@ def xml(cls: type[Kind]) -> str:
 
 def _chosen(cls: type[Kind]) -> dict[str, Any]:
     """Return the parameters that an example shows, with their defaults."""
-    default, own = defaults(cls), vars(cls).get("__annotations__", {})
-    plain = {n: default[n] for n in params(cls) if n in own and _is_plain(default[n])}
+    default, annotated = defaults(cls), vars(cls).get("__annotations__", {})
+    plain = {n: default[n] for n in params(cls) if n in annotated and _is_plain(default[n])}
     return dict(list(plain.items())[:EXAMPLE])
 
 
 def _is_plain(value: object) -> bool:
     """Return whether a value is numbers, which files and Python write alike."""
     each = value if isinstance(value, tuple) else (value,)
-    return bool(each) and all(type(one) in (int, float) for one in each)
+    return bool(each) and all(type(number) in (int, float) for number in each)
 
 
 def _blocks(text: str, code: str, element: str) -> str:
@@ -239,7 +239,7 @@ def _blocks(text: str, code: str, element: str) -> str:
 
 
 def _picture(category: str, cls: type[Kind]) -> str:
-    """Return the kind's picture and its caption, where `docs.pictures` has one."""
+    """Return the kind's picture and its caption, if `docs.pictures` has a picture."""
     caption = _captions().get(f"{category}/{cls.kind}")
     if caption is None:
         return ""
@@ -290,7 +290,7 @@ def _shown(value: object) -> str:
     if isinstance(value, Kind):
         return f"`{value.kind}`"
     if isinstance(value, tuple) and value and isinstance(value[0], Kind):
-        return ", ".join(_shown(one) for one in value)
+        return ", ".join(_shown(entry) for entry in value)
     if isinstance(value, tuple) and value and isinstance(value[0], str):
         return "all"
     if isinstance(value, float):

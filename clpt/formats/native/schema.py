@@ -60,6 +60,20 @@ def schema() -> Schema:
     }
 
 
+MATERIALX: Schema = {
+    "title": "materialx",
+    "description": "A material of a document of MaterialX, with its light and its inside.",
+    "type": "object",
+    "additionalProperties": False,
+    "required": ["type", "file"],
+    "properties": {
+        "type": {"const": "materialx"},
+        "file": {**STRING, "description": "a .mtlx"},
+        "material": {**STRING, "description": "its name, if there are several"},
+    },
+}
+
+
 def _properties() -> Schema:
     """The entries of a scene."""
     return {
@@ -95,11 +109,12 @@ def _properties() -> Schema:
 
 
 def _category(category: str) -> Schema:
-    return {"oneOf": [_kind(cls) for cls in KINDS[category]]}
+    others = [MATERIALX] if category == "material" else []
+    return {"oneOf": [*(_kind(cls) for cls in KINDS[category]), *others]}
 
 
 def _kind(cls: type[Kind]) -> Schema:
-    """An object of one kind."""
+    """Return the schema of an object of a kind."""
     default = defaults(cls)
     properties: Schema = {"type": {"const": cls.kind}}
     for name, param in params(cls).items():
@@ -116,10 +131,10 @@ def _kind(cls: type[Kind]) -> Schema:
 
 
 def _untyped(cls: type[Kind]) -> Schema:
-    """An object that is always of one kind."""
-    made = _kind(cls)
-    del made["properties"]["type"], made["required"]
-    return made
+    """Return the schema of an object whose kind is implied, so that it has no `type`."""
+    typed = _kind(cls)
+    del typed["properties"]["type"], typed["required"]
+    return typed
 
 
 def _parameter(param: Param, default: object) -> Schema:
@@ -200,7 +215,7 @@ def _step() -> Schema:
     look_at = object_of(dict.fromkeys(points, TRIPLE), list(points))
     turn = object_of({"axis": TRIPLE, "angle": NUMBER}, ["axis", "angle"])
     steps = {"translate": TRIPLE, "scale": ANY_OF_SCALE, "rotate": turn, "look_at": look_at}
-    return {"oneOf": [object_of({name: made}, [name]) for name, made in steps.items()]}
+    return {"oneOf": [object_of({name: form}, [name]) for name, form in steps.items()]}
 
 
 def _transform() -> Schema:

@@ -30,8 +30,8 @@ class ShapeFile:
     """A kind of file that a shape may name by its key `file`.
 
     accepts, meaning: for the schema and the reference; replaces: the parameters that the file
-    holds; read: returns these, None where one file makes several shapes; join: returns the kind
-    with what `read` has returned.
+    holds; read: returns these, None if a file makes several shapes; join: returns the kind with
+    the parameters that `read` has returned.
     """
 
     accepts: str
@@ -115,17 +115,17 @@ def read_transforms(cursor: Cursor) -> np.ndarray:
 
 
 def _with_tangents(shape: shapes.Mesh) -> dict[str, Any]:
-    """A mesh's attributes, with the tangents as one of them: what is per vertex stays together."""
-    own = dict(shape.attributes)
-    return own if shape.tangents is None else {**own, TANGENTS: shape.tangents}
+    """Return a mesh's attributes and its tangents, as both are arrays per vertex."""
+    attributes = dict(shape.attributes)
+    return attributes if shape.tangents is None else {**attributes, TANGENTS: shape.tangents}
 
 
 def checked_arrays(cursor: Cursor, shape: shapes.Mesh, warnings: list[str]) -> shapes.Mesh:
     """Check the arrays of a mesh that is given in the JSON itself."""
     if shape.vertices is None or shape.faces is None:
         raise cursor.error("a mesh needs a 'file', or 'vertices' and 'faces'")
-    given = {"normals": shape.normals, "uvs": shape.uvs, "tangents": shape.tangents}
-    for name, values in given.items():
+    per_vertex = {"normals": shape.normals, "uvs": shape.uvs, "tangents": shape.tangents}
+    for name, values in per_vertex.items():
         is_array = values is not None and not isinstance(values, str)
         if is_array and len(values) != len(shape.vertices):
             raise cursor.at(name).error(f"must be one for each of {len(shape.vertices)} vertices")
@@ -134,14 +134,14 @@ def checked_arrays(cursor: Cursor, shape: shapes.Mesh, warnings: list[str]) -> s
         if len(values) != count:
             raise cursor.at("attributes").at(name).error(f"must be {count} rows")
     with cursor.locating():
-        made = mesh.Arrays(
+        read = mesh.Arrays(
             shape.vertices,
             shape.faces.astype(np.int64),
             None if isinstance(shape.normals, str) else shape.normals,
             shape.uvs,
             _with_tangents(shape),
         )
-        arrays = mesh.checked(None, "", made, warnings)
+        arrays = mesh.checked(None, "", read, warnings)
         if shape.tangents is not None:
             arrays["tangents"] = arrays["attributes"].pop(TANGENTS)
     if isinstance(shape.normals, str):

@@ -1,6 +1,6 @@
 """Spectra in scene.json, read and written.
 
-A number is constant; [r, g, b] is a colour, linear, and "#rrggbb" is one in sRGB; as emission each
+A number is constant; [r, g, b] is a linear colour, "#rrggbb" a colour in sRGB; as emission each
 means that multiple of D65. A name is a glass as an index, and an illuminant as emission; an object
 has a `type` from SPECTRA and its fields, or `values` [[nm, value], ...], or a `file`.
 """
@@ -14,8 +14,8 @@ from typing import Any
 from clpt import spectra
 from clpt.errors import UnknownKindError
 from clpt.files import input_files
+from clpt.formats.colours import colour
 from clpt.formats.native.cursor import Cursor
-from clpt.formats.reading import colour
 from clpt.images.transfer import from_hex
 from clpt.scalars import is_number
 from clpt.scene.integrators import NO_AOV

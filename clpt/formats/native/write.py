@@ -66,7 +66,7 @@ def write_medium(medium: Medium, digits: int) -> str:
 
 
 class _Writer:
-    """Writes one scene; materials, groups and arrays that several shapes share are written once."""
+    """Writes a scene; materials, groups and arrays that several shapes share are written once."""
 
     def __init__(self, path: Path, copies: bool = False):
         self.path, self.copies = path, copies
@@ -82,7 +82,7 @@ class _Writer:
         self.shared: set[int] = set()  # those of them that have no name
         self.groups: dict[str, Any] = {}
         self.group_names: dict[int, str] = {}
-        self.files: dict[Any, str] = {}  # names by what they hold
+        self.files: dict[Any, str] = {}  # names by their contents
 
     def scene(self, scene: Scene) -> dict[str, Any]:
         """Write the whole file."""
@@ -120,10 +120,10 @@ class _Writer:
         return written
 
     def instances(self, run: Sequence[Any]) -> dict[str, Any]:
-        """Write instances of one group, their matrices as .npy."""
+        """Write instances of a group, their matrices as .npy."""
         group = self.group(run[0].group)
         name = self.file_name(group, "npy")
-        matrices = np.stack([np.asarray(one.to_world, np.float64)[:3] for one in run])
+        matrices = np.stack([np.asarray(instance.to_world, np.float64)[:3] for instance in run])
         images.write_npy(self.path.parent / name, matrices)
         self.files[name] = name
         return {"type": "instance", "group": group, "file": name}
@@ -136,30 +136,30 @@ class _Writer:
             self.groups[key] = [self.kind(shape) for shape in group.shapes]
         return self.group_names[id(group)]
 
-    def kind(self, thing: Kind) -> dict[str, Any]:
-        """Return the object that stands for a thing; parameters with their defaults are left out.
+    def kind(self, kind: Kind) -> dict[str, Any]:
+        """Return the JSON object of a kind; parameters with their defaults are left out.
 
-        The material of a shape is always written: without one a mesh has that of its file.
+        The material of a shape is always written: a mesh without a material has its file's.
         """
-        cls, thing = type(thing), _on_host(thing)
+        cls, kind = type(kind), _on_host(kind)
         if self.copies and issubclass(cls, materials.Material) and not _is_known(cls):
             raise SceneError(f"the material {cls.kind!r} is not clpt's own: it stays here")
-        written: dict[str, Any] = {"type": thing.kind}
+        written: dict[str, Any] = {"type": kind.kind}
         if cls in self.array_files:
-            written["file"] = self.array_files[cls](thing)
-        default, values = defaults(cls), fields_of(thing)
+            written["file"] = self.array_files[cls](kind)
+        default, values = defaults(cls), fields_of(kind)
         for name, param in params(cls).items():
-            given = values[name]
-            if "file" in written and in_file(cls, name, given):
+            parameter = values[name]
+            if "file" in written and in_file(cls, name, parameter):
                 continue
-            value = forms.write(given, param, self)
+            value = forms.write(parameter, param, self)
             if name == "material" or value != forms.write(default[name], param, self):
                 written[name] = value
         return written
 
-    def untyped(self, thing: Kind) -> dict[str, Any]:
-        """Return the object that stands for a thing where only one kind can stand."""
-        written = self.kind(thing)
+    def untyped(self, kind: Kind) -> dict[str, Any]:
+        """Return the JSON object of a kind that is implied, without its `type`."""
+        written = self.kind(kind)
         del written["type"]
         return written
 
@@ -168,25 +168,25 @@ class _Writer:
         return self.untyped(layer)
 
     def material(self, material: materials.Material) -> Any:
-        """Return a material, or its name in the table of named ones."""
+        """Return a material, or its name in the table of named materials."""
         return self._named(material, self.materials)
 
     def medium(self, medium: object) -> Any:
-        """Return a medium, or its name in the table of named ones."""
+        """Return a medium, or its name in the table of named media."""
         return self._named(medium, self.media)
 
-    def _named(self, thing: Any, table: dict[str, Any]) -> Any:
+    def _named(self, kind: Any, table: dict[str, Any]) -> Any:
         """Return a thing, or its name in the table where it is written once."""
-        if not thing.name and id(thing) not in self.shared:
-            return self.kind(thing)
-        if id(thing) not in self.names:
-            key = unused_name(thing.name or thing.kind, table)
-            self.names[id(thing)] = key
+        if not kind.name and id(kind) not in self.shared:
+            return self.kind(kind)
+        if id(kind) not in self.names:
+            key = unused_name(kind.name or kind.kind, table)
+            self.names[id(kind)] = key
             table[key] = None
-            table[key] = {**self.kind(thing), "name": thing.name}
-            if key == thing.name:
+            table[key] = {**self.kind(kind), "name": kind.name}
+            if key == kind.name:
                 del table[key]["name"]
-        return self.names[id(thing)]
+        return self.names[id(kind)]
 
     def file_name(self, label: str, suffix: str) -> str:
         """Return the name of a new file beside the scene's."""
@@ -194,7 +194,7 @@ class _Writer:
         return f"{self.path.stem}.{label}{len(self.files)}.{suffix}"
 
     def image(self, image: Any) -> str:
-        """Return the name of an image's file; an array is written to one."""
+        """Return the name of an image's file; an array is written to a file."""
         spectral = isinstance(image, spectral_exr.SpectralImage)
         if not spectral and not isinstance(image, np.ndarray):
             return (
@@ -289,30 +289,30 @@ class _Writer:
 
 
 def _shared(scene: Scene) -> set[int]:
-    """Return the ids of nameless materials and media that stand at several places.
+    """Return the ids of nameless materials and media that are used several times.
 
-    It matters that they are one: a medium may have several shapes around it.
+    Their identity matters: a medium may have several shapes around it.
     """
     counts: Counter[int] = Counter()
     waiting: list[Any] = [scene.camera, *scene.shapes]
     while waiting:
-        thing = waiting.pop()
-        if isinstance(thing, (tuple, list)) and thing and isinstance(thing[0], Kind):
-            waiting += thing
-        if isinstance(thing, shapes.Instance):
-            thing = thing.group
-        if isinstance(thing, (materials.Material, Medium, shapes.Group)):
-            counts[id(thing)] += 1
-            if counts[id(thing)] > 1:
+        entry = waiting.pop()
+        if isinstance(entry, (tuple, list)) and entry and isinstance(entry[0], Kind):
+            waiting += entry
+        if isinstance(entry, shapes.Instance):
+            entry = entry.group
+        if isinstance(entry, (materials.Material, Medium, shapes.Group)):
+            counts[id(entry)] += 1
+            if counts[id(entry)] > 1:
                 continue
-        if isinstance(thing, shapes.Group):
-            waiting += thing.shapes
-        if isinstance(thing, Kind):
-            usual = defaults(type(thing))
-            given = fields_of(thing)
-            names = params(type(thing))
-            waiting += [given[name] for name in names if given[name] is not usual[name]]
-    return {one for one, count in counts.items() if count > 1}
+        if isinstance(entry, shapes.Group):
+            waiting += entry.shapes
+        if isinstance(entry, Kind):
+            usual = defaults(type(entry))
+            fields = fields_of(entry)
+            names = params(type(entry))
+            waiting += [fields[name] for name in names if fields[name] is not usual[name]]
+    return {key for key, count in counts.items() if count > 1}
 
 
 def unused_name(name: str, used: Container[str]) -> str:
@@ -324,16 +324,16 @@ def unused_name(name: str, used: Container[str]) -> str:
     return free
 
 
-def _on_host(thing: Kind) -> Kind:
+def _on_host(kind: Kind) -> Kind:
     """Return a thing whose arrays on a device are copied to the host. Raises SceneError."""
-    named = fields_of(thing)
+    named = fields_of(kind)
     on_device = {name: value for name, value in named.items() if hasattr(value, "context")}
     for name, value in on_device.items():
         if not hasattr(value, "get"):
             message = "a buffer has no shape: give a pyopencl.array.Array"
-            raise SceneError(message, where=f"{thing.kind}.{name}")
+            raise SceneError(message, where=f"{kind.kind}.{name}")
         on_device[name] = on_host(value)
-    return dataclasses.replace(thing, **on_device) if on_device else thing
+    return dataclasses.replace(kind, **on_device) if on_device else kind
 
 
 def _is_known(cls: type[materials.Material]) -> bool:
@@ -362,10 +362,10 @@ def _ply(mesh: shapes.Mesh) -> bytes:
         vertex.append((*TANGENT_COLUMNS, mesh.tangents))
     face: list[Any] = []
     for name, values in mesh.attributes.items():
-        element, _, rest = name.partition("_")
+        element, _, suffix = name.partition("_")
         values = np.asarray(values).reshape(len(values), -1)
-        names = [f"{rest}_{i}" for i in range(values.shape[1])]
-        names = list("rgb") if rest == "color" and len(names) == 3 else names
+        names = [f"{suffix}_{i}" for i in range(values.shape[1])]
+        names = list("rgb") if suffix == "color" and len(names) == 3 else names
         (face if element == "face" else vertex).append((*names, values))
     count = np.full((len(mesh.faces), 1), 3, np.uint8)
     corners = np.ascontiguousarray(mesh.faces, "<i4").view(np.uint8).reshape(len(mesh.faces), -1)

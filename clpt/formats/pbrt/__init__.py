@@ -10,9 +10,9 @@ from pathlib import Path
 
 from clpt.choices import Missing
 from clpt.formats.pbrt import build_scene, camera_film, old_materials, reader
-from clpt.formats.pbrt.build_scene import Progress
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Contents, Definition, State
+from clpt.formats.reading import Progress
 from clpt.scene import Scene
 
 __all__ = ["load"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextvars
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -24,7 +24,7 @@ from clpt.formats.pbrt.scattering import body
 from clpt.formats.pbrt.shapes import Geometry, displaced, geometry, with_uvs
 from clpt.formats.pbrt.state import Contents, Definition, State
 from clpt.formats.pbrt.textures import textured
-from clpt.formats.reading import attempt
+from clpt.formats.reading import Progress, attempt
 from clpt.scene.lights import Area, Light
 from clpt.scene.materials import Diffuse, Mask, Material, Null, TwoSided
 from clpt.scene.media import Medium
@@ -33,7 +33,6 @@ from clpt.scene.roles import REAL
 from clpt.scene.shapes import Curves, Group, Instance, Shape
 from clpt.scene.textures import MeshAttribute, Product, Texture
 
-Progress = Callable[[float, str], None]
 SHARES = "face_power"  # the attribute of a mesh whose parts shine unequally
 GREY: Material = TwoSided(front=Diffuse(reflectance=0.5))
 
@@ -62,12 +61,12 @@ def shapes(contents: Contents, progress: Progress | None) -> list[Shape]:
 
 
 def _of(definitions: Sequence[Definition], result: dict[int, Shape | None]) -> Iterator[Shape]:
-    """Yield the shapes of definitions, but for those that are empty."""
+    """Yield the shapes of definitions that are not empty."""
     return (shape for each in definitions if (shape := result[id(each)]) is not None)
 
 
 def _make_all(definitions: list[Definition], progress: Progress | None) -> list[Shape | None]:
-    """Make the shapes of definitions: geometry in threads, materials one after the other."""
+    """Make the shapes of definitions: geometry in threads, materials in order."""
     result: list[Shape | None] = []
     workers = min(8, os.cpu_count() or 1)
     with ThreadPoolExecutor(workers) as pool:
@@ -187,7 +186,7 @@ def make_material(kind: str, params: Parameters, state: State, name: str) -> Mat
 
 
 def _emission(state: State, form: Geometry) -> Light | None:
-    """Return the light of the state: one for all shapes, but one a shape where it has a power."""
+    """Return the light of the state: all shapes share it, unless it has a power."""
     definition = state.area_light
     if definition is None:
         return None
@@ -228,7 +227,7 @@ def lights(contents: Contents) -> list[Light]:
 def check_unused_materials(contents: Contents) -> None:
     """Make the named materials that no shape has, for their errors and warnings."""
     for name, versions in contents.shared.materials.items():
-        for definition in versions:
+        for _, definition in versions:
             definition.state.material_of(name, definition)
 
 
@@ -246,7 +245,7 @@ def _warn_of_unused(params: Parameters, state: State) -> None:
 
 
 def _has_texture(item: object) -> bool:
-    """Whether a material or light, or one inside it, has a texture."""
+    """Return whether a material or light, or a part of it, has a texture."""
     if isinstance(item, Texture):
         return True
     if not isinstance(item, Kind):

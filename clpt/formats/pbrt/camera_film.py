@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +13,7 @@ from clpt.choices import MOST_LIGHT_PATHS
 from clpt.errors import UnknownKindError
 from clpt.formats.pbrt.media import medium
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.state import Definition, State
+from clpt.formats.pbrt.state import Definition, Maker, State
 from clpt.scene import cameras, integrators
 from clpt.scene.integrators import Film, Filter, Integrator, Sampler
 from clpt.scene.motion import Keys, Shutter
@@ -57,7 +56,7 @@ def _moving(camera: cameras.Camera, state: State) -> cameras.Camera:
 
 
 def exposure_time(params: Parameters, old: bool) -> float:
-    """Take the time [s] for which the shutter is open; 1 in old files, which do not count it."""
+    """Take the time [s] of the open shutter; 1 in old files, which ignore it."""
     opens, closes = _shutter(params)
     time = closes - opens
     if old:
@@ -173,7 +172,7 @@ def _realistic(params: Parameters, state: State, film: Film, diagonal: float) ->
     )
 
 
-CAMERAS: dict[str, Callable[[Parameters, State, Film], cameras.Camera]] = {
+CAMERAS = {
     "perspective": _perspective,
     "orthographic": _orthographic,
     "spherical": _spherical,
@@ -289,7 +288,7 @@ def _filter(definition: Definition | None, old: bool) -> Filter:
 
 
 def _radius(params: Parameters, state: State, default: float) -> float:
-    """Take the radii [pixels], which are one here."""
+    """Take the radius [pixels]; clpt has a single radius for both axes."""
     x, y = (params.above_zero(name, default) for name in ("xradius", "yradius"))
     if x != y:
         state.warn(params, f"one radius of {math.sqrt(x * y):.3g} pixels replaces two")
@@ -322,7 +321,7 @@ def _sinc(params: Parameters, state: State) -> Filter:
     return integrators.Lanczos(radius=radius, lobes=params.above_zero("tau", 3.0))
 
 
-FILTERS: dict[str, Callable[[Parameters, State], Filter]] = {
+FILTERS: dict[str, Maker[Filter]] = {
     "box": _box,
     "gaussian": _gaussian,
     "mitchell": _mitchell,
@@ -375,9 +374,9 @@ OLD_OTHERS = ("directsamples", "causticphotons", "indirectphotons", "nused", "fi
 
 
 def integrator(definition: Definition | None, film: Film) -> Integrator:
-    """Make what stands for pbrt's integrator; its depth counts one less.
+    """Make the counterpart of pbrt's integrator; pbrt's depth is 1 less.
 
-    film: whose pixels share pbrt's photons.
+    film: its pixels share pbrt's photons.
     """
     if definition is None:
         return integrators.Path(max_depth=6, free_panes=False)

@@ -1,4 +1,4 @@
-"""Curves of a PBRT scene: round ones as `Curves`, many as one, ribbons as strips of a mesh."""
+"""Curves of a PBRT scene: round curves joined as `Curves`, ribbons as strips of a mesh."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def _unit(v: NDArray[Any]) -> NDArray[Any]:
 
 
 def joined(items: Iterable[Shape]) -> Iterator[Shape]:
-    """The shapes, neighbouring curves that share all but their points as one."""
+    """Return the shapes; neighbouring curves that differ only in their points are joined."""
     for key, run in groupby(items, _shared):
         several = list(run)
         if key is None or len(several) == 1:

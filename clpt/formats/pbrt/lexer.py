@@ -25,7 +25,7 @@ UPGRADE = "PBRT version 3's; convert the file by pbrt-v4's --upgrade"
 
 
 class Lexer:
-    """The words of one file, in order; `line` is that of the word last taken.
+    """The words of a file, in order; `line` is the line of the word last taken.
 
     Raises SceneError with the file and line for an invalid word.
     """
@@ -45,7 +45,7 @@ class Lexer:
 
     @property
     def line(self) -> int:
-        """The line up to which words have been taken."""
+        """The line of the last word taken."""
         self._line += self.data.count(b"\n", self._counted, self.at)
         self._counted = self.at
         return self._line
@@ -124,7 +124,7 @@ class Lexer:
         return values if isinstance(values, np.ndarray) else self._typed(values)
 
     def _bracketed(self) -> NDArray[np.float64] | list[bytes]:
-        """Take what stands in brackets: numbers in one go, anything else as words."""
+        """Take the contents of brackets: numbers at once, anything else as words."""
         start = self.at + 1
         end = self.data.find(b"]", start)
         inside = self.data[start:end] if end >= 0 else b""
@@ -144,7 +144,7 @@ class Lexer:
         return words
 
     def _typed(self, words: list[bytes]) -> Any:
-        """Words as texts, truths or numbers, whichever the first one is."""
+        """Return words as texts, truths or numbers, by the first word."""
         if words and words[0].startswith(b'"'):
             if not all(word.startswith(b'"') for word in words):
                 raise self.error("strings and other values are mixed")

@@ -2,12 +2,11 @@
 
 pbrt's light space has x to the right where it looks along z with y up, ours to the left: images
 that are thrown are turned round accordingly, and images around a point are resampled in world
-space, so that any transform, mirrored ones included, is right.
+space, so that any transform, also a mirroring, is right.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,18 +15,18 @@ import numpy as np
 from clpt import images, transforms
 from clpt.arrays import Floats32
 from clpt.errors import SceneError, UnknownKindError
+from clpt.formats.colours import GREY
 from clpt.formats.pbrt import octahedral
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import spectrum
-from clpt.formats.pbrt.state import State
-from clpt.formats.reading import GREY
+from clpt.formats.pbrt.state import Maker, State
 from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.roles import EMISSION
 from clpt.scene.textures import Bitmap
 from clpt.spectra import RGBIlluminant, luminance, scaled
 
-# our directions of a map in latitude and longitude, in those of pbrt-v3
+# from clpt's directions of a map in latitude and longitude to pbrt-v3's
 LAT_LONG = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 WHITE = RGBIlluminant(1.0, 1.0, 1.0)
 SWAP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])  # y is up for a goniometer
@@ -46,10 +45,10 @@ def light(kind: str, params: Parameters, state: State) -> Light | None:
 
 
 def area_light(kind: str, params: Parameters, state: State, area: float = 0.0) -> lights.Area:
-    """Make what an `AreaLightSource` directive describes for one shape.
+    """Make the light of an `AreaLightSource` directive for a shape.
 
-    area: of the shape [m^2], which a light of a given "power" needs; of a mesh the mean of its
-    triangles, since pbrt makes each of them a light of that power. Raises SceneError.
+    area: of the shape [m^2], needed by a light with a "power"; of a mesh the mean of its triangles,
+    since pbrt makes each triangle a light of that power. Raises SceneError.
     """
     if kind != "diffuse":
         raise UnknownKindError("area light", kind, ("diffuse",), **params.location())
@@ -109,7 +108,7 @@ def _intensity(params: Parameters, state: State, per_unit: float) -> Any:
 
 
 def _from_to(params: Parameters, state: State) -> tuple[np.ndarray, np.ndarray]:
-    """Take where a light stands and the direction in which it shines, in world space."""
+    """Take a light's position and direction in world space."""
     start = np.array(params.one("from", "point3", (0.0, 0.0, 0.0)))
     along = np.array(params.one("to", "point3", (0.0, 0.0, 1.0))) - start
     if not np.linalg.norm(along) > 0.0:
@@ -197,9 +196,9 @@ def _lat_long(image: Floats32, colour: RGBIlluminant | None, state: State) -> Li
 
 
 def _upward(image: np.ndarray) -> float:
-    """Return the illuminance by pbrt's measure of a surface that faces +z of an octahedral image.
+    """Return pbrt's illuminance of a surface that faces +z of an octahedral image.
 
-    pbrt gives each pixel 2 pi / n^2 of solid angle, half of what it has; its pictures show that.
+    pbrt gives each pixel 2 pi / n^2 of solid angle, half of its true angle; its pictures show that.
     """
     centres = (np.arange(len(image)) + 0.5) / len(image)
     cosine = octahedral.to_sphere(np.stack(np.meshgrid(centres, centres), axis=-1))[..., 2]
@@ -301,7 +300,7 @@ def _square(file: str, state: State) -> Any:
     return image
 
 
-MAKERS: dict[str, Callable[[Parameters, State], Light]] = {
+MAKERS: dict[str, Maker[Light]] = {
     "point": _point,
     "spot": _spot,
     "distant": _distant,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -26,7 +25,7 @@ from clpt.formats.pbrt.scattering import (
     subsurface,
 )
 from clpt.formats.pbrt.spectra import named, spectrum
-from clpt.formats.pbrt.state import State
+from clpt.formats.pbrt.state import Maker, State
 from clpt.formats.pbrt.textures import map_values, normals, textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
@@ -164,7 +163,7 @@ def _mix(params: Parameters, state: State) -> Material:
 
 
 def _one_sided(result: Material) -> Material:
-    """The material with the fronts alone of what is given to both sides."""
+    """Return the material with the front sides of its two-sided parts."""
     if isinstance(result, materials.TwoSided):
         return _one_sided(result.front)
     inner: dict[str, Any] = {
@@ -186,7 +185,7 @@ def _measured(params: Parameters, state: State) -> Material:
     return both(materials.Measured(data=measured.read(state.existing_file(name))))
 
 
-MAKERS: dict[str, Callable[[Parameters, State], Material]] = {
+MAKERS: dict[str, Maker[Material]] = {
     "diffuse": _diffuse,
     "diffusetransmission": _diffuse_transmission,
     "coateddiffuse": coated_diffuse,

@@ -23,7 +23,7 @@ GRIDS = ("uniformgrid", "nanovdb", "rgbgrid", "cloud")
 HEAT = ("temperatureoffset", "temperaturecutoff", "temperaturescale")
 BLACK_BODY = {"normalised": True}  # so that it has 1 at its brightest wavelength
 _AROUND = ((1, 1), (1, 1), (1, 1), (0, 0))
-MILK = "Wholemilk"  # of which a medium is that says nothing
+DEFAULT_PRESET = "Wholemilk"  # pbrt's, for a medium without coefficients
 
 
 def medium(name: str, source: Parameters, state: State) -> Medium | None:
@@ -177,7 +177,7 @@ def _coefficients(params: Parameters, state: State, grid: bool) -> tuple[Any, An
     preset = params.one("preset", "string", "")
     if preset and preset not in scattering.MEDIA:
         raise UnknownKindError("preset", preset, scattering.MEDIA)
-    scatters, absorbs = (RGBUnbounded(*rgb) for rgb in scattering.MEDIA[preset or MILK])
+    scatters, absorbs = (RGBUnbounded(*rgb) for rgb in scattering.MEDIA[preset or DEFAULT_PRESET])
     return (
         spectrum(params, "sigma_a", COEFFICIENT, state, absorbs),
         spectrum(params, "sigma_s", COEFFICIENT, state, scatters),

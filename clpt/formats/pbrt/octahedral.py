@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from clpt.arrays import Floats32
 
 TALLEST = 4096  # [rows] of an image in latitude and longitude that is made
-DENSE = 1024  # [rows] up to which a pixel takes two lookups in each direction, beyond it one
+DENSE = 1024  # [rows]: up to here each pixel takes 2 x 2 lookups, else a single lookup
 CHUNK = 2**21  # directions that are looked up at once
-PEAK = 8.0  # times the mean radiance, from which a texel counts as a source of light of its own
+PEAK = 8.0  # times the mean radiance: a brighter texel counts as a light source of its own
 PARTS = 4  # points across a peak's texel
 
 
@@ -53,12 +53,12 @@ def to_sphere(points: ArrayLike) -> NDArray[np.float64]:
 
 
 def lat_long(image: Floats32, from_world: ArrayLike, *, on_poles: bool = True) -> Floats32:
-    """The image (h, 2h, c) in latitude and longitude of an octahedral one (n, n, c).
+    """Return the image (h, 2h, c) in latitude and longitude of an octahedral image (n, n, c).
 
-    from_world: (3, 3), takes directions of the world to those of the octahedron; it may mirror.
+    from_world: (3, 3), from directions of the world to the octahedron; it may mirror.
     The result has +y up and +z in the middle, as clpt.scene.lights.Envmap. Its first and last rows
     lie on the poles, as there, or half a row off them, as in the image of a Goniometric. Pixels are
-    means of texels; what exceeds PEAK, such as a sun, is laid down by its power.
+    means of texels; radiance above PEAK, such as a sun, is splatted by its power.
     """
     matrix = np.asarray(from_world, np.float64)
     height = min(max(len(image), 2), TALLEST)

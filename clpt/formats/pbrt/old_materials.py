@@ -16,7 +16,7 @@ from clpt.errors import UnknownKindError
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.scattering import both, hair, rough, subsurface
 from clpt.formats.pbrt.spectra import named, spectrum
-from clpt.formats.pbrt.state import Contents, Definition, State
+from clpt.formats.pbrt.state import Contents, Definition, Maker, State
 from clpt.formats.pbrt.textures import map_values, textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
@@ -50,8 +50,8 @@ def is_known(kind: str) -> bool:
 
 
 def has_mirrors(contents: Contents) -> bool:
-    """Return whether some material sends light on in one direction."""
-    definitions = [item for versions in contents.shared.materials.values() for item in versions]
+    """Return whether some material has a specular (delta) lobe."""
+    definitions = [item for versions in contents.shared.materials.values() for _, item in versions]
     parts = [contents.shapes, *contents.objects.values()]
     used = [item.state.material for part in parts for item in part]
     definitions += [item for item in used if isinstance(item, Definition)]
@@ -245,7 +245,7 @@ def _none(params: Parameters, state: State) -> Material:
 
 
 def _sum(lobes: Sequence[Lobe], params: Parameters, state: State) -> Material:
-    """Return the sum of lobes, each given by its factor and how it is made of one."""
+    """Return the sum of lobes, each a factor and a function that makes its material of a factor."""
     shining = [(value, make) for value, make in lobes if not _is_dark(value)]
     if not shining:
         return materials.Diffuse(reflectance=0.0)
@@ -301,7 +301,7 @@ def _number(value: Values, params: Parameters, state: State) -> Values:
     return float(np.clip(rgb.mean(), 0.0, 1.0))
 
 
-MAKERS: dict[str, Callable[[Parameters, State], Material]] = {
+MAKERS: dict[str, Maker[Material]] = {
     "matte": _matte,
     "mirror": _mirror,
     "glass": _glass,

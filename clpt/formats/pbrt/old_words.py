@@ -1,6 +1,6 @@
-"""Words of PBRT versions 2 and 3 in those of version 4, as data: each row names its source.
+"""Words of PBRT versions 2 and 3 and their names in version 4; each row names its source.
 
-Sources are files of the repository mmp/pbrt-v3, where no other is named.
+Sources are files of the repository mmp/pbrt-v3, unless another repository is named.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def is_old(data: bytes) -> bool:
 
 
 def directive(name: str) -> str:
-    """Return the directive of version 4; "" for one that changes no expected picture."""
+    """Return the directive of version 4; "" for a directive that changes no expected picture."""
     return "" if name in _LEFT_OUT else _DIRECTIVES.get(name, name)
 
 

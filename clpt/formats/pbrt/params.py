@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from clpt.formats.reading import Located
 
-SIZES = {  # how many numbers one value of a type has
+SIZES = {  # how many numbers a value of a type has
     "integer": 1, "float": 1, "blackbody": 1, "point2": 2, "vector2": 2, "point3": 3,
     "vector3": 3, "normal": 3, "rgb": 3,
 }  # fmt: skip
@@ -25,7 +25,7 @@ LARGEST_INTEGER = 2**31 - 1
 
 @dataclass(eq=False)
 class Parameter(Located):
-    """One `"type name" [values]`; `values` are float64 numbers, texts, or truths."""
+    """A `"type name" [values]`; `values` are float64 numbers, texts, or truths."""
 
     type: str
     name: str
@@ -44,7 +44,7 @@ class Parameter(Located):
         return isinstance(self.values, list) and all(isinstance(v, str) for v in self.values)
 
     def text(self) -> str:
-        """Return the one string."""
+        """Return the single string."""
         if not self.is_text or len(self.values) != 1:
             raise self.error("must be one string in quotes")
         return str(self.values[0])
@@ -56,7 +56,7 @@ class Parameter(Located):
         return [str(value) for value in self.values]
 
     def truth(self) -> bool:
-        """Return the one true or false; older files put it in quotes."""
+        """Return the single true or false; older files quote it."""
         value = self.values[0] if len(self.values) == 1 else None
         if isinstance(value, str) and value in ("true", "false"):
             return value == "true"
@@ -126,9 +126,9 @@ class Parameters(Located):
         return name in self._named
 
     def find(self, name: str, *types: str) -> Parameter | None:
-        """Take a parameter of one of the types, None without it; an integer counts as a float.
+        """Take a parameter of any of the types, None without it; an integer counts as a float.
 
-        Raises SceneError where it has another type.
+        Raises SceneError for another type.
         """
         self._asked.add(name)
         parameter = self._named.get(name)
@@ -141,7 +141,7 @@ class Parameters(Located):
         return parameter
 
     def one(self, name: str, type: str, default: object) -> Any:
-        """Take one value, or `default`: a float, int, bool, str, or an array (2,) or (3,)."""
+        """Take a single value, or `default`: a float, int, bool, str, or an array (2,) or (3,)."""
         parameter = self.find(name, type)
         if parameter is None:
             return default
@@ -164,7 +164,7 @@ class Parameters(Located):
         return None if parameter is None else parameter.rows()
 
     def choice(self, name: str, default: str, choices: Iterable[str]) -> str:
-        """Take a string that is one of `choices`."""
+        """Take a string among `choices`."""
         value = self.one(name, "string", default)
         if value not in choices:
             source: Located = self._named.get(name, self)

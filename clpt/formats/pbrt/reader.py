@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -134,7 +133,7 @@ class _Reader(TransformDirectives):
         self._end("Attribute")
 
     def transform_begin(self) -> None:
-        """As an AttributeBegin in version 4; in older ones it keeps transforms alone."""
+        """As an AttributeBegin in version 4; in older versions it keeps only transforms."""
         self._begin("Transform" if self.contents.shared.old else "Attribute")
 
     def transform_end(self) -> None:
@@ -143,6 +142,7 @@ class _Reader(TransformDirectives):
     def _begin(self, label: str) -> None:
         self.only(True)
         location = f"{self.lexer.path.name}:{self.lexer.line}"
+        self.state.number = self.contents.shared.count
         self.stack.append((label, self.state, location))
         self.state = self.state.copy()
 
@@ -153,6 +153,8 @@ class _Reader(TransformDirectives):
         if began != label:
             raise SceneError(f"the {began}Begin at {location} must end first")
         state.file_folder = self.state.file_folder
+        if label != "Transform" and self.contents.shared.old:
+            self.contents.shared.end_scope(state.number)
         if label == "Transform":
             kept = self.state.copy()
             kept.ctm, kept.end, kept.active = state.ctm, state.end, state.active
@@ -227,7 +229,7 @@ class _Reader(TransformDirectives):
         return Definition(kind, params, state)
 
     def _last(self, values: list[Parameter]) -> list[Parameter]:
-        """Return the last of parameters of one name, as pbrt does (src/pbrt/paramdict.cpp)."""
+        """Return the last of parameters of a name, as pbrt does (src/pbrt/paramdict.cpp)."""
         last: dict[str, Parameter] = {}
         for parameter in values:
             if parameter.name in last:
@@ -278,13 +280,14 @@ class _Reader(TransformDirectives):
     def make_named_material(self) -> None:
         self.only(True)
         definition = self._definition('MakeNamedMaterial "{}"', "material", "a name")
-        name, materials = definition.kind, self.contents.shared.materials
+        name, shared = definition.kind, self.contents.shared
+        materials = shared.materials
         self._check_new(name in materials, definition)
         kind = definition.params.one("type", "string", None)
         if kind is None:
             raise definition.params.error("needs the parameter 'string type'")
         version = Definition(kind, definition.params, definition.state)
-        materials.setdefault(name, []).append(version)
+        materials.setdefault(name, []).append((shared.count, version))
 
     def _check_new(self, exists: bool, definition: Definition) -> None:
         """Raise SceneError for a name that is defined again; versions 2 and 3 allow that."""
@@ -306,9 +309,10 @@ class _Reader(TransformDirectives):
         if values not in ("float", "spectrum"):
             raise SceneError(f"a texture has values float or spectrum, not {values[:40]!r}")
         definition = self._definition(f'Texture "{name}" "{{}}"', "texture")
-        textures = self.contents.shared.textures
+        shared = self.contents.shared
+        textures = shared.textures
         self._check_new((values, name) in textures, definition)
-        textures.setdefault((values, name), []).append(definition)
+        textures.setdefault((values, name), []).append((shared.count, definition))
 
     def make_named_medium(self) -> None:
         definition = self._definition('MakeNamedMedium "{}"', "medium", "a name")
@@ -320,7 +324,7 @@ class _Reader(TransformDirectives):
         self.state.inside, self.state.outside = inside, outside
 
 
-DIRECTIVES: dict[str, Callable[[_Reader], None]] = {
+DIRECTIVES = {
     "ActiveTransform": _Reader.active_transform,
     "AreaLightSource": _Reader.area_light_source,
     "Attribute": _Reader.attribute,

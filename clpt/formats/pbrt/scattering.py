@@ -53,7 +53,7 @@ def under_coat(ior: float, thickness: float) -> Callable[[Values], Values]:
     """Return how a base of albedo r looks below an absorbing coat, `thickness` in mean free paths.
 
     pbrt's coats let exp(-thickness / cos) through even where nothing scatters. With f_d the share
-    that is reflected back after two passes, and t the mean of one pass for what is refracted:
+    that is reflected back after two passes, and t the mean of a pass of refracted light:
     r' / (1 - f r') = t^2 r / (1 - f_d r).
     """
     fresnel, passes = internal_fresnel(ior), np.exp(-thickness / COSINES)
@@ -95,7 +95,7 @@ SMOOTHEST = 1e-4
 
 
 def alphas(params: Parameters, state: State, prefix: str = "") -> tuple[Any, Any]:
-    """Take the roughness along and across, as alpha; pbrt remaps one by its square root."""
+    """Take the roughness along and across as alpha; pbrt remaps it by its square root."""
     even = textured(params, f"{prefix}roughness", REAL, state, 0.0)
     u, v = (textured(params, f"{prefix}{axis}roughness", REAL, state, even) for axis in "uv")
     remap = params.one("remaproughness", "bool", True)
@@ -124,7 +124,7 @@ def stretched(alpha_u: object, alpha_v: object) -> dict[str, Any]:
 
 
 def isotropic(alphas: tuple[Any, Any], params: Parameters, state: State) -> Any:
-    """The one roughness of a coat that can be rough alike in all directions only."""
+    """Return a single roughness for a coat, which is isotropic."""
     u, v = alphas
     if u is v:
         return u
@@ -234,7 +234,7 @@ def _coefficient(value: object) -> Any:
 
 
 def _given(params: Parameters, state: State) -> tuple[Any, Any, Any, float]:
-    """Scattering, absorption, reflectance and g, of one of the four ways to say them."""
+    """Take scattering, absorption, reflectance and g, in any of four parametrisations."""
     params.ignore("scale", "mfp")
     medium, g = params.one("name", "string", ""), params.one("g", "float", 0.0)
     scattering = textured(params, "sigma_s", COEFFICIENT, state)

@@ -8,7 +8,6 @@ to the other side.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -20,7 +19,7 @@ from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.meshes import mesh, ply
 from clpt.formats.pbrt import curves, surfaces
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.state import Definition, State
+from clpt.formats.pbrt.state import Definition, Maker, State
 from clpt.formats.pbrt.textures import textured
 from clpt.scene import shapes, subdivision
 from clpt.scene.roles import REAL
@@ -40,11 +39,11 @@ DEEPEST = 10  # levels of subdivision
 
 @dataclass(eq=False)
 class Geometry:
-    """A kind of ours, its parameters but for material and light, and warnings.
+    """A kind of clpt, its parameters but for material and light, and warnings.
 
     pieces: for each triangle of a mesh the number of the shape, and so of the light, that pbrt
-    makes of it: a triangle, or a patch; None: all are one. split: lights that pbrt makes of each
-    piece of a curve.
+    makes of it: a triangle, or a patch; None: a single number. split: lights that pbrt makes of
+    each piece of a curve.
     """
 
     kind: type[Shape]
@@ -67,9 +66,9 @@ class Geometry:
         return np.bincount(self.pieces, triangles) / self.split
 
     def shares(self) -> NDArray[np.float32] | None:
-        """Return each triangle's brightness over that of a mean area; None where all are alike.
+        """Return each triangle's brightness over a mean area's; None if all are alike.
 
-        Each of pbrt's lights has the whole power, so that small ones are the brighter.
+        Each of pbrt's lights has the whole power, so that small lights are brighter.
         """
         areas = self.areas()
         if self.pieces is None or np.ptp(areas) <= ALIKE * areas.max():
@@ -366,7 +365,7 @@ def _heightfield(params: Parameters, state: State) -> Geometry | None:
     return _with_pieces(_mesh(points, faces, None, np.stack([u, v], axis=1)))
 
 
-SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
+SHAPES: dict[str, Maker[Geometry | None]] = {
     "bilinearmesh": _patches,
     "curve": _curve,
     "cylinder": _cylinder,
@@ -376,7 +375,7 @@ SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
     "sphere": _sphere,
     "trianglemesh": _triangles,
 }
-OLD_SHAPES: dict[str, Callable[[Parameters, State], Geometry | None]] = {
+OLD_SHAPES: dict[str, Maker[Geometry | None]] = {
     "cone": _cone,
     "heightfield": _heightfield,
     "hyperboloid": _hyperboloid,

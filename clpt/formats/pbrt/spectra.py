@@ -1,4 +1,4 @@
-"""Colours and spectra of a PBRT scene, and the names that pbrt gives to measured ones.
+"""Colours and spectra of a PBRT scene, and pbrt's names of measured spectra.
 
 pbrt divides every light by the photometric integral of its spectrum, so that all have luminance
 `scale`; a colour counts as a multiple of its colour space's illuminant. The constant spectrum 1
@@ -14,9 +14,9 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError
+from clpt.formats.colours import colour
 from clpt.formats.pbrt.params import Parameter, Parameters
 from clpt.formats.pbrt.state import State
-from clpt.formats.reading import colour
 from clpt.scene.roles import EMISSION, REFLECTANCE, Spectral
 from clpt.spectra import (
     Blackbody,
@@ -48,10 +48,10 @@ TEXTURE = Spectral("texture", colour=None)  # what textures are made of
 def spectrum(
     params: Parameters, name: str, role: Spectral, state: State, default: object = None
 ) -> Any:
-    """Take a number or a spectrum in the role of a parameter of ours; `default` where not given.
+    """Take a number or a spectrum in the role of a parameter of clpt; `default` if omitted.
 
-    role: TEXTURE for what a texture is made of. An emission gets luminance 1, or that of its
-    colour. Raises SceneError with the location.
+    role: TEXTURE for the operands of a texture. An emission gets luminance 1, or its colour's
+    luminance. Raises SceneError with the location.
     """
     values = params.find(name, "float", *SPECTRUM_TYPES)
     if values is None:
@@ -140,7 +140,7 @@ def _named(text: str, role: Spectral, state: State) -> Spectrum:
 
 @cache
 def named(name: str) -> Spectrum | None:
-    """One of pbrt's named spectra, such as metal-Cu-eta, glass-BK7 or stdillum-D65; else None."""
+    """Return a spectrum that pbrt names, such as metal-Cu-eta or stdillum-D65; else None."""
     start, _, others = name.partition("-")
     if start == "metal":
         metal, _, part = others.rpartition("-")

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,14 +16,16 @@ from clpt import transforms
 from clpt.choices import Missing
 from clpt.errors import SceneError, did_you_mean
 from clpt.files import budget, input_files, text
+from clpt.formats.colours import grey_for
 from clpt.formats.pbrt import old_words
 from clpt.formats.pbrt.lexer import Lexer
 from clpt.formats.pbrt.params import Parameter, Parameters
-from clpt.formats.reading import Located, grey_for
+from clpt.formats.reading import Located
 from clpt.scene.materials import Material
 from clpt.scene.motion import Keys
 
 BYTES = 1024  # of a directive in memory, about
+T = TypeVar("T")
 DEEPEST = 32  # files that include each other
 
 
@@ -85,7 +87,7 @@ class Files(Located):
         return {"file": self.lexer.path, "line": self.lexer.line, "where": self.name}
 
     def warn(self, text: str) -> None:
-        """Warn of what the picture will lack, with this location."""
+        """Warn of something that the picture will lack, with this location."""
         location = f"{self.lexer.path.name}:{self.lexer.line}: {self.name}"
         self.contents.shared.warnings.append(f"{location}: {text}")
 
@@ -111,14 +113,18 @@ class Definition:
     state: State
 
 
+# Definitions of a name in their order, each with the number from which it is in force.
+Versions = list[tuple[int, Definition]]
+
+
 @dataclass(eq=False)
 class Shared:
     """Data that all graphics states of a file share, and those of the files that it includes."""
 
     folder: Path
     warnings: list[str] = field(default_factory=list)
-    textures: dict[tuple[str, str], list[Definition]] = field(default_factory=dict)
-    materials: dict[str, list[Definition]] = field(default_factory=dict)
+    textures: dict[tuple[str, str], Versions] = field(default_factory=dict)
+    materials: dict[str, Versions] = field(default_factory=dict)
     media: dict[str, Definition] = field(default_factory=dict)
     systems: dict[str, tuple[transforms.Matrix, transforms.Matrix | None]] = field(
         default_factory=dict
@@ -133,6 +139,17 @@ class Shared:
     count: int = 0  # definitions so far
     mirrors: bool = False  # an old file has smooth metal or glass
 
+    def end_scope(self, start: int) -> None:
+        """Put the definitions back in force that definitions after number `start` have replaced.
+
+        In versions 2 and 3 names of materials and textures belong to the graphics state.
+        """
+        self.count += 1
+        for versions in (*self.textures.values(), *self.materials.values()):
+            outer = [definition for number, definition in versions if number <= start]
+            if outer and versions[-1][0] > start:
+                versions.append((self.count, outer[-1]))
+
     def once(self, key: object, source: Parameters | Parameter, make: Callable[[], Any]) -> Any:
         """Return make(), called once for each key. Raises SceneError where it needs itself."""
         if key not in self.made:
@@ -141,6 +158,9 @@ class Shared:
         if self.made[key] is None:
             raise source.error("refers to itself")
         return self.made[key]
+
+
+Maker = Callable[[Parameters, "State"], T]  # makes a part of the scene of a definition
 
 
 @dataclass(eq=False)
@@ -166,15 +186,15 @@ class State:
     defaults: dict[str, tuple[Parameter, ...]] = field(default_factory=dict)
     number: int = 0
 
-    def latest(self, versions: list[Definition] | None) -> Definition | None:
+    def latest(self, versions: Versions | None) -> Definition | None:
         """Return the last definition of a name before this state, else its first, else None."""
         if not versions:
             return None
-        at = bisect_left(versions, self.number, key=lambda item: item.state.number)
-        return versions[max(at - 1, 0)]
+        at = bisect_left(versions, self.number, key=lambda version: version[0])
+        return versions[max(at - 1, 0)][1]
 
     def motion(self) -> Keys | None:
-        """Return the keys of what the transforms move, None: it is still. Raises SceneError."""
+        """Return the keys of moving transforms, None if they are still. Raises SceneError."""
         if self.end is None or np.array_equal(self.end, self.ctm):
             return None
         return Keys(self.shared.times, np.stack([self.ctm, self.end]))
@@ -184,7 +204,7 @@ class State:
         return copy(self)
 
     def warn(self, source: Parameters | Parameter, text: str) -> None:
-        """Warn of what the picture will lack, with the file and line."""
+        """Warn of something that the picture will lack, with the file and line."""
         where = source.location()["where"]
         self.shared.warnings.append(f"{source.file.name}:{source.line}: {where}: {text}")
 
@@ -195,7 +215,7 @@ class State:
         self.warn(params, f"{error.message}; grey stands for it, or it is left out")
 
     def tell(self, text: str) -> None:
-        """Warn of what a file beside the scene has that is left out, once."""
+        """Warn once of a part of a file beside the scene that is left out."""
         if text not in self.shared.warnings:
             self.shared.warnings.append(text)
 

@@ -19,7 +19,7 @@ from clpt.scene import shapes
 
 Parts = dict[str, Any]
 AROUND, ALONG = 256, 128  # pieces of a mesh around a whole turn, and from pole to pole
-UNEVEN = 1e-5  # relative, of a matrix's axes, from which a sphere or a tube is none any more
+UNEVEN = 1e-5  # relative difference of a matrix's axes that deforms a sphere or a tube
 UPWARD = transforms.scale([1.0, 1.0, -1.0])  # ours counts a sphere's v from above
 
 
@@ -32,7 +32,7 @@ def phi_max(params: Parameters) -> float:
 
 
 def is_even(matrix: transforms.Matrix, axes: int) -> bool:
-    """Whether the axes stay orthogonal, the first `axes` of them of one length."""
+    """Return whether the axes stay orthogonal, and the first `axes` of equal length."""
     turned = matrix[:3, :3]
     squares = turned.T @ turned
     scale = squares[0, 0]

@@ -12,10 +12,10 @@ import numpy as np
 
 from clpt import images, transforms
 from clpt.errors import SceneError, UnknownKindError
+from clpt.formats.colours import EVEN, GREY
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import SPECTRUM_TYPES, TEXTURE, spectrum, value_of
 from clpt.formats.pbrt.state import Definition, State
-from clpt.formats.reading import EVEN, GREY
 from clpt.images import Stored
 from clpt.scene.params import fields_of
 from clpt.scene.roles import REAL, Role, Spectral
@@ -107,7 +107,7 @@ def textured(
     if values is None:
         return default
     if values.type != "texture":
-        used = role if isinstance(role, Spectral) else TEXTURE  # a number is one in any
+        used = role if isinstance(role, Spectral) else TEXTURE  # a number is the same in all
         with values.locating():
             return value_of(values, used, state)
     definition = state.texture(form, values.text(), values)
@@ -360,7 +360,7 @@ def _mapping(params: Parameters, state: State, before: Any = IDENTITY_UV) -> dic
     return {"to_uv": before @ to_uv, "mapping": mapping, "to_texture": to_texture}
 
 
-MAKERS: dict[str, Callable[[str, Parameters, State], Any]] = {
+MAKERS = {
     "constant": _constant,
     "scale": _scale,
     "mix": _mix,

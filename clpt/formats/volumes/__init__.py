@@ -17,15 +17,15 @@ from clpt.scene.volumes import Volume, check_density
 from clpt.spectra import RGBUnbounded
 from clpt.transforms import IDENTITY
 
-_GREY = 1e-4  # share by which colours may differ from multiples of one
+_GREY = 1e-4  # relative difference of colours from multiples of a single colour
 
 
 def read(path: str | Path, grid: str = "") -> Volume:
     """Read the density in a file, with its box: float32 values (nx, ny, nz).
 
     grid: its name in a .nvdb or .vdb of several; "" is "density", else the first. A .npy has the
-    box of the unit cube. Raises SceneError for what is no such file, and for numbers that are
-    negative or not finite.
+    box of the unit cube. Raises SceneError for any other file, and for numbers that are negative or
+    not finite.
     """
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
@@ -33,9 +33,9 @@ def read(path: str | Path, grid: str = "") -> Volume:
         message = f"unknown format {path.suffix!r} of a density; known: {' '.join(READERS)}"
         raise SceneError(message, file=path)
     with _reading(path):
-        made = reader(path, grid)
-        check_density(made.values, "")
-    return made
+        volume = reader(path, grid)
+        check_density(volume.values, "")
+    return volume
 
 
 def names(path: str | Path) -> tuple[str, ...]:
@@ -62,11 +62,12 @@ def read_colours(path: str | Path) -> Volume:
 def factored(
     values: NDArray[Any],
 ) -> tuple[RGBUnbounded, NDArray[np.float32], NDArray[np.float32] | None]:
-    """Return an extinction of colours (nx, ny, nz, 3) as what a `Grid` has of it.
+    """Return colour, density (nx, ny, nz) and colours, or None, of an extinction (nx, ny, nz, 3).
 
-    That is one colour, a density (nx, ny, nz), and None where their product is all; else twice
-    white, the highest of each three numbers, and half of what share of it each is (nx, ny, nz, 3):
-    colours that may exceed 1 have the spectra of halves, in PBRT, Mitsuba and `RGBUnbounded`.
+    A `Grid` takes these. If the extinction is a colour times a density, there are no colours; else
+    the colour is twice white, the density the largest component, and colours (nx, ny, nz, 3) are
+    half of each component's share of it: colours that may exceed 1 have the spectra of halves, in
+    PBRT, Mitsuba and `RGBUnbounded`.
     """
     values = np.asarray(values, np.float64)
     most = values.max(axis=(0, 1, 2))
@@ -89,7 +90,7 @@ def distances(path: Path) -> np.ndarray:
 
 @contextlib.contextmanager
 def _reading(path: Path) -> Iterator[None]:
-    """Name the file in what goes wrong while it is read."""
+    """Name the file in errors of its reader."""
     try:
         yield
     except MemoryError:

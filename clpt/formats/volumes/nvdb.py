@@ -1,9 +1,9 @@
 """NanoVDB files (.nvdb) of version 32: fog volumes of real numbers, without OpenVDB.
 
 A file is a row of segments: a header, the metadata of each grid, the grids, each perhaps packed. A
-grid is a tree in one buffer: a root with tiles, upper nodes of 32^3 lower ones, lower nodes of 16^3
-leaves, leaves of 8^3 values. Offsets are in bytes from the node that holds them. All of them are
-checked: a file may lie.
+grid is a tree in a buffer: a root with tiles, upper nodes of 32^3 lower nodes, lower nodes of
+16^3 leaves, leaves of 8^3 values. Offsets are in bytes from the node that holds them. All of them
+are checked: a file may lie.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ BARE = b"NanoVDB1"  # a grid without segments
 MAJOR = 32
 CODECS = ("none", "ZIP", "BLOSC")
 METADATA, GRID, TREE, TILE = 176, 672, 64, 32
-DEFLATE = 1032  # bytes at most that one of deflate stands for
+DEFLATE = 1032  # most bytes that a compressed byte of deflate stands for
 UPPER, LOWER = 270_400, 33_856
 UPPER_TABLE, LOWER_TABLE = 8_256, 1_088  # where a node's children are told
 MINIMUM, FLAGS, CODES = 80, 15, 96  # of a leaf whose numbers are packed
@@ -74,7 +74,7 @@ class _Entry:
 
 
 def read(path: Path, grid: str = "") -> Volume:
-    """Return the values (nx, ny, nz) float32 of a grid, and its box; one layer is put around.
+    """Return the values (nx, ny, nz) float32 of a grid with a layer around them, and its box.
 
     grid: its name, "" is "density", else the first. Raises SceneError, OSError.
     """
@@ -137,11 +137,13 @@ def _unpacked(data: bytes, entry: _Entry) -> bytes:
     if entry.codec >= len(CODECS):
         raise SceneError(f"the grid {entry.name!r} is packed in an unknown way ({entry.codec})")
     if CODECS[entry.codec] == "none":
-        made = data[entry.begin : entry.end]
+        grid = data[entry.begin : entry.end]
     else:
         budget.check(2 * entry.size, f"the grid {entry.name!r}")
         zipped = CODECS[entry.codec] == "ZIP"
-        unpack = sparse.inflated if zipped else sparse.blosc_unpacker()
+        if not zipped:
+            sparse.check_blosc()
+        unpack = sparse.inflated if zipped else sparse.blosc_unpacked
         chunks: list[bytes] = []
         at = entry.begin
         while at < entry.end and len(chunks) < 64:
@@ -152,15 +154,15 @@ def _unpacked(data: bytes, entry: _Entry) -> bytes:
             left = entry.size - sum(len(chunk) for chunk in chunks)
             chunks.append(unpack(part, left))
             at += 8 + packed
-        made = b"".join(chunks)
-    if len(made) != entry.size:
+        grid = b"".join(chunks)
+    if len(grid) != entry.size:
         message = f"is damaged: the grid {entry.name!r} has not {entry.size:,} bytes as it says"
         raise SceneError(message)
-    return made
+    return grid
 
 
 def _volume(grid: bytes) -> Volume:
-    """The box of the active values of a grid, with a layer of what is outside around it."""
+    """Return the box of a grid's active values, with a layer of its outside values around it."""
     sort, kind = struct.unpack_from("<2I", grid, 632)
     name = TYPES[kind] if kind < len(TYPES) else str(kind)
     if name not in LAYOUTS:
@@ -175,7 +177,7 @@ def _volume(grid: bytes) -> Volume:
     if root + layout.root + TILE * tiles > len(grid):
         raise SceneError("is damaged: its root goes beyond its end")
     (background,) = np.frombuffer(grid, layout.form, 1, root + layout.background)
-    found = _Found(grid, layout, low, high)
+    nodes_found = _Found(grid, layout, low, high)
     keys = set()
     for i in range(tiles):
         tile = root + layout.root + TILE * i
@@ -186,13 +188,13 @@ def _volume(grid: bytes) -> Volume:
         keys.add(key)
         at = np.array([_signed(key >> 42), _signed(key >> 21), _signed(key)])
         if child:
-            found.add_upper(np.array([root + child]), at[None])
+            nodes_found.add_upper(np.array([root + child]), at[None])
         elif active:
-            found.tiles.append(sparse.Tile(at, 4096, float(value)))
-    origins, nodes = found.leaves()
+            nodes_found.tiles.append(sparse.Tile(at, 4096, float(value)))
+    origins, nodes = nodes_found.leaves()
     leaves = _values(np.frombuffer(grid, np.uint8), layout, nodes)
-    made = float(background)
-    return sparse.volume(low, high, made, found.tiles, origins, leaves, _to_world(grid))
+    outside = float(background)
+    return sparse.volume(low, high, outside, nodes_found.tiles, origins, leaves, _to_world(grid))
 
 
 class _Found:
@@ -217,8 +219,8 @@ class _Found:
     def _add_lower(self, nodes: NDArray[np.int64], origins: NDArray[np.int64]) -> None:
         for node, origin in zip(nodes, origins, strict=True):
             _within(self._grid, int(node), LOWER)
-            own, at = self._children(int(node), origin, 16, 8, LOWER_TABLE)
-            self._nodes.append(own)
+            children, at = self._children(int(node), origin, 16, 8, LOWER_TABLE)
+            self._nodes.append(children)
             self._origins.append(at)
 
     def _children(
@@ -264,15 +266,15 @@ def _values(grid: NDArray[np.uint8], layout: _Layout, nodes: NDArray[np.int64]) 
     for bits in np.unique(widths):
         if bits > 16:
             raise SceneError(f"is damaged: a leaf has numbers of {bits} bits")
-        own = widths == bits
-        codes: NDArray[Any] = _gather(grid, nodes[own], CODES, 64 * int(bits))
+        same_width = widths == bits
+        codes: NDArray[Any] = _gather(grid, nodes[same_width], CODES, 64 * int(bits))
         if bits == 16:
             codes = codes.view("<u2")
         else:
             shifts = np.arange(0, 8, bits).astype(np.uint8)
             codes = (codes[:, :, None] >> shifts) & np.uint8((1 << int(bits)) - 1)
         codes = codes.reshape(-1, 512).astype(np.float32)
-        values[own] = codes * scale[own, None] + first[own, None]
+        values[same_width] = codes * scale[same_width, None] + first[same_width, None]
     return values
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import struct
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,33 +20,33 @@ BLOSC_HEADER = 16
 
 
 def inflated(packed: bytes | memoryview, most: int) -> bytes:
-    """Return what zlib has packed, one byte more than `most` where it is more."""
+    """Return at most `most` + 1 bytes that zlib has packed."""
     try:
         return zlib.decompressobj().decompress(packed, most + 1)
     except zlib.error as error:
         raise SceneError(f"is damaged: {error}") from None
 
 
-def blosc_unpacker() -> Callable[[bytes | memoryview, int], bytes]:
-    """Return what unpacks Blosc's bytes into at most so many. Raises SceneError without it."""
-    try:
-        import blosc
-    except ImportError:
+def check_blosc() -> None:
+    """Raise SceneError unless the package `blosc` is installed."""
+    if importlib.util.find_spec("blosc") is None:
         message = "is packed by Blosc: pip install 'clpt[volumes]', or convert it with ZIP"
-        raise SceneError(message) from None
+        raise SceneError(message)
 
-    def unpacked(packed: bytes | memoryview, most: int) -> bytes:
-        if len(packed) < BLOSC_HEADER:
-            raise SceneError("is damaged: a packed part has no head")
-        size, _, held = struct.unpack_from("<3I", packed, 4)
-        if size > most or held > len(packed):
-            raise SceneError("is damaged: a packed part is larger than the grid")
-        try:
-            made: bytes = blosc.decompress(bytes(packed))
-        except Exception as error:  # the package has a class of its own
-            raise SceneError(f"is damaged: {error}") from None
-        return made
 
+def blosc_unpacked(packed: bytes | memoryview, most: int) -> bytes:
+    """Return at most `most` bytes that Blosc has packed; the package `blosc` must be there."""
+    import blosc
+
+    if len(packed) < BLOSC_HEADER:
+        raise SceneError("is damaged: a packed part has no head")
+    size, _, held = struct.unpack_from("<3I", packed, 4)
+    if size > most or held > len(packed):
+        raise SceneError("is damaged: a packed part is larger than the grid")
+    try:
+        unpacked: bytes = blosc.decompress(bytes(packed))
+    except Exception as error:  # the package has a class of its own
+        raise SceneError(f"is damaged: {error}") from None
     return unpacked
 
 
@@ -55,7 +56,7 @@ MOST_AXIS = 1 << 16
 
 
 class Tile(NamedTuple):
-    """A cube of one value."""
+    """A cube of a constant value."""
 
     low: NDArray[np.int64]
     side: int
@@ -63,9 +64,9 @@ class Tile(NamedTuple):
 
 
 def chosen(names: list[str], grid: str) -> int:
-    """Return which grid of a file is read: the named one; "" is "density", else the first.
+    """Return the number of the named grid of a file; "" is "density", else the first.
 
-    Raises SceneError where there is none.
+    Raises SceneError if there is no such grid.
     """
     if not names:
         raise SceneError("has no grid")
@@ -95,11 +96,11 @@ def volume(
     leaves: NDArray[np.float32],
     to_world: NDArray[np.float64],
 ) -> Volume:
-    """Return the values of a box, with a layer of what is outside around it.
+    """Return the values of a box, with a layer of the outside value around it.
 
     low, high: (3,) the lowest and the highest index of the box; origins: (n, 3) the lowest index of
     each leaf; leaves: (n, 512) their values, z fastest; to_world: 4x4, from an index to the world.
-    Raises SceneError for a box that is empty or too large, and for a matrix without an inverse.
+    Raises SceneError for an empty or too large box, and for a matrix without an inverse.
     """
     check_box(low, high)
     budget.take(4 * math.prod(map(int, high - low + 3)), "its values")

@@ -28,8 +28,8 @@ HALF = "_HalfFloat"
 TYPES = {"Tree_float_5_4_3": "f", "Tree_double_5_4_3": "d"}  # of numbers
 UPPER, LOWER, LEAF = 32, 16, 8  # children, or values, along a side
 MASK = LEAF**3 // 8  # bytes
-PER_LEAF = 6 * LEAF**3  # bytes of a leaf's values, and of which of them it stores
-# What a node tells of its inactive values, before its active ones.
+PER_LEAF = 6 * LEAF**3  # bytes of a leaf's values and of its mask
+# A node's flag for its inactive values, before its active values.
 ONE_INACTIVE, TWO_INACTIVE, MASKED, ALL_VALUES = (2, 4, 5), 5, (3, 4, 5), 6
 
 
@@ -45,15 +45,15 @@ class _Entry:
 
 
 class _Bytes:
-    """Reads a file's bytes one after the other."""
+    """Reads a file's bytes in order."""
 
     def __init__(self, data: bytes, at: int = 0):
         self.data, self.at = data, at
 
     def take(self, form: str) -> tuple[Any, ...]:
-        made = struct.unpack_from("<" + form, self.data, self.at)
+        values = struct.unpack_from("<" + form, self.data, self.at)
         self.at += struct.calcsize("<" + form)
-        return made
+        return values
 
     def part(self, size: int) -> memoryview:
         if not 0 <= size <= len(self.data) - self.at:
@@ -69,15 +69,15 @@ class _Bytes:
 
     def metadata(self) -> dict[str, bytes]:
         (count,) = self.take("I")
-        made = {}
+        entries = {}
         for _ in range(count):
             name, _ = self.text(), self.text()
-            made[name] = bytes(self.part(*self.take("I")))
-        return made
+            entries[name] = bytes(self.part(*self.take("I")))
+        return entries
 
 
 def read(path: Path, grid: str = "") -> Volume:
-    """Return the values (nx, ny, nz) float32 of a grid, and its box; one layer is put around.
+    """Return the values (nx, ny, nz) float32 of a grid with a layer around them, and its box.
 
     grid: its name, "" is "density", else the first. Raises SceneError, OSError.
     """
@@ -114,7 +114,7 @@ def _entries(data: bytes) -> Iterator[_Entry]:
 
 
 def _volume(data: bytes, entries: list[_Entry], entry: _Entry) -> Volume:
-    """The box of the active values of a grid, with a layer of what is outside around it."""
+    """Return the box of a grid's active values, with a layer of its outside values around it."""
     kind = entry.kind.removesuffix(HALF)
     if kind not in TYPES:
         known = ", ".join(TYPES)
@@ -128,7 +128,11 @@ def _volume(data: bytes, entries: list[_Entry], entry: _Entry) -> Volume:
         )
     to_world = _transform(stream)
     if entry.parent:
-        shared = [one for one in entries if one.name == entry.parent and not one.parent]
+        shared = [
+            candidate
+            for candidate in entries
+            if candidate.name == entry.parent and not candidate.parent
+        ]
         if not shared:
             raise SceneError(f"is damaged: it has no grid {entry.parent!r}, whose tree is shared")
         entry = shared[0]
@@ -147,21 +151,21 @@ def _volume(data: bytes, entries: list[_Entry], entry: _Entry) -> Volume:
 def _transform(stream: _Bytes) -> NDArray[np.float64]:
     """The matrix (4, 4) from an index to the world."""
     kind = stream.text()
-    made = np.eye(4)
+    matrix = np.eye(4)
     if kind in ("UniformScaleMap", "ScaleMap"):
-        made[:3, :3] = np.diag(stream.array("<f8", 15)[:3])
+        matrix[:3, :3] = np.diag(stream.array("<f8", 15)[:3])
     elif kind in ("UniformScaleTranslateMap", "ScaleTranslateMap"):
         numbers = stream.array("<f8", 18)
-        made[:3, :3], made[:3, 3] = np.diag(numbers[3:6]), numbers[:3]
+        matrix[:3, :3], matrix[:3, 3] = np.diag(numbers[3:6]), numbers[:3]
     elif kind == "TranslationMap":
-        made[:3, 3] = stream.array("<f8", 3)
+        matrix[:3, 3] = stream.array("<f8", 3)
     elif kind in ("AffineMap", "UnitaryMap"):
-        made = stream.array("<f8", 16).reshape(4, 4).T  # of rows there
-        if not np.array_equal(made[3], [0.0, 0.0, 0.0, 1.0]):
+        matrix = stream.array("<f8", 16).reshape(4, 4).T  # of rows there
+        if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
             raise SceneError("is damaged: its transform is not affine")
     else:
         raise SceneError(f"lies in space by a {kind}; read are those of matrices")
-    return made
+    return matrix
 
 
 class _Tree:
@@ -173,7 +177,9 @@ class _Tree:
     def __init__(self, stream: _Bytes, packed: int, form: str, half: bool):
         self._stream, self._packed, self._form = stream, packed, form
         self._held = np.dtype("<f2" if half else f"<{form}")
-        self._unpack = sparse.blosc_unpacker() if packed & BLOSC else sparse.inflated
+        if packed & BLOSC:
+            sparse.check_blosc()
+        self._unpack = sparse.blosc_unpacked if packed & BLOSC else sparse.inflated
         self.tiles: list[sparse.Tile] = []
         self._active: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []  # boxes of tiles
         origins: list[NDArray[np.int64]] = []
@@ -192,17 +198,17 @@ class _Tree:
         for _ in range(children):
             upper = self._place(places)
             for lower in upper + LOWER * LEAF * self._children(upper, UPPER, LOWER * LEAF):
-                own = lower + LEAF * self._children(lower, LOWER, LEAF)
-                self.leaves += len(own)
+                leaf_origins = lower + LEAF * self._children(lower, LOWER, LEAF)
+                self.leaves += len(leaf_origins)
                 budget.check(PER_LEAF * self.leaves, f"its {self.leaves:,} leaves")
-                origins.append(own)
-                masks.append(stream.array("u1", MASK * len(own)))
+                origins.append(leaf_origins)
+                masks.append(stream.array("u1", MASK * len(leaf_origins)))
         none = [np.zeros((0, 3), np.int64)]
         self.origins = np.concatenate(origins or none)
         self.masks = np.concatenate([*masks, np.zeros(0, np.uint8)]).reshape(-1, MASK)
 
     def _place(self, places: set[tuple[int, ...]]) -> NDArray[np.int64]:
-        """Read the lowest index (3,) of one of the root's tiles or nodes, which overlap nowhere."""
+        """Read the lowest index (3,) of a tile or node of the root; they do not overlap."""
         low = self._stream.take("3i")
         if low in places or any(n % (UPPER * LOWER * LEAF) for n in low):
             raise SceneError("is damaged: two of its nodes have one place")
@@ -210,7 +216,7 @@ class _Tree:
         return np.array(low, np.int64)
 
     def box(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the lowest and the highest index (3,) of what is active."""
+        """Return the lowest and the highest index (3,) of active values."""
         lows, highs = [part[0] for part in self._active], [part[1] for part in self._active]
         step = 1 << 14
         for first in range(0, self.leaves, step):
@@ -238,13 +244,15 @@ class _Tree:
         parts = []
         for i in range(self.leaves):
             stream.at += MASK  # once more
-            tells, one, other, mask = self._inactive(MASK)
+            tells, inactive, other_inactive, mask = self._inactive(MASK)
             if not self._packed & ACTIVE_MASK or tells == ALL_VALUES:
                 stored[i] = True
                 parts.append(self._numbers(LEAF**3))
                 continue
             if tells != 0:
-                values[i] = one if mask is None else np.where(_bits(mask), other, one)
+                values[i] = (
+                    inactive if mask is None else np.where(_bits(mask), other_inactive, inactive)
+                )
             parts.append(self._numbers(counts[i]))
         if parts:
             values[stored] = np.frombuffer(b"".join(parts), self._held)
@@ -267,9 +275,9 @@ class _Tree:
         """
         size = count**3 // 8
         children, active = self._stream.array("u1", size), self._stream.array("u1", size)
-        tells, one, other, mask = self._inactive(size)
+        tells, inactive, other, mask = self._inactive(size)
         on = _bits(active)
-        values = np.full(count**3, one, np.float64)
+        values = np.full(count**3, inactive, np.float64)
         if mask is not None:
             values[_bits(mask)] = other
         if not self._packed & ACTIVE_MASK or tells == ALL_VALUES:
@@ -287,13 +295,13 @@ class _Tree:
         (tells,) = self._stream.take("B")
         if tells > ALL_VALUES:
             raise SceneError("is damaged: a node's values are told in an unknown way")
-        one, other = -self.background if tells else self.background, self.background
+        first, second = -self.background if tells else self.background, self.background
         if tells in ONE_INACTIVE:
-            (one,) = self._number()
+            (first,) = self._number()
         if tells == TWO_INACTIVE:
-            (other,) = self._number()
+            (second,) = self._number()
         mask = self._stream.array("u1", mask_bytes) if tells in MASKED else None
-        return tells, one, other, mask
+        return tells, first, second, mask
 
     def _numbers(self, count: int) -> bytes | memoryview:
         """The bytes of so many numbers."""
@@ -304,14 +312,14 @@ class _Tree:
             return b""
         (length,) = self._stream.take("q")
         if length <= 0:
-            made: bytes | memoryview = self._stream.part(-length)
+            packed: bytes | memoryview = self._stream.part(-length)
         else:
-            made = self._unpack(self._stream.part(length), size)
-        if len(made) != size:
+            packed = self._unpack(self._stream.part(length), size)
+        if len(packed) != size:
             raise SceneError("is damaged: a node has not as many values as it says")
-        return made
+        return packed
 
 
 def _bits(mask: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    made: NDArray[np.bool_] = np.unpackbits(mask, axis=-1, bitorder="little").view(np.bool_)
-    return made
+    bits: NDArray[np.bool_] = np.unpackbits(mask, axis=-1, bitorder="little").view(np.bool_)
+    return bits

@@ -17,7 +17,7 @@ FLOAT32 = 1  # the only encoding that Mitsuba 3 reads
 
 
 def read(path: Path) -> Volume:
-    """Return the values (nx, ny, nz) of a file with one channel, and its box. Raises SceneError."""
+    """Return the values (nx, ny, nz) of a single channel, and their box. Raises SceneError."""
     values, box = read_channels(path)
     if values.shape[3] != 1:
         raise SceneError(f"has {values.shape[3]} channels; a density has one")

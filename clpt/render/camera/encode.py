@@ -16,18 +16,16 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats
 from clpt.lenses import COATINGS, Prescription
-from clpt.lenses.coatings import DESIGN, reflectance
-from clpt.lenses.focusing import FocusedLens
 from clpt.lenses.glasses import LINE_D
-from clpt.lenses.pupils import ZONES
-from clpt.lenses.tracing import sag
+from clpt.lenses.prescription import DESIGN, reflectance
+from clpt.lenses.tracing import ZONES, FocusedLens, sag
 from clpt.render.records.camera import GHOST_CELLS, LENS_SURFACE, RECORDS
 from clpt.scene.cameras import Camera, Lens
 from clpt.scene.indices import check_index
 from clpt.scene.integrators import Film
 from clpt.spectra import Constant, Spectrum
 
-GHOST_LAMBDAS = np.linspace(420.0, 680.0, 14)  # [nm], at which pairs of surfaces are weighed
+GHOST_LAMBDAS = np.linspace(420.0, 680.0, 14)  # [nm], of the weights of pairs of surfaces
 EVEN = 0.1  # share of the ghosts' samples that is divided evenly among all pairs
 
 
@@ -44,14 +42,16 @@ def encode_camera(
     """Return the words (n,) float32 of a camera's record and of the tables behind it.
 
     width, height: of the film [pixels]; glass_rows: rows in `spectra` of its `dispersive_glasses`;
-    empty where all wavelengths have one index. Raises SceneError for a matrix, a glass or a lens
-    that cannot be used.
+    empty where no index depends on the wavelength. Raises SceneError for a matrix, a glass or a
+    lens that cannot be used.
     """
     kind = RECORDS[camera.kind]
     record, tables = np.zeros((), kind.dtype), _Tables(kind.words)
     for name, value in camera.checked_members(width, height).items():
         record[name] = value
     rows = dict(zip(camera.dispersive_glasses, glass_rows, strict=False))
+    for name, table in camera.record_tables().items():
+        record[name] = tables.append(table)
     if camera.traced_lens is not None:
         _encode_lens(camera.traced_lens, height / width, rows, record, tables)
     else:

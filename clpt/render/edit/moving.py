@@ -27,11 +27,12 @@ from clpt.render.edit.moving_parts import (
     MovingInstances,
     MovingSpheres,
 )
+from clpt.render.edit.plan import Plan
 from clpt.render.edit.scene_edit import Replacements
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.params import fields_of
-from clpt.scene.shapes import Curves, Instance, Mesh, Shape, Spheres
+from clpt.scene.shapes import Curves, Shape, Spheres
 
 _ROOT = "stage/place_vertices.cl"
 _NORMALS = SHAPE_BITS["normals"]
@@ -88,13 +89,13 @@ class Moving:
             if ranges.row["kind"] == 0 and ranges.faces[0] >= world:
                 continue  # a shape of a group: only its instances move
             shape = scene.shapes[number]
-            if isinstance(shape, Instance):
+            if shape.group is not None:
                 outer = shapes.placement(shape)
                 ranges.in_group = transforms.inverse(outer) @ shapes.placement(ranges.shape)
             self.ranges.setdefault(number, []).append(ranges)
 
-    def plan(self, scene: Scene, replaced: Replacements) -> Callable[[], None] | str:
-        """Return a function that enqueues new transforms and vertices of shapes, and refits trees.
+    def plan(self, scene: Scene, replaced: Replacements) -> Move | str:
+        """Return a plan of new transforms and vertices of shapes, and of refits of trees.
 
         scene: the present scene; replaced: the shapes that move, and their replacements. Returns
         the reason as a text if the scene must be lowered again.
@@ -106,16 +107,9 @@ class Moving:
         Raises SceneError for a transform that is singular, and arrays of the wrong shape or type.
         """
         try:
-            actions = self._plan(scene, replaced)
+            return Move(self, self._plan(scene, replaced))
         except CannotMove as reason:
             return str(reason)
-
-        def move() -> None:
-            for action in actions:
-                action()
-            self._fit_trees()
-
-        return move
 
     def _plan(self, scene: Scene, replaced: Replacements) -> list[Action]:
         """Return the actions that enqueue a move. Raises CannotMove."""
@@ -163,7 +157,7 @@ class Moving:
                 continue
             vertices, faces = (vertex, ends[0] - vertex), (face, ends[1] - face)
             mirrored = transforms.flips_handedness(shapes.placement(shape))
-            whole = not isinstance(shape, Mesh) or len(shape.faces) == faces[1]
+            whole = shape.faces is None or len(shape.faces) == faces[1]
             backwards.append(_Ranges(row, shape, vertices, faces, mirrored, whole))
             ends = vertex, face
         return backwards[::-1]
@@ -192,7 +186,7 @@ class Moving:
             matrix = shapes.placement(new) @ ranges.in_group
             if transforms.flips_handedness(matrix) != ranges.mirrored:
                 raise CannotMove(f"the transform of {name} mirrors it")
-        elif isinstance(new, Instance):
+        elif new.group is not None:
             raise CannotMove(f"{name} is copied, not shared, and its transform is on the device")
         if fields.get("vertices") is not before.get("vertices"):
             if not ranges.whole:
@@ -205,7 +199,7 @@ class Moving:
 
     def _plan_analytic(self, ranges: _Ranges, new: Shape) -> list[Action]:
         """Return the actions that move an analytic shape. Raises CannotMove if its kind changes."""
-        shape = ranges.shape if isinstance(new, Instance) else new
+        shape = new if new.group is None else ranges.shape
         matrix = shapes.placement(new) @ ranges.in_group
         in_world = dataclasses.replace(shape, to_world=matrix)
         if not keeps_its_kind(in_world):
@@ -260,7 +254,7 @@ class Moving:
         return act
 
     def _boxes_of(self, tree: str, lowered: NDArray[np.float32]) -> Boxes:
-        """Return the boxes of a tree, which `_fit_trees` will refit."""
+        """Return the boxes of a tree, which `fit_trees` will refit."""
         if tree not in self._boxes:
             host = lowered.copy()
             self._boxes[tree] = host, self.target.buffers.upload("boxes of what moves", host)
@@ -281,7 +275,7 @@ class Moving:
         on the device.
         """
         target = self.target
-        if not isinstance(new, Instance):
+        if new.group is None:
             ranges.shape = new
         table, (first, count) = target.tables["vertices"], ranges.vertices
         still = device_matrix is None and np.array_equal(matrix, transforms.IDENTITY)
@@ -374,7 +368,7 @@ class Moving:
             _ROOT, "smooth_normals", count, first=first, **tables, **ranges.around
         )
 
-    def _fit_trees(self) -> None:
+    def fit_trees(self) -> None:
         """Enqueue refits of the trees over shapes that moved."""
         target, trees = self.target, self.target.trees
         if "triangles" in self._moved:
@@ -390,9 +384,26 @@ class Moving:
         self._moved.clear()
 
 
-def _check_fields(old: Shape, new: object) -> None:
+@dataclass(frozen=True, eq=False)
+class Move(Plan):
+    """New transforms and vertices of shapes that move; actions: write the tables of each shape."""
+
+    moving: Moving
+    actions: list[Action]
+
+    @property
+    def repeatable(self) -> bool:
+        return False
+
+    def write(self) -> None:
+        for action in self.actions:
+            action()
+        self.moving.fit_trees()
+
+
+def _check_fields(old: Shape, new: Shape) -> None:
     """Raise CannotMove if fields differ between two shapes that no move can change."""
-    if not isinstance(new, Shape) or type(old) is not type(new):
+    if type(old) is not type(new):
         raise CannotMove(f"{_name(old)} becomes something else")
     before = fields_of(old)
     changed = {name for name, value in fields_of(new).items() if value is not before[name]}

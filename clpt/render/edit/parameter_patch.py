@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clpt.geometry.instancing import distinct
 from clpt.render.camera.encode import encode_camera
+from clpt.render.edit.plan import Plan
 from clpt.render.edit.rebuild import ranges
 from clpt.render.edit.scene_edit import Replacements
 from clpt.render.lights.aims import is_sharp
@@ -18,16 +20,43 @@ from clpt.render.materials.encode import gloss_word
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
-from clpt.scene.materials import CLEAR, COMPOSITES, Material
+from clpt.scene.materials import Material
 from clpt.scene.params import fields_of
 
 
-def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], None] | str:
-    """Return a function that enqueues the words by which a scene differs from a former scene.
+@dataclass(frozen=True, eq=False)
+class Patch(Plan):
+    """New words of the camera, unless it is None, and of rows of materials.
+
+    rows: the first word of each row in `materials`, and its words.
+    """
+
+    target: DeviceScene
+    camera: NDArray[np.float32] | None
+    rows: list[tuple[int, Any]]
+
+    def write(self) -> None:
+        lowered, stream = self.target.lowered, self.target.stream
+        tables = dict(lowered.tables)
+        if self.camera is not None:
+            stream.write(self.target.tables["camera"], self.camera)
+            tables["camera"] = self.camera
+        if self.rows:
+            table = tables["materials"] = tables["materials"].copy()
+            for first, new in self.rows:
+                row = table[first : first + len(new)]
+                for begin, end in ranges(row, new):
+                    buffer = self.target.tables["materials"]
+                    stream.write(buffer, new[begin:end], 4 * (first + begin))
+                row[:] = new
+        self.target.lowered = dataclasses.replace(lowered, tables=tables)
+
+
+def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Patch | str:
+    """Return the words that change from a former scene to a scene.
 
     The scenes may differ in the camera, of the same kind, and in values of materials. Else the
-    result is a text that says what differs. After an error the function may be called again.
-    Raises SceneError as `lower` does.
+    function returns the difference as a text. Raises SceneError as `lower` does.
     """
     lowered = on_device.lowered
     pairs = [] if scene.shapes is former.shapes else _pairs(former, scene)
@@ -60,29 +89,11 @@ def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Callable[[], N
         if before := lowered.features.lights.gloss:
             word = np.array([gloss_word(new)], np.uint32)
             rows += [(row - before, word) for row, _ in changed]
-    return lambda: _write(on_device, camera, rows)
+    return Patch(on_device, camera, rows)
 
 
 def _reflects(camera: Camera) -> tuple[bool, bool]:
     return camera.reflects, camera.has_ghosts
-
-
-def _write(on_device: DeviceScene, camera: Any, rows: list[tuple[int, Any]]) -> None:
-    """Enqueue the words of a camera, unless it is None, and of rows of materials."""
-    lowered, stream = on_device.lowered, on_device.stream
-    tables = dict(lowered.tables)
-    if camera is not None:
-        stream.write(on_device.tables["camera"], camera)
-        tables["camera"] = camera
-    if rows:
-        table = tables["materials"] = tables["materials"].copy()
-        for first, new in rows:
-            row = table[first : first + len(new)]
-            for begin, end in ranges(row, new):
-                buffer = on_device.tables["materials"]
-                stream.write(buffer, new[begin:end], 4 * (first + begin))
-            row[:] = new
-    on_device.lowered = dataclasses.replace(lowered, tables=tables)
 
 
 def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
@@ -92,7 +103,7 @@ def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
         if not _pair(old.material, new.material, pairs):
             return None
     changed = [(old, new) for old, new in pairs.values() if old is not new]
-    return [(old, new) for old, new in changed if not isinstance(old, COMPOSITES)]
+    return [(old, new) for old, new in changed if not old.is_composite]
 
 
 def _pair(old: Material, new: Material, pairs: Replacements) -> bool:
@@ -100,20 +111,16 @@ def _pair(old: Material, new: Material, pairs: Replacements) -> bool:
     if id(old) in pairs:
         return pairs[id(old)][1] is new
     pairs[id(old)] = old, new
-    if old is new and not isinstance(old, COMPOSITES):
+    if old is new and not old.is_composite:
         return True
     if type(old) is not type(new):
         return False
-    if not isinstance(old, COMPOSITES):
-        absorb = [material.absorption != CLEAR for material in (old, new)]
-        traits = [(material.transmits, material.uses_tangents) for material in (old, new)]
-        return absorb[0] == absorb[1] and traits[0] == traits[1]
-    others = fields_of(new)
-    for name, a in fields_of(old).items():
-        b = others[name]
-        if isinstance(a, Material) and isinstance(b, Material):
-            if not _pair(a, b, pairs):
-                return False
-        elif a is not b and name != "name":
-            return False
-    return True
+    if not old.is_composite:
+        traits = [(m.absorbs_inside, m.transmits, m.uses_tangents) for m in (old, new)]
+        return traits[0] == traits[1]
+    parts, others = old.shared_parts, fields_of(new)
+    if parts.keys() != new.shared_parts.keys():
+        return False
+    free = parts.keys() | {"name"}
+    same = all(a is others[name] for name, a in fields_of(old).items() if name not in free)
+    return same and all(_pair(part, others[name], pairs) for name, part in parts.items())

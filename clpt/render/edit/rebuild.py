@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from clpt import bvh
 from clpt.errors import SceneError
+from clpt.render.edit.plan import Plan
 from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.wavefront import trees
 from clpt.render.wavefront.device_scene import UPLOADED, DeviceScene
@@ -21,7 +21,7 @@ from clpt.render.wavefront.wavefront import Wavefront
 
 log = logging.getLogger(__name__)
 
-GAP = 256  # equal words between differences, up to which a single write covers both
+GAP = 256  # most equal words between two differences that share a write
 MOST_WRITES = 64  # if more are needed, a single write covers the whole range
 OF_FILM = (
     "width", "height", "margin", "crop_x", "crop_y", "film_width", "film_height", "bands", "alpha",
@@ -40,52 +40,54 @@ class _Changes:
     refit: bool
 
 
-@dataclass(frozen=True)
-class _Staged:
-    """New buffers, trees and queues for a lowering, which nothing uses yet.
+@dataclass(frozen=True, eq=False)
+class Rebuild(Plan):
+    """Another lowering for a wavefront, with new buffers, trees and queues that nothing uses yet.
 
-    tables: those that need a new buffer, by name.
+    tables: new buffers by name; other tables are written where their words differ. replaced: the
+    buffers that the new buffers replace, until they are released.
     """
 
+    wavefront: Wavefront
+    lowered: Lowered
+    changes: _Changes
     tables: dict[str, cl.Buffer]
     trees: trees.Trees
     queue: dict[str, Any]
+    replaced: list[cl.Buffer]
+
+    def write(self) -> None:
+        scene, changes = self.wavefront.scene, self.changes
+        _write_tables(scene, self.lowered, self.tables)
+        self.wavefront.paths.set_settings(self.lowered.settings)
+        scene.tables |= self.tables
+        scene.lowered, scene.strategy, scene.trees = self.lowered, changes.strategy, self.trees
+        scene.fill_grids()
+        self.wavefront.paths.queue = self.queue
+        _refit(scene, changes)
+        if changes.kernels or changes.boxes or self.replaced or self.tables:
+            self.wavefront.bind_again(rebuilt=changes.kernels)
+        while self.replaced:
+            scene.buffers.release(self.replaced.pop())
 
 
-def prepare(wavefront: Wavefront, lowered: Lowered, refit: bool = False) -> Callable[[], None]:
-    """Return a function after which a wavefront renders another lowering.
+def prepare(wavefront: Wavefront, lowered: Lowered, refit: bool = False) -> Rebuild:
+    """Return the plan after which a wavefront renders another lowering.
 
-    After an error the function may be called again. refit: refit the tree over triangles that only
-    moved; this is faster than a new tree, but rays are slower if triangles moved far. Programs are
-    built if the features differ, trees if triangles or boxes differ; words of tables are written
-    where they differ. The picture equals that of a new renderer.
+    refit: refit the tree over triangles that only moved; this is faster than a new tree, but rays
+    are slower if triangles moved far. Programs are built if the features differ, trees if triangles
+    or boxes differ; words of tables are written where they differ. The picture equals that of a new
+    renderer.
 
     Both lowerings must have the same kinds of paths, see `has_other_paths`. Raises SceneError as in
     `refusal`, KernelBuildError, MemoryBudgetError; the wavefront is then unchanged.
     """
-    scene, paths = wavefront.scene, wavefront.paths
-    refused = refusal(scene.lowered, lowered)
+    refused = refusal(wavefront.scene.lowered, lowered)
     if refused is not None:
         raise refused
     changes = _changes(wavefront, lowered, refit)
-    with scene.buffers.all_or_nothing():
-        staged = _stage(wavefront, lowered, changes)
-    replaced = _replaced(wavefront, staged)
-
-    def take() -> None:
-        _write_tables(scene, lowered, staged.tables)
-        paths.set_settings(lowered.settings)
-        scene.tables |= staged.tables
-        scene.lowered, scene.strategy, scene.trees = lowered, changes.strategy, staged.trees
-        scene.fill_grids()
-        paths.queue = staged.queue
-        _refit(scene, changes)
-        if changes.kernels or changes.boxes or replaced or staged.tables:
-            wavefront.bind_again(rebuilt=changes.kernels)
-        while replaced:
-            scene.buffers.release(replaced.pop())
-
-    return take
+    with wavefront.scene.buffers.all_or_nothing():
+        return _stage(wavefront, lowered, changes)
 
 
 def refusal(former: Lowered, new: Lowered) -> SceneError | None:
@@ -128,7 +130,7 @@ def _changes(wavefront: Wavefront, lowered: Lowered, refit: bool) -> _Changes:
     )
 
 
-def _stage(wavefront: Wavefront, lowered: Lowered, changes: _Changes) -> _Staged:
+def _stage(wavefront: Wavefront, lowered: Lowered, changes: _Changes) -> Rebuild:
     """Build new kernels, buffers and trees beside the present scene, which stays unchanged."""
     scene, paths, queue = wavefront.scene, wavefront.paths, wavefront.paths.queue
     if changes.kernels:
@@ -146,7 +148,8 @@ def _stage(wavefront: Wavefront, lowered: Lowered, changes: _Changes) -> _Staged
         log.info("trees are built over %s", which)
     if changes.kernels:
         queue = paths.new_queue(changes.strategy.queued, len(lowered.features.materials.kinds))
-    return _Staged(tables, new_trees, queue)
+    replaced = _replaced(wavefront, tables, new_trees, queue)
+    return Rebuild(wavefront, lowered, changes, tables, new_trees, queue, replaced)
 
 
 def _new_tables(scene: DeviceScene, lowered: Lowered, changes: _Changes) -> dict[str, cl.Buffer]:
@@ -164,20 +167,25 @@ def _new_tables(scene: DeviceScene, lowered: Lowered, changes: _Changes) -> dict
     return tables
 
 
-def _replaced(wavefront: Wavefront, staged: _Staged) -> list[cl.Buffer]:
-    """Return the buffers of clpt that the staged buffers replace."""
-    scene, queue = wavefront.scene, wavefront.paths.queue
+def _replaced(
+    wavefront: Wavefront,
+    tables: dict[str, cl.Buffer],
+    new_trees: trees.Trees,
+    queue: dict[str, Any],
+) -> list[cl.Buffer]:
+    """Return the buffers of clpt that new tables, trees and a new queue replace."""
+    scene, former = wavefront.scene, wavefront.paths.queue
     of_caller = scene.lowered.zero_copy
-    buffers = [scene.tables[name] for name in staged.tables if name not in of_caller]
-    if staged.trees is not scene.trees:
+    buffers = [scene.tables[name] for name in tables if name not in of_caller]
+    if new_trees is not scene.trees:
         buffers.append(scene.trees.instances)
-    if staged.queue is not queue:
-        buffers += [value for value in queue.values() if isinstance(value, cl.Buffer)]
+    if queue is not former:
+        buffers += [value for value in former.values() if isinstance(value, cl.Buffer)]
     return buffers
 
 
 def _write_tables(scene: DeviceScene, lowered: Lowered, new: dict[str, cl.Buffer]) -> None:
-    """Enqueue the words by which tables differ from a lowering, except in new buffers."""
+    """Enqueue the words of tables that differ from a lowering, except in new buffers."""
     for name in UPLOADED:
         if name in new or name in lowered.zero_copy:
             continue
@@ -206,7 +214,7 @@ def _refit(scene: DeviceScene, changes: _Changes) -> None:
 
 
 def ranges(old: NDArray[Any], new: NDArray[Any]) -> list[tuple[int, int]]:
-    """Return ranges, begin and end, that cover all words by which two tables differ."""
+    """Return ranges, begin and end, that cover all different words of two tables."""
     differ = np.flatnonzero(old != new)
     if not len(differ):
         return []

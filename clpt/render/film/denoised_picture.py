@@ -99,7 +99,7 @@ class DenoisedPicture(Still):
         return None if self._statistical is None else self._statistical.error()
 
     @property
-    def beside(self) -> dict[str, Image]:
+    def extra_pictures(self) -> dict[str, Image]:
         """The pictures `noisy` and, if known, `denoised_error`."""
         error = {} if self.error is None else {"denoised_error": self.error}
         return {"noisy": self._noisy} | error

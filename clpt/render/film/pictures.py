@@ -82,8 +82,8 @@ class Pictures(ABC):
         """
 
     @property
-    def beside(self) -> Mapping[str, Image]:
-        """Pictures that files show beside this picture, by name."""
+    def extra_pictures(self) -> Mapping[str, Image]:
+        """Further pictures for files that show this picture, by name."""
         return {}
 
     def image(self) -> Image:

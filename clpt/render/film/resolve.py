@@ -15,8 +15,7 @@ from clpt import device
 from clpt.device import DeviceArray
 from clpt.errors import DeviceError
 from clpt.images import srgb8_steps
-from clpt.images.colour.tones import TONES, check_tone
-from clpt.images.colour.view import View
+from clpt.images.colour import TONES, View, check_tone
 from clpt.spectra.spaces import between
 
 TONE_NUMBERS = {name: number for number, name in enumerate(TONES)}  # kernels/film/tone.cl
@@ -180,7 +179,7 @@ class Resolve:
 
 @cache
 def _to_rec709(space: str) -> dict[str, Any]:
-    """Return the arguments by which kernels convert colours of a space to Rec. 709."""
+    """Return the arguments of kernels that convert colours of a space to Rec. 709."""
     rows = zip(("red", "green", "blue"), between(space, "rec709"), strict=True)
     return {"converted": int(space != "rec709")} | {name: (*row, 0.0) for name, row in rows}
 

@@ -26,9 +26,9 @@ def _grid_collision(features: Features) -> tuple[str, ...]:
     """Return the file about collisions in grids."""
     grids = features.media.grids
     if grids.mixed:
-        return ("media/grid_collision_mixed.cl",)
+        return ("media/grid_flight.cl#collision_mixed",)
     varied = features.ratios and (grids.coloured or grids.tinted)
-    return either(varied, "media/grid_collision.cl")
+    return either(varied, "media/grid_flight.cl#collision")
 
 
 # name: the files that stand for it, for a scene's features and the layout of its triangles
@@ -37,7 +37,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/spectrum_read.cl": lambda f, _: _spectrum_read(f),
     "generated/sampler.cl": lambda f, _: (
         f"samplers/kinds/{f.transport.sampler}.cl",
-        f"samplers/pixel_sampler{'_z' * (f.transport.sampler == 'zsobol')}.cl",
+        f"samplers/pixel_sampler.cl{'#z' * (f.transport.sampler == 'zsobol')}",
     ),
     "generated/exposure.cl": lambda f, _: (
         "film/splatting.cl" if f.film_weights else "film/exposure.cl",
@@ -50,23 +50,26 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         f.media.present, "transport/photons/collisions.cl"
     ),
     "generated/train_steps.cl": lambda f, _: either(
-        f.media.present, "transport/guiding/collisions.cl"
+        f.media.present, "transport/guiding/guide.cl#collisions"
     ),
     "generated/cone.cl": lambda f, _: either(f.textures.mips, "textures/cone.cl"),
     "generated/vertex_media.cl": lambda f, _: (
-        when(f.media.bodies, "media/vertex_bodies.cl")
+        when(f.media.bodies, "media/bodies.cl#vertex")
         or either(f.media.absorbing, "media/vertex_media.cl")
     ),
-    "generated/front_motion.cl": lambda f, _: either(f.motion.camera, "cameras/front_motion.cl"),
+    "generated/front_motion.cl": lambda f, _: either(f.motion.camera, "cameras/motion.cl#front"),
     "generated/ghosts.cl": lambda f, _: either(f.transport.lit_ghosts, "cameras/ghosts.cl"),
+    "generated/first_cone.cl": lambda f, _: (
+        f"textures/cone.cl#{'unrelated' if f.camera.listed else 'first'}",
+    ),
     "generated/first_ray.cl": lambda f, _: (
-        f"cameras/first_ray{'_weighted' * f.camera.weighs}.cl",
+        f"cameras/first_ray.cl{'#weighted' * f.camera.weighs}",
     ),
     "generated/sky.cl": lambda f, _: (
         *either(f.lights.infinite, "lights/sky.cl"),
-        *either(f.lights.infinite and bool(f.film.layers.lights), "lights/sky_layers.cl"),
+        *either(f.lights.infinite and bool(f.film.layers.lights), "lights/sky.cl#layers"),
     ),
-    "generated/join_light.cl": lambda f, _: either(f.shows_lights, "lights/join_light.cl"),
+    "generated/join_light.cl": lambda f, _: either(f.shows_lights, "lights/emission.cl#join"),
     "generated/layer_sums.cl": lambda f, _: (
         "generated/layer_args.cl",
         *either(f.film.layers.words > 0, "film/layers.cl"),
@@ -78,13 +81,13 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
             f.film.layers.words > 0,
             *_screen_motion(f),
             *either(f.screen_motion, "film/screen_motion_record.cl"),
-            *either(f.motion.camera, "cameras/camera_axis.cl"),
+            *either(f.motion.camera, "cameras/motion.cl#axis"),
         ),
         *either(f.film.layers.words > 0, "film/layers_record.cl"),
     ),
     "generated/path_covers.cl": lambda f, _: either(f.film.alpha, "film/covers.cl"),
     "generated/path_start.cl": lambda f, _: either(
-        f.film.alpha and f.camera.weighs, "cameras/start.cl"
+        f.film.alpha and f.camera.weighs, "cameras/first_ray.cl#again"
     ),
     "generated/scouts.cl": lambda f, _: either(f.scouts, "film/scouts.cl"),
     "generated/scouts_begin.cl": lambda f, _: either(f.scouts, "film/scouts_begin.cl"),
@@ -108,136 +111,149 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/grid_flight.cl": lambda f, _: (
         *(
-            ("generated/lights.cl", "lights/met_light.cl")
+            ("generated/lights.cl", "lights/light.cl#met")
             if f.media.grids.emissive or f.lights.bodies
             else when(f.media.grids.present, f"lights/receiver.cl{TWIN}")
         ),
         *when(f.media.grids.present, "media/grid_flight.cl"),
     ),
     "generated/kept_hemisphere.cl": lambda f, _: (
-        when(f.lights.gloss, "lights/kept_receiver.cl")
-        or either(f.hemispheres, "lights/kept_hemisphere.cl")
+        when(f.lights.gloss, "lights/receiver.cl#kept")
+        or either(f.hemispheres, "lights/receiver.cl#kept_hemisphere")
     ),
     "generated/seen_wavelengths.cl": lambda f, _: either(
-        f.fluorescence, "spectra/seen_wavelengths.cl"
+        f.fluorescence, "spectra/wavelengths.cl#seen"
     ),
     "generated/infinite_weight.cl": lambda f, _: either(
-        f.transport.balanced, "lights/infinite_weight.cl"
+        f.transport.balanced, "lights/infinite.cl#weight"
     ),
     "generated/diffuse_roulette.cl": lambda f, _: either(
-        f.dull_paths_end, "transport/diffuse_roulette.cl"
+        f.dull_paths_end, "transport/roulette.cl#diffuse"
     ),
     "generated/light_path_endless.cl": lambda f, _: either(
-        f.media.grids.present, "media/light_path_endless.cl"
+        f.media.grids.present, "transport/light_path.cl#endless"
     ),
     "generated/emit_steps.cl": lambda f, _: (
-        *either(f.transport.aimed, "transport/mis_ratio_aimed.cl"),
-        *either(f.transport.balanced, "lights/light_kept.cl"),
+        *either(f.transport.aimed, "transport/mis_ratio.cl#aimed"),
+        *either(f.transport.balanced, "lights/emission.cl#kept"),
     ),
-    "generated/medium_steps.cl": lambda f, _: either(f.media.present, "media/medium_flies.cl"),
-    "generated/medium_dims.cl": lambda f, _: either(not f.shadow_media, "media/medium_dims.cl"),
-    "generated/light_media.cl": lambda f, _: either(f.light_media, "media/light_media.cl"),
-    "generated/grid_numbers.cl": lambda f, _: either(f.media.grids.bytes, "media/grid_bytes.cl"),
+    "generated/medium_steps.cl": lambda f, _: either(f.media.present, "media/medium.cl#flies"),
+    "generated/medium_dims.cl": lambda f, _: either(not f.shadow_media, "media/medium.cl#dims"),
+    "generated/light_media.cl": lambda f, _: either(f.light_media, "media/medium.cl#lights"),
+    "generated/grid_numbers.cl": lambda f, _: either(
+        f.media.grids.bytes, "media/medium_grid.cl#bytes"
+    ),
     "generated/grid_steps.cl": lambda f, _: (
         "generated/grid_words.cl",
-        *either(f.media.grids.coloured, "media/grid_coloured.cl"),
-        *either(f.media.grids.tinted, "media/grid_tinted.cl"),
-        *either(f.media.grids.mixed, "media/grid_mixed.cl"),
+        *either(f.media.grids.coloured, "media/medium_grid.cl#coloured"),
+        *either(f.media.grids.tinted, "media/medium_grid.cl#tinted"),
+        *either(f.media.grids.mixed, "media/medium_grid.cl#mixed"),
     ),
     "generated/grid_glow.cl": lambda f, _: (
-        *when(f.media.grids.hot, *either(f.spectra.spectral, "media/black_body.cl")),
-        *either(f.media.grids.hot, "media/grid_glow.cl"),
+        *when(
+            f.media.grids.hot, *either(f.spectra.spectral, "media/medium_grid_light.cl#black_body")
+        ),
+        *either(f.media.grids.hot, "media/medium_grid_light.cl#glow"),
     ),
     "generated/flight_steps_of_grids.cl": lambda f, _: (
-        *either(f.ratios, "media/grid_weigh.cl"),
-        *either(f.media.grids.emissive, "media/grid_gather.cl"),
+        *either(f.ratios, "media/grid_flight.cl#weigh"),
+        *either(f.media.grids.emissive, "media/grid_flight.cl#gather"),
         *_grid_collision(f),
     ),
-    "generated/brick_weight.cl": lambda f, _: either(f.lights.bricks, "media/brick_weight.cl"),
-    "generated/body_weight.cl": lambda f, _: either(f.lights.bodies, "media/body_weight.cl"),
-    "generated/aim_cone.cl": lambda f, _: either(f.media.aim_cones, "media/aim_cone.cl"),
-    "generated/grid_origin.cl": lambda f, _: either(f.media.grids.emissive, "media/grid_origin.cl"),
-    "generated/flight_medium.cl": lambda f, _: either(f.media.bodies, "media/flight_medium.cl"),
+    "generated/brick_weight.cl": lambda f, _: either(
+        f.lights.bricks, "media/grid_flight.cl#brick_weight"
+    ),
+    "generated/body_weight.cl": lambda f, _: either(
+        f.lights.bodies, "media/flight.cl#emission_weight"
+    ),
+    "generated/aim_cone.cl": lambda f, _: either(f.media.aim_cones, "media/equiangular.cl#cone"),
+    "generated/grid_origin.cl": lambda f, _: either(
+        f.media.grids.emissive, "media/grid_flight.cl#origin"
+    ),
+    "generated/flight_medium.cl": lambda f, _: either(f.media.bodies, "media/flight.cl#medium"),
     "generated/flight_steps.cl": lambda f, _: (
-        *either(f.media.bodies, "media/flight_medium.cl"),
-        *either(f.media.grids.present, "media/flight_grids.cl"),
+        *either(f.media.bodies, "media/flight.cl#medium"),
+        *either(f.media.grids.present, "media/flight.cl#grids"),
         *either(f.media.aims and not f.transport.light_paths, "media/equiangular.cl"),
-        *either(f.media.dyed, "media/flight_dye.cl"),
-        *either(f.ratios, "media/flight_weight.cl"),
-        *either(f.media.emissive, "media/flight_emission.cl"),
+        *either(f.media.dyed, "media/flight.cl#dye"),
+        *either(f.ratios, "media/flight.cl#weight"),
+        *either(f.media.emissive, "media/flight.cl#emission"),
     ),
     "generated/light_of_flight.cl": lambda f, _: either(
-        bool(f.film.layers.lights) and not f.transport.light_paths, "media/flight_light_layers.cl"
+        bool(f.film.layers.lights) and not f.transport.light_paths, "media/flight.cl#light_layers"
     ),
     "generated/way_steps.cl": lambda f, _: (
-        *either(f.media.grids.present, "media/grid_shadow.cl"),
-        *either(f.media.bodies, "media/shadow_boundary.cl"),
+        *either(f.media.grids.present, "media/medium_grid.cl#shadow"),
+        *either(f.media.bodies, "media/bodies.cl#shadow"),
     ),
     "generated/light_medium.cl": lambda f, _: (
         ("generated/textures.cl", "generated/medium.cl")
         if f.light_media
-        else (f"media/light_media.cl{TWIN}", f"media/medium_dims.cl{TWIN}")
+        else (f"media/medium.cl#lights{TWIN}", f"media/medium.cl#dims{TWIN}")
     ),
     "generated/shading_frame.cl": lambda f, _: (
         *when(f.materials.normal_mapped, "generated/normal_map.cl"),
         *either(f.materials.normal_mapped, "materials/shading_frame.cl"),
     ),
-    "generated/transmittance.cl": lambda f, _: (f"tracing/transmittance{_passing(f)}.cl",),
+    "generated/transmittance.cl": lambda f, _: (f"tracing/transmittance.cl#{_passing(f)}",),
     "generated/shadow_ray.cl": lambda f, _: (
-        when(f.shadow_media, "transport/shadow_ray_media.cl")
-        or when(f.media.escapes, "transport/shadow_ray_escapes.cl")
+        when(f.shadow_media, "transport/shadow_ray.cl#media")
+        or when(f.media.escapes, "transport/shadow_ray.cl#escapes")
         or ("transport/shadow_ray.cl",)
     ),
     "generated/trace.cl": lambda _, layout: (
-        f"tracing/trace_{'lanes' if layout == 'brute' else 'one'}.cl",
+        f"tracing/trace.cl#{'lanes' if layout == 'brute' else 'one'}",
     ),
     "generated/curve_others.cl": lambda f, _: either(
-        f.geometry.analytic != ("curves",), "tracing/curve_others.cl"
+        f.geometry.analytic != ("curves",), "tracing/curves.cl#others"
     ),
     "generated/shape_traversal.cl": lambda f, layout: (
-        (f"bvh/{bvh.shapes_layout(layout)}.cl", "bvh/shapes.cl") * bool(f.geometry.analytic)
+        (f"bvh/shapes.cl#{bvh.shapes_layout(layout).removeprefix('shapes_')}",)
+        * bool(f.geometry.analytic)
     ),
     "generated/hit_space.cl": lambda f, _: either(f.geometry.instances, "shapes/hit_space.cl"),
     "generated/surface_steps.cl": lambda f, _: (
         "generated/motion.cl",
-        *either(f.textures.attributes, "shapes/attributes.cl"),
-        *either(f.screen_motion and f.motion.vertices, "shapes/deforms.cl"),
+        *either(f.textures.attributes, "shapes/surface.cl#attributes"),
+        *either(f.screen_motion and f.motion.vertices, "shapes/surface.cl#deforms"),
         *either(f.geometry.normals or f.geometry.uvs or f.geometry.tangents, "shapes/triangle.cl"),
         *either(f.geometry.analytic, "shapes/analytic.cl"),
     ),
     "generated/corner_rows.cl": lambda f, _: (
-        f"shapes/corner_rows{'_keyed' * _corners_move(f)}.cl",
+        f"shapes/triangle.cl#{'keyed' if _corners_move(f) else 'still'}_rows",
     ),
     "generated/triangle_steps.cl": lambda f, _: (
-        *either(f.geometry.normals, "shapes/triangle_normal.cl"),
-        *either(f.geometry.uvs, "shapes/triangle_uv.cl"),
+        *either(f.geometry.normals, "shapes/triangle.cl#normal"),
+        *either(f.geometry.uvs, "shapes/triangle.cl#uv"),
         *either(
             f.geometry.tangents and f.textures.mappings and f.textures.attributes,
-            "shapes/second_uv.cl",
+            "shapes/triangle.cl#second_uv",
         ),
         *either(
             f.geometry.uvs and f.geometry.tangents and f.geometry.vertex_tangents,
-            "shapes/triangle_tangents.cl",
+            "shapes/triangle.cl#tangents",
         ),
     ),
-    "generated/uv_tangents.cl": lambda f, _: either(f.geometry.tangents, "shapes/uv_tangents.cl"),
+    "generated/uv_tangents.cl": lambda f, _: either(
+        f.geometry.tangents, "shapes/triangle.cl#uv_tangents"
+    ),
     "generated/analytic_steps.cl": lambda f, _: (
-        *either(f.motion.shapes, "shapes/shape_motion.cl"),
-        *either(f.screen_motion and f.motion.spheres, "shapes/spheres_move.cl"),
-        *either(f.geometry.tangents, "shapes/analytic_tangents.cl"),
+        *either(f.motion.shapes, "shapes/analytic.cl#motion"),
+        *either(f.screen_motion and f.motion.spheres, "shapes/analytic.cl#spheres_move"),
+        *either(f.geometry.tangents, "shapes/analytic.cl#tangents"),
     ),
     "generated/instances.cl": lambda f, _: ("tracing/instances.cl",) * f.geometry.instances,
     "generated/motion.cl": lambda f, _: (
         *either(f.motion.present, "motion/motion.cl"),
-        *when(f.motion.vertices or f.motion.spheres, "motion/vertex_keys.cl"),
+        *when(f.motion.vertices or f.motion.spheres, "motion/motion.cl#vertex_keys"),
     ),
     "generated/keyed_layout.cl": lambda f, layout: (
-        (f"bvh/{layout}_keyed.cl",) * (f.motion.vertices and layout != "brute")
+        (f"bvh/{layout}.cl#keyed",) * (f.motion.vertices and layout != "brute")
     ),
     "generated/instance_traversal.cl": lambda f, layout: (
         (
-            f"tracing/instances_{'few' if f.geometry.few_instances else layout}.cl",
-            "tracing/trace_instances.cl",
+            f"tracing/instances.cl#{'few' if f.geometry.few_instances else layout}",
+            "tracing/instances.cl#hits",
         )
         * f.geometry.instances
     ),
@@ -272,30 +288,30 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         *either(weighs, "transport/mis_ratio.cl"),
     ),
     "generated/mis_ratio_steps.cl": lambda f, cls: (
-        *either(f.transport.merged, "transport/mis_ratio_merging.cl"),
-        *either(f.transport.joined and not cls.delta, "transport/mis_ratio_camera.cl"),
+        *either(f.transport.merged, "transport/mis_ratio.cl#merging"),
+        *either(f.transport.joined and not cls.delta, "transport/mis_ratio.cl#camera"),
     ),
     "generated/mis_merging_area.cl": lambda f, cls: (
-        f"transport/mis_merging_area{'_along' * cls.is_phase}.cl",
+        f"transport/mis_ratio.cl#area{'_along' * cls.is_phase}",
     ),
     "generated/hero_steps.cl": lambda f, cls: (
         *either(
-            f.ratios and flags.is_chromatic(f, cls) and f.spectra.spectral, "spectra/hero_weighs.cl"
+            f.ratios and flags.is_chromatic(f, cls) and f.spectra.spectral, "spectra/hero.cl#weighs"
         ),
-        *either(f.told_dispersion, "spectra/hero_alone.cl"),
+        *either(f.told_dispersion, "spectra/hero.cl#alone"),
         *(
             either(
                 flags.is_chromatic(f, cls) and (f.told_dispersion or cls.is_phase),
-                "transport/mis_pdf.cl",
+                "materials/bsdf.cl#mis_pdf",
             )
             if f.transport.balanced and not flags.is_null(f, cls)
-            else ("transport/mis_pdf_unused.cl",)
+            else ("materials/bsdf.cl#no_mis_pdf",)
         ),
     ),
-    "generated/pair.cl": lambda f, cls: ("materials/pair.cl",),
+    "generated/pair.cl": lambda f, cls: ("materials/bsdf.cl#pair",),
     "generated/guide.cl": lambda f, cls: (
         (
-            f"transport/guiding/at_{'collision' if cls.is_phase else 'surface'}.cl",
+            f"transport/guiding/guide.cl#at_{'collision' if cls.is_phase else 'surface'}",
             "transport/guiding/guided_vertex.cl",
         )
         if flags.is_guided(f, cls) and not f.transport.light_paths
@@ -312,21 +328,23 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
     ),
     "generated/light_path_steps.cl": lambda f, cls: (
         *either(f.transport.joined and not cls.delta, "integrator/steps/join_camera.cl"),
-        *either(flags.asks_chance(f, cls), "transport/mis_ratio_chosen.cl"),
+        *either(flags.asks_chance(f, cls), "transport/mis_ratio.cl#chosen"),
         *either(f.dull_paths_end and not cls.delta, "integrator/steps/dull_goes_on.cl"),
         "integrator/steps/adjoint_weight.cl",
         *either(not flags.is_null(f, cls), "integrator/steps/light_path_roulette.cl"),
     ),
     "generated/scout.cl": lambda f, cls: either(f.scouts and not cls.is_phase, "film/scout.cl"),
     "generated/vertex_steps.cl": lambda f, cls: (
-        *either(f.names_surfaces, "transport/vertex_names.cl"),
+        *either(f.names_surfaces, "transport/vertex.cl#names"),
         *(
-            when(f.media.bodies, "media/vertex_bodies_ways.cl")
-            or either(f.media.absorbing, "media/vertex_media_ways.cl")
+            when(f.media.bodies, "media/vertex_ways.cl#bodies")
+            or either(f.media.absorbing, "media/vertex_ways.cl#media")
         ),
-        *either(flags.between_bodies(f, cls), "media/between_bodies.cl"),
-        *either(flags.has_lobe(f, cls, "clearcoat_apart"), "materials/coat_normal.cl"),
-        *either(flags.has_lobe(f, cls, "anisotropy"), "materials/anisotropy.cl"),
+        *either(flags.between_bodies(f, cls), "media/bodies.cl#between"),
+        *either(
+            flags.has_lobe(f, cls, "clearcoat_apart"), "materials/shading_frame.cl#coat_normal"
+        ),
+        *either(flags.has_lobe(f, cls, "anisotropy"), "materials/shading_frame.cl#anisotropy"),
     ),
 }
 
@@ -344,17 +362,17 @@ def _corners_move(features: Features) -> bool:
 
 
 def _passing(features: Features) -> str:
-    """Return the end of the name of the file that tells which light passes."""
+    """Return the step that tells which light passes."""
     if features.shadow_media:
-        return "_media"
-    return "" if features.materials.null_surfaces else "_opaque"
+        return "media"
+    return "surfaces" if features.materials.null_surfaces else "opaque"
 
 
 def _spectrum_read(features: Features) -> tuple[str, ...]:
     """The look-up of spectra, and in spectral mode how the camera draws wavelengths."""
-    read = f"spectra/{features.spectra.mode}_read.cl"
-    drawn = f"spectra/{'density' if features.spectra.tabulated_density else 'visible'}.cl"
-    return (read, drawn) if features.spectra.spectral else (read,)
+    read = f"spectra/{features.spectra.mode}.cl#read"
+    step = "density" if features.spectra.tabulated_density else "visible"
+    return (read, *when(features.spectra.spectral, f"spectra/wavelengths.cl#{step}"))
 
 
 def virtual_files(features: Features, layout: str) -> dict[str, tuple[str, ...]]:

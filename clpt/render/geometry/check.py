@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from clpt.errors import SceneError
 from clpt.geometry import analytic, refining, shapes, triangles
-from clpt.render.textures.check import check_image
+from clpt.scene.pixels import check_image
 from clpt.scene.shapes import Cylinder, Mesh, Shape, Sphere, Spheres
 from clpt.scene.textures import attributes_in
 

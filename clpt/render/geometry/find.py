@@ -29,9 +29,7 @@ from clpt.geometry.motion import Motions
 from clpt.records import SHAPE, SHAPE_BITS
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex
-from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape
-from clpt.scene.textures import Texture
 
 LEAST_RADIUS = 1e-12  # of a sphere around a scene [m]
 SWEPT_CELLS = 4  # of the hull of a moving instance, see `instancing.hull_points`
@@ -105,8 +103,13 @@ class Geometry:
     warnings: tuple[str, ...]
     keys: Mapping[int, int] = field(default_factory=dict)
 
+    @property
+    def keyed(self) -> bool:
+        """Whether vertices have a row for each of several keys."""
+        return any(count > 1 for count in self.keys.values())
+
     def bounding_sphere(self) -> tuple[NDArray[np.float64], float]:
-        """Return centre and radius of a sphere around the scene; a unit one if it is empty.
+        """Return centre and radius of a sphere around the scene; the unit sphere if it is empty.
 
         Raises SceneError for a scene whose size is beyond float32.
         """
@@ -231,8 +234,7 @@ class _Builder:
         if shape.emission is not None:
             count = len(times) if _in_triangles(shape) else 1
             self.emitters.append(Emitter(shape, len(self.rows), *corners, keys=max(count, 1)))
-            values = fields_of(shape.emission).values()
-            self.uvs |= any(isinstance(value, Texture) for value in values)
+            self.uvs |= shape.emission.has_textures
         self.rows.append(row)
         self.stored.append(stored)
 

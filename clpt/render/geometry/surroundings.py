@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.geometry import shapes, winding
 from clpt.geometry.motion import AT_ONCE, corners
-from clpt.geometry.triangles import at_time
 from clpt.geometry.winding import box
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.scene import Film, Scene
@@ -212,7 +211,7 @@ def stands_still(bounding: Sequence[Shape]) -> bool:
 
 
 def camera_origin(camera: Camera, film: Film, time: float) -> NDArray[np.float64]:
-    """Return the point (3,) [m] from which a camera sees at a time [s], see `Camera.view_point`."""
+    """Return a camera's `view_point` (3,) [m] at a time [s]."""
     origin = camera.view_point(film.width, film.height)
     if camera.motion is None:
         return origin
@@ -227,7 +226,7 @@ def moment(camera: Camera, time: float | None = None) -> float:
 
 def _deformed(shape: Shape, time: float) -> Shape:
     """Return a shape with its points at a time, before its `motion`."""
-    return shape if shape.deformation is None else at_time(shape, time)
+    return shape if shape.deformation is None else shape.at_time(time)
 
 
 def _swept_box(

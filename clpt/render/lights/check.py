@@ -12,11 +12,12 @@ from clpt import transforms
 from clpt.arrays import fits_single
 from clpt.errors import SceneError
 from clpt.render.records.lights import IMAGE_RECORDS, INFINITE, PROJECTED_RECORDS, RECORDS
-from clpt.render.textures.check import check_image, check_textures
 from clpt.scene import roles
 from clpt.scene.lights import Light, with_emission
-from clpt.scene.params import Texture, fields_of, params
+from clpt.scene.params import fields_of, params
+from clpt.scene.pixels import check_image
 from clpt.scene.roles import Role
+from clpt.scene.textures import check_textures
 
 SHEAR = 1e-5  # largest cosine between axes that are at right angles
 
@@ -38,16 +39,10 @@ def check_light(lamp: Light) -> None:
             PLACES[param.role](lamp, values[name], f"{lamp.kind}.{name}")
 
 
-def record_of(lamp: Light) -> str:
-    """Return the name of a lamp's record: a spot with an image has a record of its own."""
-    throws = lamp.kind == "spot" and isinstance(fields_of(lamp)["image"], Texture)
-    return "image_spot" if throws else lamp.kind
-
-
 def _check_matrix(lamp: Light, value: ArrayLike, where: str) -> None:
     if lamp.kind in INFINITE:
         rotation(lamp)
-    elif record_of(lamp) in PROJECTED_RECORDS:
+    elif lamp.record in PROJECTED_RECORDS:
         unsheared(value, where)
     else:
         placement(value, where)

@@ -1,4 +1,6 @@
-"""The contents of a renderer's film as a single value, which a single assignment replaces.
+"""The contents of a renderer's film as a single value, and the lock around its methods.
+
+A single assignment replaces the contents.
 
 An exception can come at any line: Ctrl-C raises it wherever the main thread is. So while a film
 changes, a `Change` replaces its `Contents`. The last assignment of a change sets the new contents.
@@ -9,18 +11,24 @@ fails too, the change stays, and the renderer says that it is broken.
 from __future__ import annotations
 
 import datetime
+import functools
 import logging
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import TracebackType
+from typing import Concatenate, NoReturn, ParamSpec, TypeVar
 
 from clpt.device import Device, forking
 from clpt.errors import DeviceError
 from clpt.render.film.saved_film import Session
 from clpt.render.film.state import Ranges
-from clpt.render.makers.locking import DeviceOwner
 from clpt.render.wavefront.adaptive import Adaptive
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+_S = TypeVar("_S", bound="FilmOwner")
 
 log = logging.getLogger(__name__)
 
@@ -45,6 +53,9 @@ class Contents:
     began: str = field(default_factory=_now)
 
 
+Settle = Callable[[BaseException | None], Contents]  # ends a change; see `FilmOwner._change`
+
+
 class Change:
     """A change of a film, as a context manager; see `FilmOwner._change`."""
 
@@ -53,7 +64,7 @@ class Change:
         owner: FilmOwner,
         name: str,
         former: Contents,
-        finish: Callable[[BaseException], Contents] | None,
+        finish: Settle | None,
         heals: bool,
     ):
         self._owner, self._name, self.former = owner, name, former
@@ -68,7 +79,7 @@ class Change:
 
     @contextmanager
     def beginning_unless(self, *refusals: type[BaseException]) -> Iterator[None]:
-        """Begin, but not if one of these errors ends the block: then nothing has changed."""
+        """Begin, unless an error of these types ends the block: then nothing has changed."""
         self.begin()
         try:
             yield
@@ -117,12 +128,30 @@ class Change:
         )
 
 
-class FilmOwner(DeviceOwner):
-    """Base of renderers, which own the contents of a film."""
+class FilmOwner:
+    """Base of renderers, which own the contents of a film.
+
+    Their `synchronized` methods exclude each other, and raise DeviceError after `close`.
+    """
 
     def __init__(self) -> None:
-        super().__init__()
+        self._lock = forking.renewed(threading.RLock())  # a callback may call back
+        self._closed = False
         self._contents: Contents | Change = Contents()
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            f"a {type(self).__name__} is on its device and can be neither pickled nor copied; "
+            "pickle its scene and make another one of it"
+        )
+
+    @property
+    def _inside(self) -> bool:
+        """Whether this thread is within a method of the object."""
+        return bool(self._lock._is_owned())  # type: ignore[attr-defined]
+
+    def _closed_error(self) -> DeviceError:
+        return DeviceError(f"this {type(self).__name__} is closed; make another one")
 
     @property
     def _settled(self) -> Contents:
@@ -144,7 +173,7 @@ class FilmOwner(DeviceOwner):
     def _change(
         self,
         name: str,
-        finish: Callable[[BaseException], Contents] | None = None,
+        finish: Settle | None = None,
         *,
         heals: bool = True,
     ) -> Change:
@@ -156,14 +185,15 @@ class FilmOwner(DeviceOwner):
         """
         return Change(self, name, self._settled, finish, heals)
 
-    def _healing(self, name: str, finish: Callable[[BaseException], Contents]) -> Change:
+    def _healing(self, name: str, finish: Settle) -> Change:
         """Return a change as `_change` does, also for a broken renderer."""
         now = self._contents
         former = now.former if isinstance(now, Change) else now
         return Change(self, name, former, finish, heals=True)
 
     def _check_healing(self, inside: bool) -> None:
-        super()._check_healing(inside)
+        """Raise DeviceError if `reset` cannot repair it."""
+        self._check_open()
         if isinstance(self._contents, Change):
             if inside:
                 raise self._contents.unfinished()
@@ -176,11 +206,60 @@ class FilmOwner(DeviceOwner):
         raise NotImplementedError
 
     def _check_open(self) -> None:
-        super()._check_open()
+        """Raise DeviceError after `close`, and in a forked process."""
+        if self._closed:
+            raise self._closed_error()
         for device in self.devices:
             forking.check(device.queue)
 
     def _check(self, inside: bool) -> None:
-        super()._check(inside)
+        """Raise DeviceError if it cannot be used; inside: within a method of the object."""
+        self._check_open()
         if isinstance(self._contents, Change) and not inside:
             raise self._contents.failure()
+
+
+def synchronized(
+    method: Callable[Concatenate[_S, _P], _R], *, heals: bool = False
+) -> Callable[Concatenate[_S, _P], _R]:
+    """Return a method that excludes other threads.
+
+    It raises DeviceError after `close`, and for a broken object unless `heals`.
+    """
+
+    def locked(self: _S, /, *args: _P.args, **named: _P.kwargs) -> _R:
+        inside = self._inside
+        with self._lock:
+            (self._check_healing if heals else self._check)(inside)
+            return method(self, *args, **named)
+
+    functools.update_wrapper(locked, method)
+    return locked
+
+
+def healing(method: Callable[Concatenate[_S, _P], _R]) -> Callable[Concatenate[_S, _P], _R]:
+    """Return a synchronized method that repairs a broken object."""
+    return synchronized(method, heals=True)
+
+
+class Stop:
+    """A request to stop a run.
+
+    It is a threading.Event without a lock: the handler of a signal that interrupted the holder of
+    the lock would wait for ever.
+    """
+
+    def __init__(self) -> None:
+        self._wanted = False
+
+    def set(self) -> None:
+        """Request a stop."""
+        self._wanted = True
+
+    def clear(self) -> None:
+        """Withdraw the request."""
+        self._wanted = False
+
+    def is_set(self) -> bool:
+        """Return whether a stop is requested."""
+        return self._wanted

@@ -15,17 +15,19 @@ from numpy.typing import NDArray
 
 from clpt import device as dev
 from clpt.errors import SceneError
+from clpt.render.edit.plan import Plan
 from clpt.render.film.state import FilmState, Ranges
-from clpt.render.makers.contents import Contents
-from clpt.render.makers.device_film import Apply, Changes, DeviceFilm
+from clpt.render.makers import planning
+from clpt.render.makers.contents import Contents, Settle
+from clpt.render.makers.device_film import DeviceFilm
+from clpt.render.makers.planning import Changes
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.tracer import Tracer
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Plain
-from clpt.scene.integrators import Integrator
 
-Settle = Callable[[BaseException | None], Contents]
+Tick = Callable[[], bool]  # returns whether a call goes on
 
 
 class Discarded(Exception):
@@ -117,7 +119,7 @@ class Maker(ABC):
         """
 
     @abstractmethod
-    def run(self, call: Call, adaptive: Adaptive | None, tick: Callable[[], bool]) -> bool:
+    def run(self, call: Call, adaptive: Adaptive | None, tick: Tick) -> bool:
         """Add samples to the film; return whether all were added.
 
         tick: called repeatedly; if it returns False the call ends soon.
@@ -179,17 +181,12 @@ class Maker(ABC):
         """Empty the film; seed: of later samples; recover: after an error at any line."""
         self.home.empty(seed=seed, recover=recover)
 
-    def update(self, changes: Changes, events: dev.Events, apply: Apply) -> None:
-        """Render another scene from now on.
+    def plan(self, changes: Changes, events: dev.Events = None) -> Plan | None:
+        """Return the plan of a changed scene; None if nothing is to be written.
 
-        events: to wait for before arrays of the changes are read; apply: calls the function that
-        writes a change, see `FilmRenderer._apply`.
+        events: to wait for before arrays of the changes are read. Raises as `Renderer.update` does.
         """
-        self.home.update(changes, events, apply)
-
-    def follow(self, way: Integrator, apply: Apply) -> None:
-        """Render with another integrator, which made a saved film; see `update`."""
-        self.home.follow(way, apply)
+        return planning.plan(self.home, changes, events)
 
     def close(self) -> None:
         """Release the devices' memory."""

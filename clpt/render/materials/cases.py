@@ -153,12 +153,15 @@ class Table:
 
 TABLES: dict[Role, Table] = {
     roles.ANGULAR: Table(
-        "angular_load", "materials/angular_table.cl", "materials/angular_load.cl", counted=False
+        "angular_load",
+        "materials/angular_table.cl",
+        "materials/angular_table.cl#load",
+        counted=False,
     ),
     roles.MEASUREMENT: Table(
-        "measurement_load", "materials/measurement.cl", "materials/measurement_load.cl"
+        "measurement_load", "materials/measurement.cl", "materials/measurement.cl#load"
     ),
-    roles.MERL: Table("merl_load_table", "materials/merl_table.cl", "materials/merl_load.cl"),
+    roles.MERL: Table("merl_load_table", "materials/merl_table.cl", "materials/merl_table.cl#load"),
 }
 # the loads of members that are neither spectra nor numbers
 LOADS: dict[Role, Callable[[_Read], str]] = {

@@ -22,7 +22,6 @@ from clpt.scene import roles
 from clpt.scene.materials import Material
 from clpt.scene.params import (
     Kind,
-    Texture,
     device_params,
     fields_of,
     interior_params,
@@ -30,6 +29,7 @@ from clpt.scene.params import (
     place_of,
 )
 from clpt.scene.roles import Param, Role, Spectral
+from clpt.scene.texture_values import is_texture
 from clpt.spectra import RGB, Constant, Sensor, Tabulated
 
 BLACK = (Constant(0.0), RGB(0.0, 0.0, 0.0))
@@ -66,11 +66,6 @@ class Encoder:
     def look(self) -> Look:
         """The film's wavelengths, for the brightness of lights that are images."""
         return Look(self.spectra.spectral, *self.spectra.range, self.cache)
-
-    @property
-    def second_uv(self) -> tuple[int, int]:
-        """See `TextureTable.second_uv`."""
-        return self.textures.second_uv
 
     @property
     def sources(self) -> Sources:
@@ -156,9 +151,8 @@ class Encoder:
 
         owner: the kind with this parameter, if any.
         """
-        if isinstance(value, Texture):
-            value = self.textures.folded(value, param.role)
-        if isinstance(value, Texture):
+        value = self.textures.folded(value, param.role)
+        if is_texture(value):
             texture_words = np.zeros(words(param), np.uint32)
             texture_words[-1] = 1 + self.textures.row(value, param.role)
             return texture_words, "texture"

@@ -29,11 +29,19 @@ HIGHEST = 3.0  # the largest index of the tables
 BOUNCE = 0.77  # cosine of light within a coat, see kernels/materials/kinds/coated_conductor.cl
 _RADII, _AZIMUTHS = leggauss(40), 48
 
+NODES_HEAD = "/* Where the tables of rough coats and facets have their nodes. */\n"
 HEAD = """\
 /* Integrals over the normals of a rough coat, by distribution, roughness and index, made by
  * `python -m clpt.render.materials.rough_coat_table`, which has their formulas. A word holds a
  * number and, in its upper half, the next along the last axis; `_UNIT`: what 1 of them means. */
 """
+FACETS_HEAD = """\
+/* Integrals over the normals of GGX facets by roughness and index, made as those of coats. */
+"""
+FACETS = {  # of GGX alone
+    "turned": "1, and what facets reflect less what a smooth boundary does, by cosine too",
+    "turned_mean": "What facets reflect of diffuse light from outside",
+}
 DOCS = {
     "passed": "Transmittance over a smooth coat's, by cosine too",
     "inside": "Reflectance for diffuse light below",
@@ -181,9 +189,25 @@ def _thrown(distribution: str, alpha: float, eta: float) -> Floats:
     return 1.0 + thrown_back(distribution, alpha, eta, cos_i) - fresnel(cos_i, eta)
 
 
+def _turned(alpha: float, eta: float) -> Floats:
+    """Return 1 and what facets reflect less what a smooth boundary does, (COSINES,)."""
+    cos_i = cosines(alpha)
+    return 1.0 + reflectance("ggx", alpha, eta, cos_i) - fresnel(facing(cos_i, alpha), eta)
+
+
+def turned_mean(alpha: float, eta: float) -> float:
+    """Return the share of diffuse light from outside that GGX facets reflect."""
+    nodes, weights = leggauss(32)
+    root = 0.5 * (nodes + 1.0)  # of the cosine
+    turned = reflectance("ggx", alpha, eta, root**2)
+    return float((weights * 2.0 * root**3 * turned).sum())
+
+
 def computed() -> Kept:
-    """Return the tables by name, in the order of DOCS: a minute of work."""
+    """Return the tables by name, in the order of DOCS and FACETS: a minute of work."""
     tables = {
+        "turned": np.array([[_turned(a, e) for e in indices()] for a in alphas()]),
+        "turned_mean": np.array([[turned_mean(a, e) for e in indices()] for a in alphas()]),
         "passed": _rows(_passed),
         "inside": _rows(inside_reflectance),
         "bounce": _bounces(),
@@ -216,10 +240,8 @@ def _array(name: str, doc: str, shares: NDArray[np.uint16], most: float) -> str:
     return "\n".join([*lines, "};", ""])
 
 
-@functools.cache
-def text() -> str:
-    """Return the text of the kept tables, as kernels/materials/rough_coat.cl reads them."""
-    tables = kept()
+def nodes_text() -> str:
+    """Return the text of the tables' sizes, as kernels/materials/coat_cell.cl reads them."""
     scale = (INDICES - 1) / np.sqrt(1.0 - 1.0 / HIGHEST)
     numbers = {
         "COAT_ALPHAS": ALPHAS,
@@ -228,15 +250,26 @@ def text() -> str:
         "COAT_STEEPS": STEEPS,
         "COAT_INDEX_SCALE": f"{scale:.9g}f",
     }
-    rows = [f"#define {name} {value}\n" for name, value in numbers.items()]
-    for name, doc in DOCS.items():
-        rows.append(_array(f"coat_{name}", doc, tables[name], float(tables[f"{name}_most"])))
-    return HEAD + "".join(rows)
+    return NODES_HEAD + "".join(f"#define {name} {value}\n" for name, value in numbers.items())
 
 
+def _arrays(prefix: str, docs: dict[str, str]) -> str:
+    tables = kept()
+    rows = (
+        _array(f"{prefix}_{name}", doc, tables[name], float(tables[f"{name}_most"]))
+        for name, doc in docs.items()
+    )
+    return "".join(rows)
+
+
+@functools.cache
 def virtual_files() -> dict[str, str]:
-    """Return the generated file that kernels/materials/rough_coat.cl includes."""
-    return {"generated/rough_coat_table.cl": text()}
+    """Return the generated files that coat_cell, rough_coat and facet_reflectance.cl include."""
+    return {
+        "generated/coat_nodes.cl": nodes_text(),
+        "generated/rough_coat_table.cl": HEAD + _arrays("coat", DOCS),
+        "generated/facet_reflectance_table.cl": FACETS_HEAD + _arrays("facet", FACETS),
+    }
 
 
 if __name__ == "__main__":

@@ -23,7 +23,6 @@ from clpt.render.records.materials import FILM_COSINES, row_words
 from clpt.scene import roles
 from clpt.scene.materials import Layer
 from clpt.scene.params import Kind, params
-from clpt.scene.textures import Texture
 from clpt.spectra import Spectrum, cie
 from clpt.spectra.spectrum import d65
 
@@ -31,8 +30,8 @@ THICKNESS_STEP = 4.0  # [nm] of the table, where a texture varies the thickness
 MOST_ROWS = 1024
 
 Sources = Mapping[str, frozenset[str]]
-_WAVES = '#include "materials/layers_waves.cl"\n#include "materials/boundary_film.cl"\n'
-_TABLE = '#include "materials/layers_table.cl"\n#include "materials/boundary_table.cl"\n'
+_WAVES = '#include "materials/boundary.cl#film_layers"\n#include "materials/boundary.cl#film"\n'
+_TABLE = '#include "materials/boundary.cl#table_layers"\n#include "materials/boundary.cl#table"\n'
 
 _ZERO = spectra.Constant(0.0)
 
@@ -46,7 +45,7 @@ def boundary_text(cls: type[Kind], mode: str, sources: Sources, layer: Sources) 
     if not coated:
         return ""
     if not any("layers" in sources.get(name, ()) for name in coated):
-        return '#include "materials/boundary_bare.cl"\n'
+        return '#include "materials/boundary.cl#bare"\n'
     if mode == "rgb":
         profile = value_text("film_profile", params(Layer)["profile"], layer["profile"])
         return f"{profile}#define FILM_COSINES {FILM_COSINES}\n{_TABLE}"
@@ -62,7 +61,7 @@ def film_colours(material: Kind) -> NDArray[np.float32]:
     of the thickness the table has a single profile.
     """
     layers: tuple[Any, ...] = material.layers  # type: ignore[attr-defined]
-    textured = [layer for layer in layers if _textured(layer)]
+    textured = [layer for layer in layers if layer.has_textures]
     thickest = max((layer.thickness for layer in textured), default=0.0)
     count = int(np.clip(np.ceil(thickest / THICKNESS_STEP) + 1, 2, MOST_ROWS)) if textured else 1
     lambdas = cie.GRID[:: 5 if textured else 1]
@@ -74,7 +73,7 @@ def film_colours(material: Kind) -> NDArray[np.float32]:
         step = 1 if above is parts[0][0] else -1  # from inside the layers are met in reverse
         indices = [above, *films[::step], below]
         for row, profile in enumerate(np.linspace(0.0, 1.0, count) if textured else [1.0]):
-            thick = [e.thickness * (profile if _textured(e) else e.profile) for e in layers]
+            thick = [e.thickness * (profile if e.has_textures else e.profile) for e in layers]
             r, t = film_shares(indices, thick[::step], tangential, lambdas)
             table[part, row] = np.clip(np.hstack([r @ weights, t @ weights]), 0.0, 1.0)
     return table
@@ -126,14 +125,10 @@ def film_shares(
     return r_sum, t_sum
 
 
-def _textured(layer: Layer) -> bool:
-    return isinstance(layer.profile, Texture)
-
-
 def profile(material: Kind) -> Any:
     """Return the texture that varies the thickness of a material's layers, 1 without a texture."""
     layers: tuple[Layer, ...] = material.layers  # type: ignore[attr-defined]
-    return next((layer.profile for layer in layers if _textured(layer)), 1.0)
+    return next((layer.profile for layer in layers if layer.has_textures), 1.0)
 
 
 def _complex(eta: Spectrum | str, k: Spectrum | str, lambdas: Array) -> Array:

@@ -91,7 +91,7 @@ def _deformations(motions: Motions, count: int, first: int) -> NDArray[np.float3
     """Return for each shape the first word of its steps, and the steps of all shapes.
 
     The words of a shape are the number of steps, then each step's begin [s] and inverse length
-    [1/s]. A shape that does not deform has no steps. See kernels/motion/vertex_keys.cl.
+    [1/s]. A shape that does not deform has no steps. See kernels/motion/motion.cl.
     """
     places, parts, at = np.full(count, first + count, np.int32), [np.zeros(3, np.float32)], 3
     first_words: dict[tuple[float, ...], int] = {}

@@ -71,7 +71,7 @@ class GridFeatures:
     hot: bool = False  # some have a temperature
     tinted: bool = False  # some have an albedo on a grid
     coloured: bool = False  # some have colours of their extinction on a grid
-    mixed: int = flag("GRIDS_MIXED", 0)  # parts of the one that is made of most
+    mixed: int = flag("GRIDS_MIXED", 0)  # most parts of a mixture
     bytes: bool = False  # some have 8 bits for each number
 
 
@@ -108,7 +108,7 @@ class MotionFeatures:
 
     camera: bool = False
     instances: bool = flag("MOVES_INSTANCES")
-    shapes: bool = False  # analytic ones
+    shapes: bool = False  # analytic shapes
     lights: bool = False
     vertices: bool = flag("MOVES_VERTICES")  # have a row for each key
     spheres: bool = flag("MOVES_SPHERES")  # of shapes `spheres` have a row for each key
@@ -118,7 +118,7 @@ class MotionFeatures:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """The names of what moves."""
+        """The names of the parts that move."""
         parts = (field.name for field in fields(self) if field.name not in ("scales", "row"))
         return tuple(name for name in parts if vars(self)[name])
 
@@ -151,7 +151,7 @@ class SpectraFeatures:
 
 @dataclass(frozen=True)
 class TransportFeatures:
-    """The integrator and the sampler, and what paths do; of one kind of paths of a scene."""
+    """The integrator, the sampler and the techniques of a single kind of paths."""
 
     integrator: str = "path"
     sampler: str = "sobol"
@@ -172,7 +172,7 @@ class TransportFeatures:
 
 @dataclass(frozen=True)
 class Features:
-    """Features of a scene, and of one kind of its paths, see `passes`."""
+    """Features of a scene, and of a single kind of its paths, see `passes`."""
 
     camera: CameraFeatures = CameraFeatures()
     film: FilmFeatures = FilmFeatures()
@@ -194,12 +194,12 @@ class Features:
         if not self.transport.weighed:
             return (self,)
         layers = replace(self.film.layers, names=self.film.layers.lights, material_numbers=0)
-        own = FilterFeatures(self.film.filter.kind, *self.transport.light_filter)
-        return self._from_lights(own, layers, self.group_words), self
+        light_filter = FilterFeatures(self.film.filter.kind, *self.transport.light_filter)
+        return self._from_lights(light_filter, layers, self.group_words), self
 
-    def _from_lights(self, own: FilterFeatures, layers: LayerFeatures, first: int) -> Features:
-        """The features of paths that start at lights beside those of the camera."""
-        film = replace(self.film, filter=own, layers=layers, first_word=first, alpha=False)
+    def _from_lights(self, filter_: FilterFeatures, layers: LayerFeatures, first: int) -> Features:
+        """The features of light paths beside paths from the camera."""
+        film = replace(self.film, filter=filter_, layers=layers, first_word=first, alpha=False)
         transport = replace(self.transport, integrator="particle_tracer", light_paths=True)
         return replace(self, film=film, transport=transport)
 
@@ -234,20 +234,24 @@ class Features:
 
     @property
     def dull_paths_end(self) -> bool:
-        """Whether most light paths end whose first surface is dull: others aim at what is sharp."""
+        """Whether roulette ends light paths at a first diffuse surface.
+
+        Other light paths are aimed at specular shapes.
+        """
         return self.transport.aimed and self.transport.balanced and not self.media.present
 
     @property
     def hemispheres(self) -> bool:
-        """Whether paths keep the side of a surface from which their direction was chosen."""
+        """Whether paths keep the hemisphere that their direction was sampled in."""
         weighed_there = self.transport.balanced and self.transport.light_paths
         return self.lights.infinite or self.lights.tree or weighed_there
 
     @property
     def shows_lights(self) -> bool:
         """Whether paths that start at lights join these to the camera."""
-        own = self.transport
-        return own.joined and own.light_paths and self.lights.visible and not own.weighed
+        transport = self.transport
+        starts = transport.joined and transport.light_paths and not transport.weighed
+        return starts and self.lights.visible
 
     @property
     def shadow_media(self) -> bool:
@@ -258,13 +262,13 @@ class Features:
     @property
     def light_media(self) -> bool:
         """Whether media are known around lights, as paths start there."""
-        own = self.transport
-        start = own.light_paths or own.weighed or own.guided
-        return self.media.present and start and not own.lit_ghosts
+        transport = self.transport
+        start = transport.light_paths or transport.weighed or transport.guided
+        return self.media.present and start and not transport.lit_ghosts
 
     @property
     def screen_motion(self) -> bool:
-        """Whether a layer tells how what is seen moves across the film, and anything may."""
+        """Whether there is a layer of motion across the film, and anything moves."""
         return "motion" in self.film.layers.names and self.motion.present
 
     @property
@@ -275,7 +279,7 @@ class Features:
 
     @property
     def scouts(self) -> bool:
-        """Whether paths go ahead to the first surface, as chance decides what others meet."""
+        """Whether extra paths look for the first surface, where chance decides which it is."""
         chance = self.media.present or self.materials.mixtures or self.materials.free_panes
         return self.film.layers.of_surfaces and bool(chance)
 
@@ -315,6 +319,6 @@ class Features:
 
     @property
     def footprint_words(self) -> int:
-        """Words of what a slot sums around its pixel, see kernels/film/splatting.cl."""
+        """Words of the sums of a slot around its pixel, see kernels/film/splatting.cl."""
         side = 2 * self.film.filter.reach + 1
         return side * side * 8 * (1 + self.film.alpha) if self.film_weights else 0

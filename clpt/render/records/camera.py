@@ -21,8 +21,8 @@ _PINHOLE = {
     "far": _FAR,
 }
 
-WEIGHTED = ("lens",)  # cameras whose rays have weights
-GHOST_CELLS = 1024  # of equal probability, from which pairs of reflecting surfaces are drawn
+WEIGHTED = ("lens", "rays")  # cameras whose rays have weights
+GHOST_CELLS = 1024  # of equal probability; a cell gives a pair of reflecting surfaces
 
 RECORDS: dict[str, Record] = {
     "perspective": Record("PerspectiveCamera", "A pinhole.", **_PINHOLE),
@@ -52,7 +52,7 @@ RECORDS: dict[str, Record] = {
         blade_normals=("integer", "where the blades' normals begin"),
         blade_distance=("real", "of a blade from the axis, in radii of the stop"),
         ghosts=("real", "share of samples that are reflected twice"),
-        ghost_cells=("integer", "where the pairs of surfaces begin that they are drawn from"),
+        ghost_cells=("integer", "where the pairs of reflecting surfaces begin"),
         rear_radius=("real", "on the rear plane, of rays that meet the last surface [m]"),
     ),
     "orthographic": Record(
@@ -73,6 +73,14 @@ RECORDS: dict[str, Record] = {
         near=("spectrum", "point on the near plane at x = y = 0, homogeneous"),
         near_x=("spectrum", "what it gains per x"),
         near_y=("spectrum", "and per y"),
+    ),
+    "rays": Record(
+        "RaysCamera",
+        "A list of rays, which follows.",
+        columns=("integer", "of the film"),
+        rows=("integer", "of the film"),
+        count=("integer", "of rays"),
+        list=("integer", "the list's first word, from columns on"),
     ),
 }
 
@@ -108,3 +116,8 @@ class CameraFeatures:
     def weighs(self) -> bool:
         """Whether its rays have weights."""
         return self.kind in WEIGHTED
+
+    @property
+    def listed(self) -> bool:
+        """Whether its pixels are entries of a list, and so no neighbours."""
+        return self.kind == "rays"

@@ -1,7 +1,7 @@
-"""Material kinds from outside of the package: where their text stands, and what they may be called.
+"""Material kinds from outside of the package: their OpenCL text and their valid names.
 
 A scene carries its classes itself: nothing is registered, and two scenes may have different kinds
-of one name.
+with the same name.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ def ordered(kinds: dict[type[Material], str]) -> tuple[type[Material], ...]:
     outside = sorted(kinds.keys() - set(LEAVES), key=lambda cls: cls.kind)
     for cls in outside:
         check(cls, kinds[cls])
-    for one, other in pairwise(outside):
-        if one.kind == other.kind:
+    for cls, other in pairwise(outside):
+        if cls.kind == other.kind:
             raise SceneError(
-                f"two classes are called {one.__name__!r}; rename one, or, if its definition was "
+                f"two classes are called {cls.__name__!r}; rename one, or, if its definition was "
                 "run twice, make the materials anew",
                 where=kinds[other],
             )
@@ -57,7 +57,7 @@ def check(cls: type[Material], where: str | None = None) -> None:
             "OpenCL functions",
             where=where,
         )
-    kinds = {*INNER, *(one.kind for listed in KINDS.values() for one in listed)}
+    kinds = {*INNER, *(cls.kind for listed in KINDS.values() for cls in listed)}
     names = {cls.__name__, *(f"{cls.kind}_{verb}" for verb in VERBS)}
     if taken := sorted({cls.kind} & kinds | names & _identifiers()):
         raise SceneError(
@@ -78,7 +78,7 @@ def check(cls: type[Material], where: str | None = None) -> None:
 
 
 def text(cls: type[Scatterer]) -> device.Part:
-    """Return a kind's OpenCL text, and the place at which compilers shall find faults with it.
+    """Return a kind's OpenCL text, with its file and line for compilers' messages.
 
     Raises SceneError for a file that cannot be read.
     """
@@ -90,22 +90,22 @@ def text(cls: type[Scatterer]) -> device.Part:
             return device.Part(path.read_text(encoding="utf-8"), path.as_posix())
         except (OSError, UnicodeDecodeError) as error:
             raise SceneError(f"{cls.__name__}.source cannot be read: {error}", file=path) from error
-    given = str(cls.source)
-    if "{" not in given:
+    source = str(cls.source)
+    if "{" not in source:
         raise SceneError(
-            f"{cls.__name__}.source is {given!r}, which is no OpenCL; a file is a pathlib.Path"
+            f"{cls.__name__}.source is {source!r}, which is no OpenCL; a file is a pathlib.Path"
         )
-    file, line = _place(given, Path(module)) if module else (f"{cls.__name__}.source", 1)
-    return device.Part(dedent(given), file, line)  # functions begin at the beginnings of lines
+    file, line = _place(source, Path(module)) if module else (f"{cls.__name__}.source", 1)
+    return device.Part(dedent(source), file, line)  # functions begin at the beginnings of lines
 
 
-def _place(given: str, module: Path) -> tuple[str, int]:
-    """The file and line where a text stands, if it stands in the Python file as it is."""
+def _place(source: str, module: Path) -> tuple[str, int]:
+    """The file and line of a text, if the Python file holds it unchanged."""
     try:
-        before, found, _ = module.read_text(encoding="utf-8").partition(given)
+        before, match, _ = module.read_text(encoding="utf-8").partition(source)
     except (OSError, UnicodeDecodeError):
-        found = ""
-    return (module.as_posix(), before.count("\n") + 1) if found else (f"{module.name}:source", 1)
+        match = ""
+    return (module.as_posix(), before.count("\n") + 1) if match else (f"{module.name}:source", 1)
 
 
 @cache

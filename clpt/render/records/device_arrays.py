@@ -12,7 +12,7 @@ from clpt.arrays import on_device
 from clpt.errors import SceneError
 from clpt.scene.params import fields_of
 
-# What shapes have of arrays: numbers in a row (0: the array is flat), and their type.
+# Arrays of shapes by name: numbers in a row (0: the array is flat), and their type.
 COLUMNS: dict[str, tuple[int, type]] = {
     "vertices": (3, np.float32),
     "normals": (3, np.float32),
@@ -25,7 +25,7 @@ COLUMNS: dict[str, tuple[int, type]] = {
 
 
 def is_table(values: object, kind: str) -> bool:
-    """Return whether values are an array on a device as a table is, of words of a numpy kind."""
+    """Return whether values are a device array that can be a table; kind: numpy kinds of words."""
     return (
         isinstance(values, cl_array.Array)
         and values.dtype.itemsize == 4
@@ -36,14 +36,14 @@ def is_table(values: object, kind: str) -> bool:
 
 
 def fresh_view(values: Any) -> Any:
-    """Return another object for the same memory on a device: what it holds may be other now."""
+    """Return another object for the same memory on a device, whose contents may have changed."""
     if isinstance(values, cl_array.Array):
         return values.view()
     return cl.Buffer.from_int_ptr(values.int_ptr)
 
 
 def as_array(values: Any, name: str, queue: cl.CommandQueue, where: str) -> Any:
-    """Return what `on_host` can read: a buffer as an array of a shape's COLUMNS, on the queue.
+    """Return an array that `on_host` can read: of a buffer an array of COLUMNS, on the queue.
 
     Host arrays come back as they are. Raises SceneError for memory of another context, and for a
     buffer of no whole number of rows.
@@ -72,12 +72,12 @@ def as_array(values: Any, name: str, queue: cl.CommandQueue, where: str) -> Any:
 
 
 def readable(shape: Any, queue: cl.CommandQueue, where: str) -> dict[str, Any]:
-    """Return those fields of a shape that `shaped` makes other objects of."""
+    """Return the fields of a shape that `as_array` replaces, by name."""
     fields = {name: value for name, value in fields_of(shape).items() if name in COLUMNS}
-    made = {name: as_array(values, name, queue, where) for name, values in fields.items()}
-    changed = {name: values for name, values in made.items() if values is not fields[name]}
-    given = shape.attributes
-    own = {name: as_array(values, name, queue, where) for name, values in given.items()}
-    if any(own[name] is not given[name] for name in given):
-        changed["attributes"] = own
+    arrays = {name: as_array(values, name, queue, where) for name, values in fields.items()}
+    changed = {name: values for name, values in arrays.items() if values is not fields[name]}
+    former = shape.attributes
+    attributes = {name: as_array(values, name, queue, where) for name, values in former.items()}
+    if any(attributes[name] is not former[name] for name in former):
+        changed["attributes"] = attributes
     return changed

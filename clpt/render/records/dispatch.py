@@ -1,4 +1,4 @@
-"""Dispatch in lanes: OpenCL text that does for each kind what only the lanes of that kind need.
+"""Dispatch in lanes: OpenCL text that serves each kind in the lanes of that kind.
 
 Lanes may differ in their kind, so a `switch` cannot choose. A case is skipped where no lane has its
 kind; else all lanes compute it, and a mask chooses which of them keep it. A lane without the kind
@@ -7,6 +7,7 @@ must still read valid memory: `active` gives it index 0.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -17,13 +18,18 @@ from clpt.layout import select_name
 class Case:
     """A value for some lanes.
 
-    test: the mask of these lanes; "": all. value: an expression, in which `m` is that mask. before:
-    statements that the value needs.
+    test: the mask of these lanes; "": all. value: an expression that may use the mask as `m`.
+    before: statements that the value needs.
     """
 
     test: str
     value: str
     before: tuple[str, ...] = ()
+
+    @property
+    def in_all_lanes(self) -> bool:
+        """Whether it needs no mask."""
+        return not self.test and not re.search(r"\bm\b", " ".join((self.value, *self.before)))
 
 
 @dataclass(frozen=True)
@@ -31,7 +37,7 @@ class Function:
     """A function whose value is that of the last case that holds, in every lane.
 
     signature: type, name and parameters; otherwise: the value where no case holds; before:
-    statements that the cases need; result: what is made of `value`.
+    statements that the cases need; result: the returned expression of `value`.
     """
 
     signature: str
@@ -42,9 +48,13 @@ class Function:
 
     def text(self) -> str:
         """Return the definition."""
-        type_ = self.signature.split()[0]
+        type_, cases = self.signature.split()[0], [*self.cases]
         body = [*self.before, f"{type_} value = {self.otherwise};"]
-        body += choose("value", type_, *self.cases)
+        if all(case.in_all_lanes for case in cases) and len(cases) < 2:
+            before, value = (cases[0].before, cases[0].value) if cases else ((), self.otherwise)
+            value = re.sub(r"\bvalue\b", value, self.result)
+            return function(self.signature, *self.before, *before, f"return {value};")
+        body += choose("value", type_, *cases)
         return function(self.signature, *body, f"return {self.result};")
 
 

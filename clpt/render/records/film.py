@@ -142,17 +142,17 @@ class FilmFeatures:
 
     filter: FilterFeatures = FilterFeatures()
     layers: LayerFeatures = LayerFeatures()
-    first_word: int = 0  # of those words of a pixel that paths add to
+    first_word: int = 0  # the first of a pixel's words that paths add to
     bands: bool = flag("USES_BANDS")  # a spectral film
-    alpha: bool = flag("USES_ALPHA")  # a film that tells what is covered
+    alpha: bool = flag("USES_ALPHA")  # a film with coverage
 
 
 @dataclass(frozen=True)
 class LayerNames:
-    """Names of what is in a scene, as far as its layers tell of it.
+    """Names of the shapes, materials and groups of lights in a scene's layers.
 
     objects: of the scene's shapes, in their order; materials: of all materials, by number;
-    light_groups: those of lights.
+    light_groups: of groups of lights.
     """
 
     objects: tuple[str, ...] = ()

@@ -185,7 +185,7 @@ RECORDS: dict[str, Record] = {
         inverse=("real", "of its volume [1/m^3]"),
     ),
 }
-# A ray that leaves the scene meets INFINITE lights; PLACED ones have a position.
+# A ray that leaves the scene meets INFINITE lights; PLACED lights have a position.
 INFINITE = (
     *(cls.kind for cls in LIGHTS if cls.reach == "infinite"),
     "spectral_envmap",
@@ -198,7 +198,7 @@ BASES = {
     "spectral_envmap": "envmap",
     "spectral_sky": "sky",
     "image_spot": "spot",
-}  # whose functions a kind uses
+}  # a kind uses the functions of its base
 
 # LightRow.kind is a position in this tuple
 KINDS = (*(kind for kind in RECORDS if kind not in VOLUMES), *shape_records.RECORDS, *VOLUMES)
@@ -215,7 +215,7 @@ NODE = Record(
     child=("integer", "the group of its children; below 0: -1 - the row in `lights`"),
 )
 WIDTH = 4  # nodes of a group
-LINE = 16  # words, to a multiple of which the first group is aligned
+LINE = 16  # words; the first group begins at a multiple of it
 
 # What the functions of lights return, see kernels/lights/light.cl and emission.cl.
 LIGHT_SAMPLE = Record(
@@ -262,8 +262,8 @@ class LightFeatures:
     two_sided: bool = False  # some shape emits from its back too
     unseen: bool = False  # some shape emits, but no ray sees it
     tree: bool = False  # a tree chooses among the lights
-    gloss: int = 0  # words before a material's row where its gloss stands; 0: nobody asks for it
-    few: bool = flag("FEW_LIGHTS", True)  # the number that chooses one also places the point on it
+    gloss: int = 0  # the gloss stands so many words before a material's row; 0: no gloss
+    few: bool = flag("FEW_LIGHTS", True)  # a single random number chooses a light and a point
 
     @property
     @macro("USES_LIGHTS")

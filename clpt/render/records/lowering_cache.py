@@ -5,71 +5,69 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from clpt.arrays import on_device
+from clpt.scene.pixels import image_file
 
-Made = TypeVar("Made")
+T = TypeVar("T")
 _BY_VALUE = (str, bytes, int, float, bool, type(None), type)
 
 
 class LoweringCache:
     """A cache of the results of pure functions, by their arguments.
 
-    Numbers and texts count by value, whatever else by identity: an array that is the same object is
-    taken to hold the same. former: the cache of the lowering before, whose results are taken on
-    when they are asked for again; `settle` lets go of the others.
+    Numbers and texts are compared by value, other arguments by identity: an array that is the same
+    object is taken to hold the same values. former: the cache of the lowering before; a result that
+    is asked for again moves here, and `settle` drops the others.
     """
 
     def __init__(self, former: LoweringCache | None = None):
-        self._former = {} if former is None else former._made
-        self._made: dict[Any, tuple[Any, Any]] = {}
+        self._former = {} if former is None else former._results
+        self._results: dict[Any, tuple[Any, Any]] = {}
 
     def __call__(
-        self, make: Callable[..., Made], *given: object, by: tuple[Any, ...] | None = None
-    ) -> Made:
-        """Return make(*given); the same object as before for what was given before.
+        self, function: Callable[..., T], *arguments: object, by: tuple[Any, ...] | None = None
+    ) -> T:
+        """Return function(*arguments); for equal arguments the same object as before.
 
-        by: what it follows from, where that is not all of what is given.
+        by: the values that the result depends on, in place of all arguments.
         """
-        by = given if by is None else by
-        key = make, *map(_mark, by)
-        if key not in self._made:
-            # what is known by identity stays alive, so that no other object gets its id
-            self._made[key] = self._former.get(key) or (make(*given), by)
-        return self._made[key][0]
+        by = arguments if by is None else by
+        key = function, *map(_key, by)
+        if key not in self._results:
+            # Values that are compared by identity stay alive: no other object gets their id.
+            self._results[key] = self._former.get(key) or (function(*arguments), by)
+        return self._results[key][0]
 
     def settle(self) -> None:
-        """Forget what was not asked for."""
+        """Drop results of the former cache that were not asked for."""
         self._former = {}
 
 
-def _mark(given: object) -> Any:
-    """Return the key of an argument; memory of a device has a new one each time.
-
-    Kernels may have written there since.
-    """
-    if isinstance(given, _BY_VALUE):
-        return given
-    return object() if on_device(given) else (id(given),)
+def _key(argument: object) -> Any:
+    """Return the key of an argument; a new key for memory of a device, which kernels may write."""
+    if isinstance(argument, _BY_VALUE):
+        return argument
+    return object() if on_device(argument) else (id(argument),)
 
 
 def version(image: object) -> Any:
-    """Return what an image is known by: of a file its name, its time and its size."""
-    if not isinstance(image, (str, Path)):
+    """Return a key of an image: a file's path, time and size; other images themselves."""
+    file = image_file(image)
+    if file is None:
         return image
     try:
-        found = os.stat(image)
-    except OSError:  # whoever reads it tells what is wrong
-        return str(image)
-    return f"{image}\0{found.st_mtime_ns}\0{found.st_size}"
+        status = os.stat(file)
+    except OSError:  # reading raises the error
+        return file
+    return f"{file}\0{status.st_mtime_ns}\0{status.st_size}"
 
 
 def content(*arrays: np.ndarray) -> bytes:
-    """Return what stands for the values of arrays, where these are made anew each time."""
+    """Return a digest of the values of arrays, for arrays that are new objects each time."""
     digest = hashlib.blake2b()
     for array in arrays:
         digest.update(np.ascontiguousarray(array).data.cast("B") if array.size else b"")

@@ -1,7 +1,7 @@
-"""Macros: the names by which kernels ask for a feature, each beside the field that says it.
+"""Macros of features: each field that kernels ask for declares the name of its macro.
 
-A record of features is a frozen dataclass. Its fields and properties that kernels ask for are made
-by `flag`, `number` and `macro`, and `said` reads them.
+A record of features is a frozen dataclass. `flag` and `number` declare fields with macros, `macro`
+properties; `macros_of` reads them.
 """
 
 from __future__ import annotations
@@ -35,22 +35,22 @@ def macro(name: str, *, of_number: bool = False) -> Callable[[_Get], _Get]:
     return named
 
 
-def said(record: Any) -> Iterator[tuple[str, Value]]:
-    """Return the macros of a record and of the records in it, each with its value."""
+def macros_of(record: Any) -> Iterator[tuple[str, Value]]:
+    """Yield the macros of a record and of the records in it, each with its value."""
     for field in dataclasses.fields(record):
-        own = vars(record)[field.name]
+        value = vars(record)[field.name]
         if "macro" in field.metadata:
-            yield _value(field.metadata["macro"], own)
-        elif dataclasses.is_dataclass(own) and not isinstance(own, type):
-            yield from said(own)
+            yield _value(field.metadata["macro"], value)
+        elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+            yield from macros_of(value)
     for member in vars(type(record)).values():
         get = member.fget if isinstance(member, property) else None
         if get is not None and "macro" in vars(get):
             yield _value(vars(get)["macro"], get(record))
 
 
-def _value(named: tuple[str, bool], own: Value) -> tuple[str, Value]:
+def _value(named: tuple[str, bool], value: Value) -> tuple[str, Value]:
     """A macro's name and value; in kernels, true is 1."""
     name, is_flag = named
-    absent = not own if is_flag else own is None
-    return name, None if absent else int(own) if isinstance(own, bool) else own
+    absent = not value if is_flag else value is None
+    return name, None if absent else int(value) if isinstance(value, bool) else value

@@ -22,13 +22,13 @@ REAL_WORDS = 2  # the value, and 0 or 1 + the texture
 ORDERS_WORDS = 2 * ORDERS + 1
 ANGULAR_WORDS = 5  # of the table: first value, cosines, rows; first wavelength, rows a nm
 MEASUREMENT_WORDS = 1 + SPECTRUM_WORDS  # its first number; which colour a wavelength has
-MERL_WORDS = 4  # its first number; rows of what red, green and blue are
+MERL_WORDS = 4  # its first number; rows of the spectra of red, green and blue
 LAYERS_WORDS = 2  # where the layers lie, see clpt.render.materials.thin_films; how many
 
 
 @dataclass(frozen=True)
 class Member:
-    """A value as kernels have it: words in its row, and `count` values of a type in its struct."""
+    """A parameter in kernels: words in its row, and `count` values of a type in its struct."""
 
     words: int
     lane_type: str
@@ -76,7 +76,7 @@ class MaterialFeatures:
     """The materials that a path may meet.
 
     leaves: classes of leaf materials in their order, then of phase functions: a material word's
-    upper bits count in it; transmitting: kinds of leaves of which some let light through; shining:
+    upper bits count in it; transmitting: kinds of leaves that let light through somewhere; shining:
     kinds of leaves on shapes that are lights; sources: (kind, parameter, source) of all that is
     loaded, of lights and media too, see clpt.render.materials.cases.
     """
@@ -119,14 +119,14 @@ class MaterialFeatures:
 
     def sources_of(self, kind: str) -> dict[str, frozenset[str]]:
         """Return the sources of each parameter of a kind that has some."""
-        found: dict[str, frozenset[str]] = {}
+        by_name: dict[str, frozenset[str]] = {}
         for owner, name, source in self.sources:
             if owner == kind:
-                found[name] = found.get(name, frozenset()) | {source}
-        return found
+                by_name[name] = by_name.get(name, frozenset()) | {source}
+        return by_name
 
     def phase_varies(self, cls: type[Scatterer]) -> bool:
         """Return whether a phase function differs between wavelengths."""
-        found = self.sources_of(cls.kind).values()
         varies = cls.is_phase and cls.chromatic
-        return varies and any(source not in ("grey", "row") for one in found for source in one)
+        sources = frozenset[str]().union(*self.sources_of(cls.kind).values())
+        return varies and not sources <= {"grey", "row"}

@@ -70,13 +70,13 @@ class TableStore:
         return first
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return every table as one array, and drop the parts.
+        """Return every table as a single array, and drop the parts.
 
         An empty table becomes a single zero, because OpenCL has no empty buffers.
         """
-        made = {name: self._joined(name) for name in TABLES}
+        arrays = {name: self._joined(name) for name in TABLES}
         self._parts = {name: [] for name in TABLES}
-        return made
+        return arrays
 
     def _joined(self, name: str) -> np.ndarray:
         parts = self._parts[name]

@@ -94,7 +94,7 @@ RECORDS["mip_bitmap"] = Record("MipBitmap", "Levels of floats.", **_IMAGE, **_LE
 
 RECORDS["packed_mip_bitmap"] = Record("PackedMipBitmap", "Levels of bytes.", **_IMAGE, **_LEVELS)
 
-# of texels, between which is filtered
+# images of texels, which are filtered
 IMAGES = ("bitmap", "packed_bitmap", "spectral_bitmap", *MIPS)
 
 KINDS = (*(kind for kind in RECORDS if kind not in MIPS), "program", *MIPS)

@@ -37,7 +37,7 @@ from clpt.spectra.spectrum import d65, gridded, primaries
 
 STEP = 1.0  # largest distance of nodes of tabulated spectra [nm]
 FEWEST = 100  # cells between nodes, however narrow the film's range is
-ONE = 1e4  # argument at which the sigmoid of a colour is 1 in float32
+ONE = 1e4  # argument of the sigmoid of a colour for a value of 1 in float32
 EVEN = 0.25  # share of the expected light that is equal at all wavelengths
 
 
@@ -177,7 +177,7 @@ class SpectraTable:
         """Return the words of a measured material and its source.
 
         They hold the first index of its numbers, and a spectrum from wavelengths to indices of its
-        colours; see kernels/materials/measurement_load.cl.
+        colours; see kernels/materials/measurement.cl.
         """
         key = "measurement", id(value)
         if key not in self._measurements:
@@ -200,7 +200,7 @@ class SpectraTable:
         """Return the words of a MERL table and its source.
 
         They hold the first index of its numbers and, in spectral mode, the rows of red, green and
-        blue; see kernels/materials/merl_load.cl.
+        blue; see kernels/materials/merl_table.cl.
         """
         key = "merl", id(value)
         if key not in self._measurements:
@@ -237,13 +237,13 @@ class SpectraTable:
 
 
 def reradiation_nodes(low: float, high: float) -> Floats:
-    """Return the wavelengths [nm] between which a film's reradiation matrices are linear."""
+    """Return the wavelengths [nm] of the nodes of a film's reradiation matrices."""
     count = int(np.ceil((high - low) / RERADIATION_STEP - 1e-9)) + 1
     return np.asarray(low + RERADIATION_STEP * np.arange(count), np.float64)
 
 
 def expected_light(lights: Iterable[Spectrum], nodes: Floats) -> Floats:
-    """Return the expected light (n,) at nodes, mean about 1, by which wavelengths are sampled.
+    """Return the expected light (n,) at nodes, mean about 1, for sampling of wavelengths.
 
     All lights count equally, whatever their powers: surfaces may see any of them.
     """

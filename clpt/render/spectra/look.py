@@ -9,7 +9,6 @@ import numpy as np
 from clpt.arrays import Floats
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.scene import Film
-from clpt.scene.pixels import pixels, spectral_image
 from clpt.scene.roles import EMISSION
 from clpt.scene.textures import Bitmap
 from clpt.spectra import Spectrum
@@ -58,8 +57,8 @@ class Look:
 
     def levels(self, image: Bitmap) -> Floats:
         """Return the weights of the texels of an emission (h, w), top row first."""
-        seen = np.maximum(pixels(image, EMISSION), 0.0).mean(axis=2, dtype=np.float64)
-        spectra = spectral_image(image, EMISSION) if self.spectral else None
+        seen = np.maximum(image.pixels(EMISSION), 0.0).mean(axis=2, dtype=np.float64)
+        spectra = image.spectral(EMISSION) if self.spectral else None
         if spectra is None:
             return seen * (1.0 + self.unseen * self.spectral)
         within = (spectra.lambdas >= self.lo) & (spectra.lambdas <= self.hi)

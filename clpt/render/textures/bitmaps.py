@@ -15,7 +15,6 @@ from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,16 +24,17 @@ from clpt import images, spectra
 from clpt.arrays import Words
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.images import Stored, arrays
+from clpt.images import Stored
+from clpt.images.stored import checked
 from clpt.render.records.lowering_cache import LoweringCache, version
 from clpt.render.records.tables import TableStore
 from clpt.render.records.textures import KINDS, MIPS
 from clpt.render.textures.texels import texels
-from clpt.scene.pixels import channel, spectral_image
+from clpt.scene.pixels import channel, image_file
 from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role
 from clpt.scene.textures import Bitmap
 
-NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectral_read.cl
+NODES = np.array([400.0, 550.0, 700.0])  # [nm] of packed spectra, as in spectral.cl
 LARGEST = 2**31 - 1  # words in `images` that an index reaches
 THREADS = 8
 UNKNOWN, NEW, PACKED = range(3)
@@ -65,7 +65,7 @@ class _Pixels:
         self._image = image
         self._stored: Future[Stored] | None = None
         self._form: _Form | None = None
-        self._is_file = isinstance(image, (str, Path))
+        self._is_file = image_file(image) is not None
         self.begin()
 
     def begin(self) -> None:
@@ -163,9 +163,9 @@ class Images:
         """
         channel_of = role is REAL and texture.channel
         levels = has_levels(texture, role)
-        key = (identity(texture), texture.raw, role, channel_of, levels)
+        key = (texture.image_key, texture.raw, role, channel_of, levels)
         if key not in self._wanted:
-            spectral = spectral_image(texture, role)
+            spectral = texture.spectral(role)
             image = texture.image if spectral is None else spectral.to_rgb()
             self._wanted[key] = _Image(texture, role, self._read(image))
         self._wanted[key].rows.append(row)
@@ -229,7 +229,7 @@ class Images:
         """Return the words of an image: level by level, row by row from the top."""
         texture, stored = image.texture, image.pixels.stored.meant(image.texture.raw)
         packs = _packs(image.form, image, self.spectral)
-        values = arrays.checked(stored.values, "bitmap.image")
+        values = checked(stored.values, "bitmap.image")
         curved = stored.encoded and not texture.raw
         if image.halvings:
             values = _halved(values, curved, image.halvings)
@@ -267,9 +267,8 @@ class Images:
 
     def _read(self, image: object) -> _Pixels:
         """Return the pixels of an image; a file is decoded once."""
-        if isinstance(image, (str, Path)):
-            return self.cache(_Pixels, str(image), by=(version(image),))
-        return _Pixels(image)
+        file = image_file(image)
+        return _Pixels(image) if file is None else self.cache(_Pixels, file, by=(version(file),))
 
     def _decode(self, curved: bool, store: TableStore) -> int:
         """Return the first of the 256 words that decode bytes."""
@@ -292,12 +291,6 @@ class Images:
             if sizes[worst] == before:
                 break  # single texels
         return [_note(image) for image in wanted if image.halvings]
-
-
-def identity(texture: Bitmap) -> Any:
-    """Return a key that is equal for the same images: a file's name, or an object's id."""
-    image = texture.image
-    return str(image) if isinstance(image, (str, Path)) else id(image)
 
 
 def has_levels(texture: Bitmap, role: Role) -> bool:
@@ -352,8 +345,7 @@ def _left_out(wanted: Iterable[_Image]) -> list[str]:
 def _note(image: _Image) -> str:
     height, width = image.pixels.form.shape[:2]
     small = " x ".join(str(max(1, -(-n >> image.halvings))) for n in (width, height))
-    source = image.texture.image
-    name = source if isinstance(source, (str, Path)) else "an image"
+    name = image_file(image.texture.image) or "an image"
     return f"{name}: {width} x {height} texels made {small}, to keep to the texture budget"
 
 

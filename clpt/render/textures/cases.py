@@ -162,5 +162,5 @@ def _operand_text(kinds: dict[str, list[str]], depth: int) -> list[str]:
         f"#define PROGRAM_END {END}",
         *(f"#define TEXTURE_ROLE_{role.upper()} {i}" for i, role in enumerate(ROLES)),
         Function(signature, "spectrum_of(as_real(argument))", cases).text(),
-        '#include "textures/program.cl"',
+        '#include "textures/texture.cl#program"',
     ]

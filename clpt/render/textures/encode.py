@@ -15,14 +15,14 @@ from clpt.errors import SceneError
 from clpt.geometry.triangles import per_face
 from clpt.render.records.materials import SPECTRUM_WORDS
 from clpt.render.records.tables import TableStore
-from clpt.render.records.textures import KINDS, PROGRAM, RECORDS
+from clpt.render.records.textures import KINDS, PROGRAM, RECORDS, TextureFeatures
 from clpt.render.spectra.encode import SpectraTable
-from clpt.render.textures.bitmaps import Images, has_levels, identity
-from clpt.render.textures.programs import folded, is_composite, program, separated
+from clpt.render.textures.bitmaps import Images, has_levels
+from clpt.render.textures.programs import program
 from clpt.render.textures.texels import bands
 from clpt.scene.params import params
-from clpt.scene.pixels import spectral_image
 from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role, Spectral
+from clpt.scene.texture_values import is_texture, separated
 from clpt.scene.textures import (
     MAPPINGS,
     PATTERNS,
@@ -91,15 +91,15 @@ class TextureTable:
         self._folded: dict[tuple[int, Role], Any] = {}
         self._alive: list[Any] = []  # textures whose ids are keys
 
-    def folded(self, texture: Texture, role: Role) -> Any:
-        """Return a texture with its constants combined, see `programs.folded`."""
-        key = id(texture), role
-        if key not in self._folded:
-            result = folded(texture, role)
+    def folded(self, value: object, role: Role) -> Any:
+        """Return a value with constants combined and RGB products separated, see `Texture`."""
+        key = id(value), role
+        if is_texture(value) and key not in self._folded:
+            combined = value.folded(role)
             spectral = self.spectra.spectral and role in (REFLECTANCE, EMISSION)
-            self._folded[key] = separated(result, role) if spectral else result
-            self._alive.append(texture)
-        return self._folded[key]
+            self._folded[key] = separated(combined, role) if spectral else combined
+            self._alive.append(value)
+        return self._folded.get(key, value)
 
     def row(self, texture: Texture, role: Role) -> int:
         """Append a texture in a role; return the first word of its row in `textures`.
@@ -107,13 +107,22 @@ class TextureTable:
         A composite must be `folded`. The same texture in the same role is appended once. Raises
         SceneError for an image or a uv transform that cannot be used.
         """
-        key = _identity(texture), role
+        key = texture.identity, role
         if key not in self._rows:
             if self.store.size("textures") == 0:
                 self._append_blank()
             self._rows[key] = self._append(texture, role)
             self._alive.append(texture)
         return self._rows[key]
+
+    def features(self) -> TextureFeatures:
+        """Return the features of the textures so far."""
+        return TextureFeatures(
+            roles=tuple(sorted(self.roles)),
+            mappings=self.mappings,
+            depth=self.depth,
+            attributes=bool(self.attributes),
+        )
 
     def finish(self) -> list[str]:
         """Append the images, when all of them are known; return warnings."""
@@ -141,16 +150,17 @@ class TextureTable:
         return self.store.append("textures", words.view(np.uint32)), words
 
     def _append(self, texture: Texture, role: Role) -> int:
-        if isinstance(texture, Bitmap):
-            return _bitmap(texture, role, self)
-        if is_composite(texture):
+        if texture.combines:
             self.roles.add(("program", role.name))
             words, depth = program(texture, role, self.store, self.spectra, self.row)
             self.depth = max(self.depth, depth)
             return self.store.append("textures", [PROGRAM, *words])
-        kind, members = MEMBERS[type(texture)](texture, role, self)
-        self.roles.add((kind, role.name))
-        return self.append_row(kind, members)[0]
+        return APPENDERS[type(texture)](texture, role, self)
+
+    def append_leaf(self, texture: Texture, role: Role, **members: Any) -> int:
+        """Append the row of a texture other than an image; return its first word."""
+        self.roles.add((texture.kind, role.name))
+        return self.append_row(texture.kind, members)[0]
 
     def _append_blank(self) -> None:
         self.store.append_floats("texels", np.zeros(4))
@@ -159,23 +169,9 @@ class TextureTable:
         self.store.append("textures", PERMUTATION)
 
 
-def _identity(texture: Texture) -> Any:
-    """Return a key that is equal for the same textures.
-
-    It holds the parameters of a bitmap; for other textures it is the id of the object.
-    """
-    if isinstance(texture, Bitmap):
-        values = texture.raw, texture.filter, texture.wrap, texture.wrap_v, texture.channel
-        to_texture = np.asarray(texture.to_texture).tobytes()
-        placed = (texture.to_uv.tobytes(), texture.mapping, to_texture)
-        return (identity(texture), *values, *placed)
-    return id(texture)
-
-
 def _uv(texture: Placed, table: TextureTable, down: bool = False) -> dict[str, Any]:
     """Return the members of a row about uv; down: v runs down, as an image's rows do."""
-    matrix = np.asarray(texture.to_uv, np.float64)
-    u, v = matrix[:2] / matrix[2, 2]
+    u, v = texture.affine[:2]
     members = {"to_u": u, "to_v": [0.0, 0.0, 1.0] - v if down else v}
     if texture.mapping == "uv":
         return members
@@ -198,9 +194,7 @@ def _transform(texture: Placed | Solid, table: TextureTable) -> int:
     return table.store.append("textures", np.ascontiguousarray(matrix[:3]).view(np.uint32))
 
 
-def _checkerboard(
-    texture: Checkerboard, role: Role, table: TextureTable
-) -> tuple[str, dict[str, Any]]:
+def _checkerboard(texture: Checkerboard, role: Role, table: TextureTable) -> int:
     members = _uv(texture, table)
     colours: dict[str, Any] = {"color0": texture.color0, "color1": texture.color1}
     for name, value in colours.items():
@@ -210,7 +204,7 @@ def _checkerboard(
             members[name] = table.store.append("textures", words.view(np.uint32))
         else:
             members[name] = table.store.append("textures", table.spectra.words(value, role)[0])
-    return texture.kind, members
+    return table.append_leaf(texture, role, **members)
 
 
 def _bitmap(texture: Bitmap, role: Role, table: TextureTable) -> int:
@@ -219,12 +213,11 @@ def _bitmap(texture: Bitmap, role: Role, table: TextureTable) -> int:
     members = {
         **_uv(texture, table, down=True),
         "filter": filters.index("bilinear" if smooth else texture.filter),
-        "wrap_u": WRAPS.index(texture.wrap),
-        "wrap_v": WRAPS.index(texture.wrap_v or texture.wrap),
+        "wrap_u": WRAPS.index(texture.wraps[0]),
+        "wrap_v": WRAPS.index(texture.wraps[1]),
     }
-    spectral = (
-        spectral_image(texture, role) if table.spectra.spectral and role is not REAL else None
-    )
+    in_colours = not table.spectra.spectral or role is REAL
+    spectral = None if in_colours else texture.spectral(role)
     if spectral is None:
         kind = "mip_bitmap" if has_levels(texture, role) else "bitmap"
         at, row = table.append_row(kind, members)
@@ -244,49 +237,53 @@ def _bitmap(texture: Bitmap, role: Role, table: TextureTable) -> int:
     return table.append_row("spectral_bitmap", {**members, **more})[0]
 
 
-def _mesh_attribute(
-    texture: MeshAttribute, role: Role, table: TextureTable
-) -> tuple[str, dict[str, Any]]:
+def _mesh_attribute(texture: MeshAttribute, role: Role, table: TextureTable) -> int:
     channel = texture.channel if role is REAL and texture.channel != "luminance" else ""
     number = table.attribute(texture.name, role, channel)
-    return texture.kind, {"number": number, "per_face": per_face(texture.name)}
+    return table.append_leaf(texture, role, number=number, per_face=per_face(texture.name))
 
 
-def _dots(texture: Dots, role: Role, table: TextureTable) -> tuple[str, dict[str, Any]]:
-    return texture.kind, _uv(texture, table)
+def _dots(texture: Dots, role: Role, table: TextureTable) -> int:
+    return table.append_leaf(texture, role, **_uv(texture, table))
 
 
-def _checkers(texture: Checkers, role: Role, table: TextureTable) -> tuple[str, dict[str, Any]]:
-    return texture.kind, {"transform": _transform(texture, table)}
+def _checkers(texture: Checkers, role: Role, table: TextureTable) -> int:
+    return table.append_leaf(texture, role, transform=_transform(texture, table))
 
 
-def _noise(texture: Noise, role: Role, table: TextureTable) -> tuple[str, dict[str, Any]]:
-    return texture.kind, {
-        "transform": _transform(texture, table),
-        "pattern": PATTERNS.index(texture.pattern),
-        "octaves": texture.octaves,
-        "roughness": texture.roughness,
-    }
+def _noise(texture: Noise, role: Role, table: TextureTable) -> int:
+    return table.append_leaf(
+        texture,
+        role,
+        transform=_transform(texture, table),
+        pattern=PATTERNS.index(texture.pattern),
+        octaves=texture.octaves,
+        roughness=texture.roughness,
+    )
 
 
-def _marble(texture: Marble, role: Role, table: TextureTable) -> tuple[str, dict[str, Any]]:
+def _marble(texture: Marble, role: Role, table: TextureTable) -> int:
     if role is REAL:
         words = np.zeros((len(MARBLE), SPECTRUM_WORDS), np.float32)
         words[:, 0] = luminance(MARBLE)
     else:
         colours = [table.spectra.words(RGB(*rgb), REFLECTANCE)[0] for rgb in MARBLE]
         words = np.array(colours).view(np.float32)
-    return texture.kind, {
-        "transform": _transform(texture, table),
-        "colours": table.store.append("textures", words.view(np.uint32)),
-        "octaves": texture.octaves,
-        "roughness": texture.roughness,
-        "scale": texture.scale,
-        "variation": texture.variation,
-    }
+    return table.append_leaf(
+        texture,
+        role,
+        transform=_transform(texture, table),
+        colours=table.store.append("textures", words.view(np.uint32)),
+        octaves=texture.octaves,
+        roughness=texture.roughness,
+        scale=texture.scale,
+        variation=texture.variation,
+    )
 
 
-MEMBERS: dict[type[Texture], Callable[..., tuple[str, dict[str, Any]]]] = {
+# functions that append the row of a kind that combines no others
+APPENDERS: dict[type[Texture], Callable[..., int]] = {
+    Bitmap: _bitmap,
     Checkerboard: _checkerboard,
     MeshAttribute: _mesh_attribute,
     Dots: _dots,

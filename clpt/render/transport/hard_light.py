@@ -1,7 +1,7 @@
-"""Choices for hard light: an integrator in place of `auto`, and "auto" light paths of `path`.
+"""The choice of an integrator in place of `auto`, and of "auto" light paths of `path`.
 
-Light paths find the light that something sharp has gathered on something dull. Where the lamp is
-large, paths from the camera find that light too, and sooner. Photons find it also where it is seen
+Light paths find caustics: light that specular surfaces focus on diffuse surfaces. If the light is
+large, paths from the camera find caustics too, and sooner. Photons also find caustics that are seen
 in a mirror or through glass.
 """
 
@@ -19,48 +19,47 @@ from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
-from clpt.render.lights import images as image_lights
-from clpt.render.lights import sky as sky_light
 from clpt.render.lights.aims import is_sharp, sharp_pieces
-from clpt.render.lights.find import Sources
+from clpt.render.lights.find import Sources, environment_of
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
-from clpt.render.transport import guides, worth
+from clpt.render.transport import guides
 from clpt.scene import materials as mt
-from clpt.scene.integrators import Auto, Integrator, Path, Vcm, shared
-from clpt.scene.lights import CubeMap, Envmap, Sky
+from clpt.scene.integrators import Integrator, Path, Vcm, shared
 from clpt.scene.shapes import Shape
 
-SMALL = 0.03  # of the sphere that is seen: up to it a light is small
-NEAR = 0.25  # of the scene's radius: a light counts as no nearer to what it shines on
-SUN = 0.25  # of an image's power: where it comes from a small part the image is a small light
+SMALL = 0.03  # share of the sphere of directions: a light that fills less is small
+NEAR = 0.25  # of the scene's radius: the least distance from a light to lit surfaces
+SUN = 0.25  # of an image's power: if a small part sends it, the image is a small light
 FEWEST = 3  # edges of a path from a light over two surfaces to the camera: the shortest caustic
-MOSTLY = 0.5  # of the power of all lights: where small ones have less, few paths start at lights
-FEW = 0.125  # a sample
-SOME = 0.25  # where they have more; `vcm` has one, as its photons are these
-FOGGY = 0.25, 0.5  # the same two where lights are in media that scatter
-MANY = 8  # where they are in bulbs: the camera's paths find next to nothing there
-DIRECTIONS = 128  # in which a light looks for what is sharp
-SLACK = 1e-6  # of the cosine of a cone around what may be met, for roundings
-BULB = 0.75  # of them: where what is sharp fills more, the light is in a bulb
-SEEN = 0.02  # of the picture: where what is clear fills more, caustics may be seen through it
-CLEAR = 0.05  # roughness alpha of what is clear: light paths can be joined to what is rougher
-RAYS = 256  # of the camera, that look for what is clear
+MOSTLY = 0.5  # share of small lights in the power of all lights, for more light paths than FEW
+FEW = 0.125  # light paths for each sample, if small lights have less than MOSTLY
+SOME = 0.25  # the same if small lights have more; `vcm` has 1, as its photons are light paths
+FOGGY = 0.25, 0.5  # FEW and SOME for lights in media that scatter
+MANY = 8  # the same for lights in bulbs, which paths from the camera hardly find
+DIRECTIONS = 128  # from a light, for the share of specular surfaces around it
+SLACK = 1e-6  # of the cosine of a cone around a surface, for roundings
+BULB = 0.75  # of DIRECTIONS: if specular surfaces fill more, the light is in a bulb
+SEEN = 0.02  # of the picture: if clear surfaces fill more, caustics may be seen through them
+CLEAR = 0.05  # roughness alpha of clear surfaces; light paths are connected to rougher surfaces
+RAYS = 256  # of the camera, for the share of clear surfaces
+TRIAL_SAMPLES = 1 << 23  # of the film, for a trial of integrators that compiles nothing more
 
-LEAST = 0.25  # of the power of all lights: where small ones in media have less, they do not count
+LEAST = 0.25  # share in the power of all lights: small lights in media with less are ignored
 THIN, DENSE = 0.3, 5.0  # optical depths from a light to the camera, see bench/notes/media.md
-ALL_AROUND = 0.49 * np.pi  # [rad] from a light's axis: what shines so far is no spot
+ALL_AROUND = 0.49 * np.pi  # [rad] from a light's axis: a light that reaches it is no spot
 
 Ball = tuple[NDArray[np.float64], float]  # centre and radius
 
 
 @dataclass(frozen=True)
 class Lit:
-    """The parts of a scene by which the choice of an integrator is made.
+    """The facts about a scene that decide its integrator.
 
-    sphere: centre and radius of one around the scene [m]; extinction (n,): of the medium around
-    each row of `lights` where it scatters, else 0, and nan on a grid [1/m]; () without media.
+    sphere: centre and radius of a sphere around the scene [m]; extinction (n,): of the medium
+    around each row of `lights` where it scatters, else 0, and nan on a grid [1/m]; () without
+    media.
     """
 
     index: SceneIndex
@@ -74,48 +73,47 @@ class Lit:
 def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str]:
     """Return the index with the integrator that "auto" stands for, and the reason as a sentence.
 
-    The sentence is empty where the scene leaves no choice. former: what a renderer has chosen that
-    goes on with this scene, whose film has a place for light paths or none. Raises SceneError for
-    an image light that is broken.
+    The sentence is empty if the scene leaves no choice. former: the choice before an edit, which
+    stays, since the film has sums for its light paths. Raises SceneError for a broken image light.
     """
     index = lit.index
-    given = index.integrator
-    if not given.leaves_choice:
+    wanted = index.integrator
+    if not wanted.leaves_choice:
         return index, ""
     if former is None:
         chosen, reason = _choice(lit)
     else:
-        keeps = isinstance(former, Vcm) and isinstance(given, Auto)
-        guiding = former.guiding and not given.guiding
+        keeps = former.has_photons and wanted.asks_photons
+        guiding = former.guiding and not wanted.guiding
         guide_paths = former.guide_paths if guiding else 0
         plain = Path(light_paths=former.light_paths, guiding=guiding, guide_paths=guide_paths)
         chosen = former if keeps else plain
         reason = "as before the scene was edited"
     if index.light_layers and index.adaptive:
         chosen, reason = Path(light_paths=0), "layers of light have no guides of noise"
-    elif "light_groups" in index.layers and isinstance(chosen, Vcm):
+    elif "light_groups" in index.layers and chosen.has_photons:
         chosen, reason = Path(light_paths=chosen.light_paths), "photons do not know their group"
-    if given.guiding:
-        chosen = Path(light_paths=0, guiding=True, guide_paths=given.guide_paths)
+    if wanted.guiding:
+        chosen = Path(light_paths=0, guiding=True, guide_paths=wanted.guide_paths)
         reason = "directions are guided"
-    chosen = replace(chosen, **shared(given, chosen))
+    chosen = replace(chosen, **shared(wanted, chosen))
     index = replace(index, integrator=chosen)
     return replace(index, candidates=_candidates(index, chosen) if former is None else ()), reason
 
 
 def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]:
-    """The integrators between which a trial may decide, the chosen one first; else none.
+    """The candidates of a trial, the chosen integrator first; empty without a trial.
 
-    It pays if many samples are to come. Where a limit of noise ends the picture nobody knows how
-    many, and some scenes cannot have a guide. Photons blur the picture, which no variance tells: so
-    they are left where another way is cheaper all the same, and never taken. `path` is no such way
-    where it never finds a light through what is clear.
+    A trial pays if many samples are to come. If a limit of noise ends the picture, their number is
+    unknown. Some scenes cannot have a guide. Photons blur the picture, and the variance does not
+    show that: a trial may replace `vcm` by a cheaper integrator, but never chooses it. `path` is no
+    candidate where it cannot find a light behind clear surfaces.
     """
     samples = index.samples
-    if samples < worth.SAMPLES or index.adaptive or index.lit_ghosts or chosen.guiding:
+    if samples < TRIAL_SAMPLES or index.adaptive or index.lit_ghosts or chosen.guiding:
         return ()
     path = Path(light_paths=0, **shared(chosen, Path()))
-    finds = isinstance(chosen, Path) or (chosen.light_paths != MANY and _may_be_met(index))
+    finds = not chosen.has_photons or (chosen.light_paths != MANY and _may_be_met(index))
     plain = [path] if finds and chosen.light_paths else []
     several = chosen.max_depth < 0 or chosen.max_depth > 2
     can_guide = several and index.lights_reach
@@ -130,7 +128,7 @@ def _may_be_met(index: SceneIndex) -> bool:
 
 
 def _choice(lit: Lit) -> tuple[Integrator, str]:
-    """The integrator but for its depths, and why; what is cheap to know is asked first."""
+    """The integrator, without its depths, and the reason; cheap questions come first."""
     index, geometry = lit.index, lit.geometry
     integrator, without = index.integrator, Path(light_paths=0)
     if not index.lights_reach:
@@ -142,10 +140,10 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
         return without, "the longest path is too short for a caustic"
     if (in_fog := _in_fog(lit)) is not None:
         return in_fog
-    sharp = _first_with((one for one in index.shapes if not _hides(one)), is_sharp)
+    sharp = _first_with((shape for shape in index.shapes if not _hides(shape)), is_sharp)
     if sharp is None:
         return without, "nothing is specular"
-    if _first_with((one for one in index.shapes if one.emission is None), _is_diffuse) is None:
+    if _first_with((s for s in index.shapes if s.emission is None), _is_diffuse) is None:
         return without, "there is nothing dull for a caustic to be seen on"
     small = list(_small_lights(lit))
     if not small:
@@ -156,7 +154,7 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     number = SOME
     if sum(share for _, place, share in small if _is_enclosed(geometry, place)) >= MOSTLY:
         number, reason = MANY, f"{reason}, in a bulb"
-    if not isinstance(integrator, Auto):
+    if not integrator.asks_photons:
         return Path(light_paths=number), reason
     if index.adaptive:
         return Path(light_paths=number), f"{reason}; noise is not measured with photons"
@@ -172,16 +170,16 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
 
 
 def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
-    """The integrator where small lights are in media that scatter, None where they are not.
+    """The integrator for small lights in media that scatter; None without such lights.
 
-    Near such a light much is scattered that the camera's paths find by chance alone. Through much
-    fog light paths do not come to the camera. In little, what is near a light is lit by it alone,
-    which the camera's paths find, but around a spot lamp.
+    Paths from the camera find the light that is scattered near such a light by chance alone. In
+    dense fog light paths do not reach the camera. In thin fog a light is the only light on its
+    surroundings, which paths from the camera find, except around a spot.
     """
     if not lit.extinction.any():
         return None
     share = lit.sources.power / max(lit.sources.power.sum(), 1e-300)
-    bounds = light_bounds.concatenated([one.bounds for one in lit.sources.every])
+    bounds = light_bounds.concatenated([source.bounds for source in lit.sources.every])
     spots = bounds.theta_o + bounds.theta_e < ALL_AROUND
     index, shutter = lit.index, lit.index.motions.shutter
     eye = surroundings.camera_origin(index.camera, index.film, (shutter.open + shutter.close) / 2.0)
@@ -200,17 +198,17 @@ def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
 
 
 def _hides(shape: Shape) -> bool:
-    """Whether what goes into a shape is scattered there, so that it makes no caustic."""
+    """Whether a shape is filled with a medium that scatters, so that it makes no caustic."""
     return shape.interior is not None and shape.interior.scatters
 
 
 def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
-    """Whether a light is in a bulb: what is only sharp fills most directions from its place [m]."""
+    """Whether a light at a place [m] is in a bulb: specular shapes fill most directions."""
     if place is None:
         return False
     covered = np.zeros(DIRECTIONS, bool)
     directions = _cone(np.array([0.0, 0.0, 1.0]), -1.0, DIRECTIONS)
-    for pieces in sharp_pieces(geometry, (), lambda one: is_sharp(one) and not _is_diffuse(one)):
+    for pieces in sharp_pieces(geometry, (), lambda m: is_sharp(m) and not _is_diffuse(m)):
         covered[_covered(pieces, place, directions)] = True
     return bool(covered.mean() > BULB)
 
@@ -237,7 +235,7 @@ def _covered(
     away, along = np.linalg.norm(middle, axis=1), middle @ directions
     edge = np.where(size < away, np.sqrt(np.maximum(away * away - size * size, 0.0)), -away)
     piece, way = np.nonzero(along >= (edge - SLACK * away)[:, None])  # a cone around each piece
-    a, b, c, middle, reach = (one[piece] for one in (a, b, c, middle, reach))
+    a, b, c, middle, reach = (values[piece] for values in (a, b, c, middle, reach))
     ahead = np.sign(np.einsum("ij,ij->i", a, np.cross(b, c)))
     towards = directions.T[way]
     sides = [np.einsum("ij,ij->i", np.cross(p, q), towards) for p, q in ((a, b), (b, c), (c, a))]
@@ -246,11 +244,11 @@ def _covered(
 
 
 def _sees_clear(index: SceneIndex, geometry: Geometry) -> bool:
-    """Whether mirrors and clear things fill enough of the picture: as if nothing hid them."""
+    """Whether mirrors and clear shapes fill enough of the picture, as if no shape hid them."""
     view = index.camera.view_of(index.film.width, index.film.height)
     assert view is not None, "a camera that can be joined has a point"
     directions = _cone(view.axis, math.cos(view.angle), RAYS)
-    for pieces in sharp_pieces(geometry, index.motions.shapes, lambda one: is_sharp(one, CLEAR)):
+    for pieces in sharp_pieces(geometry, index.motions.shapes, lambda m: is_sharp(m, CLEAR)):
         met = _covered(pieces, view.origin, directions)
         directions = np.delete(directions, met, axis=1)
         if directions.shape[1] <= (1.0 - SEEN) * RAYS:
@@ -259,7 +257,7 @@ def _sees_clear(index: SceneIndex, geometry: Geometry) -> bool:
 
 
 def _first_with(all_: Iterable[Shape], wanted: Callable[[mt.Material], object]) -> Shape | None:
-    """The first shape whose material is as wanted; a material is asked once."""
+    """The first shape whose material passes a test; each material is tested once."""
     asked: set[int] = set()
     for shape in all_:
         if id(shape.material) not in asked and wanted(shape.material):
@@ -269,16 +267,16 @@ def _first_with(all_: Iterable[Shape], wanted: Callable[[mt.Material], object]) 
 
 
 def _is_diffuse(material: mt.Material) -> bool:
-    """Whether light paths can be joined to the camera on a material, or on one inside it."""
-    if isinstance(material, mt.NormalMapped) or not material.reversible:
+    """Whether light paths can be connected to the camera on a material, or on a part of it."""
+    if not material.reversible:
         return False
-    if isinstance(material, mt.COMPOSITES):
-        return any(_is_diffuse(part) for _, part in mt.inner(material))
+    if material.is_composite:
+        return any(map(_is_diffuse, material.shared_parts.values()))
     return not material.delta and not is_sharp(material)
 
 
 def _small_lights(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, float]]:
-    """The names of small lights, where they are [m], and the share of all light that is theirs."""
+    """Yield small lights: name, place [m] and share in the power of all lights."""
     for name, place, share, _ in _small_rows(lit):
         yield name, place, share
 
@@ -290,10 +288,9 @@ def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, flo
     lamps, share = lit.index.lights, sources.power / max(sources.power.sum(), 1e-300)
     for row, i in enumerate(sources.order):
         lamp = lamps[i]
-        if isinstance(lamp, (Envmap, CubeMap)):
-            small = image_lights.extent(lamp, lit.look, SUN) < SMALL
-        elif isinstance(lamp, Sky):
-            small = sky_light.sun_share(lamp, lit.look) >= SUN
+        environment = environment_of(lamp, lit.look)
+        if environment is not None:
+            small = environment.extent(SUN) < SMALL
         else:
             small = lamp.reach in ("placed", "distant") and lamp.falloff
         bounds, place = lamp.bounds(), None

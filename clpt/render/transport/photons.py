@@ -1,4 +1,4 @@
-"""Photons: how many a pass has, and the radius in which they are gathered."""
+"""Photons: their number in a pass, and the radius of the disks that gather them."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from clpt.render.geometry.find import Geometry
 from clpt.scene.cameras import Camera
 from clpt.scene.integrators import Vcm
 
-# of a path where photons are merged, each vertex of which has a place; many files ask for 65
+# of a path with photon merging, whose vertices have places in memory; many files ask for 65
 DEEPEST = 65
-FIRST = 2  # surfaces of a light path, before which it leaves no photon
+FIRST = 2  # the surface of a light path that may store its first photon
 MIB = 1 << 20
 FEWEST_CELLS = 1 << 10
 GROUPS = 8  # of wavelengths, where light disperses
 FEW_GROUPS = 2
 RADIUS = 1.25  # of a disk in pixels
 LEAST, MOST = 5e-4, 1e-2  # radii, over that of the scene
-SPLITS = 24  # rounds in which triangles are split that are large where they are seen
+SPLITS = 24  # rounds of splitting triangles that look large from the camera
 MOST_SPLIT = 1 << 15  # in a round
-BOX = np.array(  # corners of a box's sides, of which bit k says where they are along axis k
+BOX = np.array(  # numbers of the corners of a box's sides: bit k is the end along axis k
     [
         (0, 1, 3), (0, 3, 2), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4),
         (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 3, 7), (1, 7, 5),
@@ -34,15 +34,15 @@ BYTES = 4 * WORDS
 
 
 def places(integrator: Vcm) -> int:
-    """Return how many photons a light path may leave: all its surfaces but the first and last."""
+    """Return the most photons of a light path: all its surfaces but the first and last."""
     depth = integrator.max_depth
     return (DEEPEST if depth < 0 else min(depth, DEEPEST)) - FIRST
 
 
 def pixels(integrator: Vcm, number: int) -> int:
-    """Return of how many of `number` pixels the light paths leave photons.
+    """Return the number of pixels whose light paths store photons, at most `number`.
 
-    There is one at least: 1 MiB, the least memory, holds the most photons of the most light paths.
+    It is at least 1: the least memory, 1 MiB, holds all photons of a pixel.
     """
     each = BYTES * places(integrator) * integrator.light_paths
     return min(number, integrator.photon_memory * MIB // each)
@@ -51,11 +51,11 @@ def pixels(integrator: Vcm, number: int) -> int:
 def first_radius(
     camera: Camera, geometry: Geometry, film: tuple[int, int], scene_radius: float
 ) -> float:
-    """Return a radius that suits a picture [m]: some pixels, where the camera sees surfaces.
+    """Return the radius for a picture [m]: some pixels at the distance of visible surfaces.
 
     film: width and height of the whole [pixels]; scene_radius: of a sphere around the scene [m].
-    The distance of surfaces is the median over what fills the picture, as if nothing hid them. A
-    power of the square root of 2, so that small changes of a scene rarely change it.
+    The distance of surfaces is the median over the picture, as if no surface hid another. The
+    radius is a power of the square root of 2, so that small changes of a scene rarely change it.
     """
     least, most = LEAST * scene_radius, MOST * scene_radius
     view = camera.view_of(*film)
@@ -72,10 +72,10 @@ def _rounded(radius: float) -> float:
 
 
 def _median_distance(triangles: NDArray[np.float64], axis: NDArray, angle: float) -> float:
-    """The distance [m] within which half of what is seen from the origin lies; 0 if nothing is.
+    """The median distance [m] of surfaces in a cone from the origin; 0 if the cone is empty.
 
-    triangles: (n, 3, 3); axis: of the cone that is seen, unit length; angle: from it to the cone's
-    edge [rad]. Triangles that are large where they are seen are split.
+    triangles: (n, 3, 3); axis: of the cone, unit length; angle: from the axis to the edge of the
+    cone [rad]. Triangles that look large are split.
     """
     kept = []
     for _ in range(SPLITS):

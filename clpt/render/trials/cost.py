@@ -1,7 +1,7 @@
-"""The cost of a way to render a scene, told by small pictures: variance times counted rays.
+"""The cost of an integrator for a scene, measured on small pictures: variance times counted rays.
 
-So no clock has a word in it. What counts is the variance of the mean of some samples, as these are
-spread evenly, and some ways spoil that.
+Clocks play no part. The variance is that of the mean of some samples, since samples are spread
+evenly over their domain, and integrators differ in how much they gain from that.
 """
 
 from __future__ import annotations
@@ -14,23 +14,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats
-from clpt.render.transport import worth
 
 FEWEST, PIXELS = 512, 2048  # of the small film, about
-ROUNDS = 8  # pictures of each way, each of another seed
-SAMPLES = 16  # of a pixel of each
+ROUNDS = 8  # pictures of each integrator, with different seeds
+SAMPLES = 16  # of a pixel of each picture
 BLOCK = 8  # side of a block of pixels
-TRIM = 0.001  # share of the pixels that is left out, the worst
-ODD = 0.01  # the same, where the noise of ordinary pixels is asked for
+TRIM = 0.001  # share of the pixels that is left out: the noisiest
+ODD = 0.01  # the same for the noise of ordinary pixels
 SURE = 3.0  # standard deviations
-LIGHT_RAY, GUIDED_RAY = 1.15, 1.3  # time of a ray over one of `path`, see bench/notes/guiding.md
+LIGHT_RAY, GUIDED_RAY = 1.15, 1.3  # time of a ray, relative to `path`: bench/notes/guiding.md
 PHOTON_RAY = 1.5  # the same of `vcm`
+# For these sizes of films, and larger sizes, a trial costs less than it can save.
+GUIDE_RAYS = 1 << 27  # rays, some 20 s of a core: longer than the compilation of a guide
+PLAIN_RAYS = 1 << 30  # the same for the compilation of kernels without light paths
+SHARE = 1 << 7  # samples of a film for each sample of an integrator in a trial
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Pictures of a few samples each, (rounds, height, width, 3), the number of all their rays, and
-    the relative time of a ray."""
+    """Pictures of a few samples each.
+
+    pictures: (rounds, height, width, 3); rays: the number of rays of all pictures; ray: the time of
+    a ray, relative to the integrator `path`.
+    """
 
     pictures: Floats
     rays: int
@@ -38,15 +44,15 @@ class Trial:
 
 
 def pixels_for(samples: int) -> int:
-    """Return how many pixels a small film has, about, where a film has so many samples."""
-    wanted = samples // (worth.SHARE * ROUNDS * SAMPLES)
+    """Return the number of pixels, about, of a small film; samples: of the whole film."""
+    wanted = samples // (SHARE * ROUNDS * SAMPLES)
     return min(max(wanted, FEWEST), PIXELS)
 
 
 def settings(of: NDArray[np.void], pixels: int = PIXELS) -> NDArray[np.void]:
-    """Return the settings of a small film of the whole picture; of: those of the picture.
+    """Return the settings of a small film of the whole picture; of: settings of the picture.
 
-    Its photons are as few as its pixels, so they are gathered in disks as much larger.
+    A small film has fewer photons, so the disks that gather them are larger.
     """
     small = of.copy()
     width, height = int(of["film_width"]), int(of["film_height"])
@@ -63,7 +69,7 @@ def settings(of: NDArray[np.void], pixels: int = PIXELS) -> NDArray[np.void]:
 
 
 def variances(trials: Sequence[Trial], trim: float = TRIM) -> list[float]:
-    """Return the variance of a picture of each trial; all are of one scene, with as many rounds.
+    """Return the variance of a picture of each trial; all have the same scene and rounds.
 
     It is relative to the mean of a block of pixels, as the mean of a pixel is too noisy; trim: the
     share of the worst pixels, which are left out. The variance of a trial misses light that it has
@@ -99,9 +105,9 @@ def _of_blocks(values: Floats) -> Floats:
 
 
 def costs(trials: Sequence[Trial]) -> list[float]:
-    """Return the variance times the time of the rays of each trial, over that of the first one.
+    """Return the variance times the time of the rays of each trial, over the first trial's.
 
-    1 for each where nothing is noisy.
+    All costs are 1 if the first trial has no noise.
     """
     products = [
         variance * trial.rays * trial.ray

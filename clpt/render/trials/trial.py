@@ -1,8 +1,8 @@
-"""A trial of ways to render a scene: each makes small pictures, and the best one makes the picture.
+"""A trial of integrators: each makes small pictures, and the cheapest makes the whole picture.
 
-It is a function of the scene and its seed, so whoever takes samples takes those of one way. Its
-samples are few beside the picture's, of other seeds, and no part of it: its mean would else depend
-on what they bring.
+A trial is a function of the scene and its seed, so all devices and workers choose the same
+integrator. Its samples are few, have other seeds, and are no part of the picture: otherwise the
+mean of the picture would depend on their values.
 """
 
 from __future__ import annotations
@@ -15,9 +15,18 @@ import numpy as np
 
 from clpt import device
 from clpt.render.flow.scene_to_tables import Lowered
-from clpt.render.transport import worth
 from clpt.render.trials import cost
-from clpt.render.trials.cost import GUIDED_RAY, LIGHT_RAY, PHOTON_RAY, ROUNDS, SAMPLES, Trial
+from clpt.render.trials.cost import (
+    GUIDE_RAYS,
+    GUIDED_RAY,
+    LIGHT_RAY,
+    PHOTON_RAY,
+    PLAIN_RAYS,
+    ROUNDS,
+    SAMPLES,
+    SHARE,
+    Trial,
+)
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.wavefront import Wavefront
@@ -26,14 +35,14 @@ from clpt.scene.integrators import Integrator, Vcm
 log = logging.getLogger(__name__)
 
 SEED = 0x2545F491
-QUIET = 0.4  # variance of such pictures up to which no guide is tried: that takes a compilation
-LESSON = 8  # of the light paths from which a guide learns at last, for each in a trial, at most
+QUIET = 0.4  # variance of small pictures: a guide, which must be compiled, is tried above it
+LESSON = 8  # a trial trains its guide with at least 1/LESSON of the light paths of the film
 FEWEST_LESSONS = 1 << 18
 
 
 @dataclass(frozen=True)
 class Ground:
-    """Where ways are tried: a device, and what suits it, see `Wavefront.create`."""
+    """The device of trials, and its tuning, see `Wavefront.create`."""
 
     device: device.Device
     tuning: Tuning
@@ -41,50 +50,50 @@ class Ground:
 
 
 class Tries:
-    """Ways of which each has been tried, the one that the scene chose first; costs: of each."""
+    """Integrators that have been tried; the first is the choice of the scene."""
 
     def __init__(self, ground: Ground, samples: int):
         self._ground, self._samples = ground, samples
-        self._scene: DeviceScene | None = None  # of the first way, whose trees all share
+        self._scene: DeviceScene | None = None  # of the first trial; later trials share its trees
         self.ways: list[Lowered] = []
         self._trials: list[Trial] = []
 
     def add(self, way: Lowered) -> None:
-        """Try a way. Raises what `Wavefront.create` raises."""
+        """Try an integrator. Raises as `Wavefront.create` does."""
         trial, self._scene = tried(self._ground, way, self._samples, self._scene)
         self.ways.append(way)
         self._trials.append(trial)
 
     @property
     def costs(self) -> list[float]:
-        """The cost of each way over that of the first one."""
+        """The cost of each integrator over the cost of the first."""
         return cost.costs(self._trials)
 
     @property
     def best(self) -> int:
-        """The number of the way of the lowest cost."""
-        found = self.costs
-        return min(range(len(found)), key=lambda i: (found[i], i))
+        """The number of the integrator of the lowest cost."""
+        return int(np.argmin(self.costs))
 
     @property
     def noise(self) -> float:
-        """The variance of the ordinary pixels of the best way's pictures."""
+        """The variance of ordinary pixels in pictures of the best integrator."""
         return cost.variances(self._trials, cost.ODD)[self.best]
 
     @property
     def rays(self) -> float:
-        """The rays that the best way would trace for the whole film."""
+        """The rays of the best integrator for the whole film."""
         trial = self._trials[self.best]
         return trial.rays / (trial.pictures[..., 0].size * SAMPLES) * self._samples
 
 
 def decided(ground: Ground, lowered: Lowered, lower_as: Callable[[Integrator], Lowered]) -> Lowered:
-    """Return a scene lowered for the best of its candidates, and why in its reason.
+    """Return a scene lowered for the cheapest of its candidates, with the costs in its reason.
 
-    lowered: for the first one; lower_as: lowers it for another. What has to be compiled is tried
-    where the best way so far has much to trace, and a guide where that leaves noise too.
+    lowered: for the first candidate; lower_as: lowers the scene for another. A candidate that must
+    be compiled is tried if the best so far has many rays to trace, and a guide only if that leaves
+    noise.
 
-    Raises what `Wavefront.create` raises.
+    Raises as `Wavefront.create` does.
     """
     tries = Tries(ground, lowered.samples)
     tries.add(lowered)
@@ -93,19 +102,19 @@ def decided(ground: Ground, lowered: Lowered, lower_as: Callable[[Integrator], L
             tries.add(lower_as(way))
     costs, best = tries.costs, tries.ways[tries.best]
     named = zip(tries.ways, costs, strict=True)
-    told = ", ".join(f"{name_of(way.integrator)} {figure:.2f}" for way, figure in named)
-    log.info("a trial of small pictures: noise %.3g; costs: %s", tries.noise, told)
-    reason = f"{lowered.reason}; of a trial's costs the lowest: {told}" if costs[1:] else ""
+    text = ", ".join(f"{name_of(way.integrator)} {figure:.2f}" for way, figure in named)
+    log.info("a trial of small pictures: noise %.3g; costs: %s", tries.noise, text)
+    reason = f"{lowered.reason}; of a trial's costs the lowest: {text}" if costs[1:] else ""
     return replace(best, reason=reason or lowered.reason, candidates=())
 
 
 def is_worth(way: Integrator, rays: float) -> bool:
-    """Return whether a film of so many rays is worth the compilation that trying a way takes."""
-    return rays >= (worth.GUIDE_RAYS if way.guiding else worth.PLAIN_RAYS)
+    """Return whether a film of so many rays is worth the compilation of another integrator."""
+    return rays >= (GUIDE_RAYS if way.guiding else PLAIN_RAYS)
 
 
 def name_of(way: Integrator) -> str:
-    """Return what a candidate is called, for people."""
+    """Return the name of a candidate, for people."""
     if way.guiding:
         return "guiding"
     if isinstance(way, Vcm):
@@ -116,9 +125,9 @@ def name_of(way: Integrator) -> str:
 def tried(
     ground: Ground, lowered: Lowered, samples: int, like: DeviceScene | None
 ) -> tuple[Trial, DeviceScene]:
-    """Return the pictures that a way makes of a scene, and what they took.
+    """Return the trial of a lowered scene, and the scene on the device.
 
-    samples: of the whole film; like: the scene as another way has it, None for the first one.
+    samples: of the whole film; like: the scene of an earlier trial, whose trees are shared.
     """
     settings = cost.settings(lowered.settings, cost.pixels_for(samples))
     settings["guide_paths"] = lessons(int(settings["guide_paths"]), samples)
@@ -139,16 +148,16 @@ def tried(
 
 
 def lessons(paths: int, samples: int) -> int:
-    """Return from how many light paths a guide learns in a trial, for a film of so many samples.
+    """Return the number of light paths that train a guide in a trial.
 
-    paths: from which it would learn for the film. A coarser guide has more noise than it, so a
-    trial comes as near to it as what other ways take allows.
+    paths: the number for the whole film; samples: of the whole film. A guide with less training
+    leaves more noise, so a trial trains as much as it can afford.
     """
-    return min(max(paths // LESSON, samples // worth.SHARE, FEWEST_LESSONS), paths)
+    return min(max(paths // LESSON, samples // SHARE, FEWEST_LESSONS), paths)
 
 
 def _ray(lowered: Lowered) -> float:
-    """Return the time of a way's ray over one of `path`."""
+    """Return the time of a ray, relative to the integrator `path`."""
     if lowered.features.transport.guided:
         return GUIDED_RAY
     if lowered.features.transport.merged:

@@ -12,15 +12,14 @@ these samples do not go into the picture.
 
 Light paths, where the scene has them, reach all pixels: see clpt.render.wavefront.light_rounds.
 
-For a picture that is denoised what is left after that decides, see
-clpt.render.wavefront.denoised_noise. That falls slower than noise does while samples are added, so
-nothing is decided ahead.
+For a denoised picture the noise after denoising decides, see clpt.render.wavefront.denoised_noise.
+It falls slower than the noise of samples, so nothing is decided ahead.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -29,17 +28,18 @@ from numpy.typing import NDArray
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.render.records import Features
+from clpt.render.wavefront.denoised_noise import DenoisedNoise
 from clpt.render.wavefront.light_rounds import LightRounds
 from clpt.render.wavefront.noise_meter import NoiseMeter, divide
-from clpt.render.wavefront.tracer import OnBatch, Selection, Tracer
-from clpt.render.wavefront.wavefront import Wavefront
+from clpt.render.wavefront.tracer import Selection, Tracer
+from clpt.render.wavefront.wavefront import OnBatch, Wavefront
 from clpt.render.wavefront.work_list import FOREVER
 from clpt.scene import checked_noise
 from clpt.scene.integrators import PIXELWISE
 
-LEAST = 8  # samples of a pixel at the first look at the film; the second look tells the noise
-AHEAD = 4  # a look decides where up to as many times its own samples are needed
-STEPS = 4  # a number of samples is decided in steps of this part of those at the look
+LEAST = 8  # samples of a pixel at the first look at the film; the second look measures noise
+AHEAD = 4  # a look decides for cells that need at most so many times the samples at the look
+STEPS = 4  # decided numbers of samples are multiples of 1/STEPS of the samples at the look
 OPEN = FOREVER  # of a cell whose number of samples is not decided
 
 
@@ -73,18 +73,18 @@ class Adaptive:
     beside it.
 
     noise: the limit; next: (cells,) the first sample that a cell's pixels do not have;
-    stop: (cells,) how many samples they will have. tracer: adds samples to the film. left: returns
-    what relative variance is left in cells after denoising, of a picture that is denoised.
+    stop: (cells,) how many samples they will have. tracer: adds samples to the film. denoised:
+    measures the noise of a denoised picture.
     """
 
     def __init__(
         self,
         wavefront: Wavefront,
         tracer: Tracer | None = None,
-        left: Callable[[NDArray[np.bool_]], Floats] | None = None,
+        denoised: DenoisedNoise | None = None,
     ):
         self.wavefront, self._meter = wavefront, NoiseMeter(wavefront)
-        self._tracer, self._left = tracer or Tracer(wavefront), left
+        self._tracer, self._denoised = tracer or Tracer(wavefront), denoised
         self._pixels = self._meter.pixels
         self._rate = _rate(wavefront.features)
         count = len(self._pixels)
@@ -99,7 +99,7 @@ class Adaptive:
         self._level = 0  # samples at the last look
         self._measured_at = np.zeros(count, np.int64)  # samples when a cell was last measured
         self._variance = np.full(count, np.inf)  # of a sample, relative; of n over n^rate
-        self._has_guides = False  # whether the film has samples beside those of the picture
+        self._has_guides = False  # whether the film has samples of guides beside the picture's
         self._kept: dict[str, NDArray[Any]] | None = None
 
     @property
@@ -129,7 +129,7 @@ class Adaptive:
         return np.where(np.isfinite(self._variance), self._variance, 0.0)
 
     def skip(self, samples: int) -> None:
-        """Note that every pixel has all samples before this one, whatever its noise."""
+        """Note that every pixel has all samples up to this number, whatever its noise."""
         self.next[:] = samples
         self._level = max(self._level, samples)
         self.stop[self.stop < samples] = samples
@@ -145,27 +145,27 @@ class Adaptive:
         self._kept = self._read()
 
     def _read(self) -> dict[str, NDArray[Any]]:
-        own = {
+        state = {
             "next": self.next, "stop": self.stop, "measured_at": self._measured_at,
             "variance": self._variance, "noise": np.float64(self.noise),
             "level": np.int64(self._level), **self._meter.arrays(),
         }  # fmt: skip
         if self._lights is not None:
-            own |= {f"lights_{name}": array for name, array in self._lights.arrays().items()}
-        return {name: np.array(array) for name, array in own.items()}
+            state |= {f"lights_{name}": array for name, array in self._lights.arrays().items()}
+        return {name: np.array(array) for name, array in state.items()}
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from a state of the same film. Raises KeyError, ValueError for another one."""
+        """Go on from a state of the same film. Raises KeyError, ValueError for another film."""
         self.next[:], self.stop[:] = arrays["next"], arrays["stop"]
         self._measured_at[:], self._variance[:] = arrays["measured_at"], arrays["variance"]
         self.noise, self._level = float(arrays["noise"]), int(arrays["level"])
         self._meter.restore(arrays)
         if self._lights is not None:
-            own = {n.removeprefix("lights_"): a for n, a in arrays.items() if n[:7] == "lights_"}
-            self._lights.restore(own)
+            names = [name for name in arrays if name.startswith("lights_")]
+            self._lights.restore({name.removeprefix("lights_"): arrays[name] for name in names})
 
     def become(self, other: Adaptive) -> None:
-        """Take the place of another one, as on another device."""
+        """Take the state of another, as on another device."""
         vars(self).update(vars(other))
 
     def run(self, end: int, noise: float, on_batch: OnBatch) -> bool:
@@ -191,7 +191,7 @@ class Adaptive:
         return True
 
     def finish(self) -> None:
-        """Take paths of learning out of the film, wherever an interrupt has left `run`."""
+        """Remove samples of guides from the film, wherever an interrupt has left `run`."""
         if self._has_guides:
             self._give_film_back()
         self.next = np.maximum(self.next, self._begun)
@@ -199,7 +199,7 @@ class Adaptive:
         self.noise = 0.0  # all is decided again
 
     def _goes_on(self, end: int) -> bool:
-        """Whether something is missing of what is to come before sample `end`."""
+        """Whether samples are missing before sample `end`."""
         lights = self._lights is not None and self._lights.next < min(self._lights.wanted, end)
         return lights or bool((self.next < np.minimum(self.stop, end)).any())
 
@@ -246,9 +246,9 @@ class Adaptive:
         """Add samples to every cell up to its end; return whether it was not stopped."""
         behind = (self.next < ends) & (self._pixels > 0)
         for first in np.unique(self.next[behind]):
-            own = np.where(behind & (self.next == first), ends, 0)
-            chosen = Selection("camera", int(self._pixels[own > 0].sum()), own)
-            if not self._tracer.add(chosen, int(first), int(own.max()), on_batch):
+            stops = np.where(behind & (self.next == first), ends, 0)
+            chosen = Selection("camera", int(self._pixels[stops > 0].sum()), stops)
+            if not self._tracer.add(chosen, int(first), int(stops.max()), on_batch):
                 return False
         return True
 
@@ -256,33 +256,33 @@ class Adaptive:
         """Estimate the relative variance of a sample in these cells."""
         if not cells.any():
             return
-        if self._left is None:
-            # From n samples to 2n variance falls by 2^rate - 1 of what is left.
+        if self._denoised is None:
+            # From n samples to 2n variance falls by 2^rate - 1 times the variance at 2n.
             relative = self._meter.measure(cells) / (2.0**self._rate - 1.0)
             known = cells & (self._measured_at > 0)
         elif self._level < 2 * LEAST:
             return
         else:
-            relative, known = self._left(cells), cells
+            relative, known = self._denoised.measure(cells), cells
         self._variance[known] = self._level**self._rate * relative[known]
         self._measured_at[cells] = self._level
 
     def _decide(self, noise: float) -> None:
-        """Decide how many samples cells get whose partners know it closely enough."""
+        """Decide the number of samples of cells whose partners are measured well enough."""
         limit: Any = noise**2
         if self._lights is not None:
             self._lights.decide(limit, self._known_variance, AHEAD, STEPS)
             limit = self._lights.left_over(limit, self._known_variance)[self._partner]
         measured_at = self._measured_at[self._partner]
         needed = divide(self._variance[self._partner], limit) ** (1.0 / self._rate)
-        ahead = AHEAD if self._left is None else 1
+        ahead = AHEAD if self._denoised is None else 1
         sure = (self.stop == OPEN) & (needed <= ahead * measured_at) & (self._pixels > 0)
         step = np.maximum(measured_at // STEPS, 1)
         wanted = np.ceil(np.where(sure, needed, 0.0) / step) * step
         self.stop[sure] = np.maximum(wanted, measured_at)[sure]
 
     def _give_film_back(self) -> None:
-        """Give the film back the samples that it had before."""
+        """Restore the samples that the film had before."""
         self._tracer.give_back()
         self._has_guides = False
 
@@ -297,13 +297,13 @@ def _rate(features: Features) -> float:
 def _partners(pixels: Integers, across: int) -> Integers:
     """Return the cell that decides about each cell: of the other colour, with pixels.
 
-    pixels: of each cell. In a film of one pixel there is none: its cell is its own partner, and its
-    mean has a bias, of the order of 1 over its samples.
+    pixels: of each cell. In a film of a single pixel the cell is its own partner, and the mean has
+    a bias of the order of 1 over the samples.
     """
     cells = np.arange(len(pixels))
     partner = cells ^ 1
     row, column = np.divmod(cells // 2, across)
-    for rows, columns in ((0, -1), (-1, 0)):  # only the last square may have one pixel
+    for rows, columns in ((0, -1), (-1, 0)):  # only the last square may have a single pixel
         beside = (row + rows) * across + column + columns
         usable = (row + rows >= 0) & (column + columns >= 0)
         other = np.where(usable, 2 * beside + 1 - cells % 2, partner)

@@ -1,6 +1,6 @@
-"""The bounce loop of one kind of paths: its kernels, and how they run until all paths have ended.
+"""The bounce loop of a single kind of paths: its kernels, which run until all paths have ended.
 
-The host only enqueues; it reads the counters of an iteration while later ones run.
+The host only enqueues; it reads the counters of an iteration while later iterations run.
 """
 
 from __future__ import annotations
@@ -21,21 +21,23 @@ from clpt.device.stream import Timings
 from clpt.render.flow import bounce, programs, signatures
 from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.records import Features
-from clpt.render.wavefront import queues, strategy
+from clpt.render.wavefront import strategy
 from clpt.render.wavefront.device_scene import DeviceScene
-from clpt.render.wavefront.path_buffers import GROUP, PathBuffers
+from clpt.render.wavefront.path_buffers import GROUP, PathBuffers, queue_steps
 from clpt.render.wavefront.strategy import Strategy
 
 BATCH = 8  # bounces that are enqueued between two reads of the counters
-CORE_BOUNCES = 1 << 16  # of all slots, that a core's part of a loop takes at once
-LEAST_LAUNCH = 1 / 2  # of the usual one: shorter ones cost too much
-LAUNCHES = 3  # that a run has to wait for, about, before it ends
-LOOP_SECONDS = 0.5  # of a launch of the loop at most, as far as one bounce of all slots allows
+CORE_BOUNCES = 1 << 16  # bounces of all slots in a launch of the loop, for each core
+LEAST_LAUNCH = 1 / 2  # of the usual launch: shorter launches cost too much
+LAUNCHES = 3  # launches that a run waits for, about, before it ends
+LOOP_SECONDS = 0.5  # of a launch of the loop at most, unless a single bounce takes longer
 LAUNCH_SECONDS = 0.05  # of a stage at most: drivers of GPUs that draw a screen end long kernels
-FIRST_PARTS = 8  # launches that a stage is divided into before it is known how long one takes
+FIRST_PARTS = 8  # launches of a stage before the time of a launch is known
 LEAST_ITEMS = 1 << 12  # of a part
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
 IDLE = {"samples": (0, 0), "bounces": 0, "restart": 0, "leave": None}  # has nothing to do
+
+OnCounters = Callable[[NDArray[np.uint64]], bool]  # returns whether a run goes on
 
 
 @dataclass(frozen=True)
@@ -57,11 +59,11 @@ class Step:
 
 
 def next_bounces(bounces: int, took: float, most: int, cancel_seconds: float | None) -> int:
-    """Return the bounces of the next launch of a loop, after one of `bounces`.
+    """Return the bounces of the next launch of a loop, after a launch of `bounces`.
 
-    took: the time of that [s]; most: what suits the device; cancel_seconds: in which a run is to
-    end that is stopped [s], or None. A launch takes LOOP_SECONDS at most, as far as one bounce of
-    all slots allows: whatever a bounce costs, the host looks at limits and signals meanwhile.
+    took: the time of that launch [s]; most: for the device; cancel_seconds: the longest time from a
+    request to stop to the end of the run [s], or None. A launch takes LOOP_SECONDS at most, unless
+    a single bounce of all slots takes longer: the host looks at limits and signals between.
     """
     rate, wanted = bounces / max(took, 1e-6), most
     if cancel_seconds is not None:
@@ -73,7 +75,7 @@ def next_bounces(bounces: int, took: float, most: int, cancel_seconds: float | N
 class Kernels:
     """Programs of a device by name, and their kernels with the arguments that they all share.
 
-    arguments: returns these by name. seconds: that building took.
+    arguments: returns the arguments by name. seconds: of building.
     """
 
     def __init__(self, on: device.Device, arguments: Callable[[], dict[str, Any]]):
@@ -89,7 +91,7 @@ class Kernels:
         self.seconds += time.perf_counter() - start
 
     def keep(self, name: str, make: Callable[[], device.Program]) -> None:
-        """Make a program, if there is none of its name."""
+        """Make a program, unless a program has its name."""
         if name not in self.programs:
             start = time.perf_counter()
             self.programs[name] = make()
@@ -104,11 +106,11 @@ class Kernels:
 
 @dataclass(frozen=True)
 class Ending:
-    """The way in which a run of a bounce loop ends that is stopped.
+    """The end of a stopped run of a bounce loop.
 
-    leave: raised, it lets the run leave its paths in flight, where the device runs the loop and
-    sees it: then on_batch must raise; None: nothing does. seconds: in which it is to end [s], None
-    for what suits the device.
+    leave: a flag; if it is raised the run may abandon paths in flight, where the device runs the
+    loop, and on_batch must raise; None: the run completes its paths. seconds: the longest time to
+    the end [s]; None: the default of the device.
     """
 
     leave: device.Flag | None = None
@@ -116,9 +118,9 @@ class Ending:
 
 
 class BounceLoop:
-    """The bounce loop of one kind of paths in a scene.
+    """The bounce loop of a single kind of paths in a scene.
 
-    which: of `Features.passes`; per_sample: how many of its paths are traced for a sample.
+    which: index in `Features.passes`; per_sample: paths for each sample.
     """
 
     def __init__(
@@ -135,7 +137,7 @@ class BounceLoop:
         self.device, self.stream, self.looped = scene.device, scene.stream, looped
         self.lanes = self.device.lanes
         self._which, self._leave = which, ending.leave
-        self._first = 0  # path that the last run began with
+        self._first = 0  # the first path of the last run
         self.is_last = which == len(scene.lowered.features.passes) - 1
         self.per_sample = 1 if self.is_last else float(scene.lowered.settings["light_paths"]) or 1
         self._label = "" if self.is_last else "light "
@@ -164,8 +166,8 @@ class BounceLoop:
         if self._loop is None:
             scene = self.scene
             self.kernels.keep("loop", lambda: self._link(scene.lowered, scene.strategy))
-            own = {"share": self._share, "which": self._which}
-            self._loop = self.kernels.bind("loop", "loop", **IDLE, **own)
+            arguments = {"share": self._share, "which": self._which, **IDLE}
+            self._loop = self.kernels.bind("loop", "loop", **arguments)
         return self._loop
 
     def prepare(self) -> None:
@@ -173,7 +175,7 @@ class BounceLoop:
         _ = self.loop if self.looped else self.stages
 
     def build_ahead(self, lowered: Lowered, chosen: Strategy) -> None:
-        """Build the programs that are in use for another lowering, so that no later build fails."""
+        """Build the programs in use for another lowering, so that no later build fails."""
         if self._stages is not None:
             device.build_all(self.device, self._texts(lowered, chosen))
         if self._loop is not None:
@@ -199,7 +201,7 @@ class BounceLoop:
         event = self.stream.run(self.loop, *self._loop_sizes())
         self.timings.add(f"{self._label}loop", event)
 
-    def run(self, first: int, end: int, on_batch: Callable[[NDArray[np.uint64]], bool]) -> bool:
+    def run(self, first: int, end: int, on_batch: OnCounters) -> bool:
         """Trace the paths of samples first to end - 1 of every pixel, and wait.
 
         on_batch is called every few iterations with the counters; if it returns False, every path
@@ -221,7 +223,7 @@ class BounceLoop:
         self,
         numbers: tuple[int, int],
         leave: object,
-        on_batch: Callable[[NDArray[np.uint64]], bool],
+        on_batch: OnCounters,
     ) -> bool:
         """Trace paths of these numbers until none is in flight; see `run`."""
         steps = self._batch()
@@ -259,7 +261,7 @@ class BounceLoop:
         return finished
 
     def _launch(self, step: Step) -> None:
-        """Enqueue a step; a stage in several launches if one would take too long."""
+        """Enqueue a step; a stage in several launches if a single launch would take too long."""
         for first, items in step.parts(1 if self.looped else self._parts):
             event = self.stream.run(step.bound, (items,), step.group, (first,) if first else None)
             self.timings.add(step.name, event)
@@ -286,7 +288,7 @@ class BounceLoop:
         append = f"{self._label}append"
         return [
             Step(name, self.kernels.bind(append, name), (size,), (group,) if group else None)
-            for name, size, group in queues.steps(self.paths.slots, kinds)
+            for name, size, group in queue_steps(self.paths.slots, kinds)
         ]
 
     def _texts(self, lowered: Lowered, chosen: Strategy) -> dict[str, device.Source]:
@@ -309,12 +311,12 @@ class BounceLoop:
         return self.stages * BATCH
 
     def _adjust(self, loop: device.BoundKernel, took: float) -> None:
-        """Let launches take so long as suits; took: what is between two reads of counters [s].
+        """Adjust the length of launches; took: the time between two reads of counters [s].
 
-        One of the loop: that a run ends in time, and looks at its limits meanwhile. A stage's: that
-        no driver ends it.
+        A launch of the loop must let a run end in time, and look at its limits. A launch of a stage
+        must be too short for a driver to end it.
         """
-        if not self.looped:  # one stage may take all of a bounce
+        if not self.looped:  # a single stage may take all of a bounce
             self._parts = max(1, math.ceil(took / BATCH / LAUNCH_SECONDS))
             return
         most = self._most_bounces()

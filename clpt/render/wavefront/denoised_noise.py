@@ -1,14 +1,14 @@
 """Noise that is left after denoising, cell by cell, for adaptive sampling.
 
 Both halves of the samples are denoised. The noise of a half is independent of the other half, so
-the distance of a denoised half from the other one tells its error, blur included: with halves a
+the distance of a denoised half from the other half measures its error, blur included: with halves a
 and b, and d of them denoised, the square of (d(a) + d(b)) / 2 - truth is on average
 
     ((d(a) - b)^2 + (d(b) - a)^2) / 2 - (a - b)^2 / 2 - (d(a) - d(b))^2 / 4
 
 The two colours of the chessboard (clpt.render.wavefront.adaptive) are denoised apart, each in a
-picture of half the width. So the error of one colour's pixels does not depend on the samples of
-the other, whose numbers it decides.
+picture of half the width. So the error of a colour's pixels does not depend on the samples of the
+other colour, whose numbers it decides.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from clpt.denoise import needs
 from clpt.denoise.oidn import LUMINANCE, Oidn
 from clpt.denoise.statistical import Statistical
 from clpt.render.film.pictures import Pictures
-from clpt.render.wavefront.cells import SIDE
 from clpt.render.wavefront.noise_meter import DARK, divide
+from clpt.render.wavefront.work_list import SIDE
 
-SURE = {"oidn": 0.02, "statistical": 0.1}  # of the noise before: less is not believed to be left
-BESIDE = 2  # squares around those that are asked for, which are denoised with them
-AROUND = np.array([1.0, 2.0, 1.0])  # how much squares in a row count beside each other
+SURE = {"oidn": 0.02, "statistical": 0.1}  # least share of the noise that remains
+BESIDE = 2  # squares around the wanted squares, which are denoised with them
+AROUND = np.array([1.0, 2.0, 1.0])  # weights of neighbouring squares in a row
 
 
 class DenoisedNoise:
-    """Tells how far a picture is from the truth once it is denoised.
+    """A meter of the error of a denoised picture.
 
-    picture: returns it as it is now, with halves; on: the device that denoises; method: a name of
-    clpt.choices.DENOISERS.
+    picture: returns the present picture, with halves; on: the device that denoises; method: a name
+    of clpt.choices.DENOISERS.
     """
 
     def __init__(self, picture: Callable[[], Pictures], on: device.Device, method: str):
@@ -47,10 +47,9 @@ class DenoisedNoise:
     def measure(self, cells: NDArray[np.bool_]) -> Floats:
         """Return the mean square of the relative error of luminance left in cells, (cells,).
 
-        cells: that are asked for; others may be 0. An error is relative to the denoised light;
-        light that is darker than a hundredth of the picture's mean counts as if it were so bright.
-        One square tells little, so those around it count too. What is left is no more than the
-        noise before, which pixels of one colour alone may hide, as their edges are rough. Raises
+        cells: the cells to measure; others may be 0. An error is relative to the denoised light,
+        but at least to a hundredth of the picture's mean. A single square is too noisy, so
+        neighbouring squares count too. The error is at most the noise before denoising. Raises
         DeviceError where the denoiser fails.
         """
         picture = self._picture()
@@ -58,8 +57,10 @@ class DenoisedNoise:
         height, width = halves[0].shape[:2]
         down, across = -(-height // SIDE), -(-width // SIDE)
         dark = DARK * max(float(np.mean(halves[0] + halves[1]) / 2.0), 0.0)
-        found = np.zeros((down, across, 2))
-        rows, columns = (_part(cells.reshape(found.shape).any(axis=(2, axis))) for axis in (1, 0))
+        left_over = np.zeros((down, across, 2))
+        rows, columns = (
+            _part(cells.reshape(left_over.shape).any(axis=(2, axis))) for axis in (1, 0)
+        )
         part = tuple(slice(each.start * SIDE, each.stop * SIDE) for each in (rows, columns))
         surfaces = [layers[name][part] if name in layers else None for name in needs.LAYERS]
         even, odd = (np.nan_to_num(half[part]) for half in halves)
@@ -68,16 +69,16 @@ class DenoisedNoise:
             beside = [None if image is None else image[y, x] for image in surfaces]
             squares = (y // SIDE * (columns.stop - columns.start) + x // SIDE)[inside]
             errors = self._errors(colour, (even[y, x], odd[y, x]), beside, dark)
-            shape = found[rows, columns, 0].shape
+            shape = left_over[rows, columns, 0].shape
             count, left, before = (
                 _around(np.bincount(squares, each[inside], shape[0] * shape[1]).reshape(shape))
                 for each in (np.ones(x.shape), *errors)
             )
             before = divide(before, count)
-            found[rows, columns, colour] = np.clip(
+            left_over[rows, columns, colour] = np.clip(
                 divide(left, count), SURE[self._method] * before, before
             )
-        return found.ravel()
+        return left_over.ravel()
 
     def _errors(
         self,
@@ -111,16 +112,17 @@ class DenoisedNoise:
         return oidn.colours(halves[0]), oidn.colours(halves[1])
 
 
-def _part(asked: NDArray[np.bool_]) -> slice:
-    """Return the rows or columns of squares that are asked for, and what a denoiser sees beside."""
-    found = np.flatnonzero(asked)
-    return slice(max(int(found[0]) - BESIDE, 0), min(int(found[-1]) + 1 + BESIDE, len(asked)))
+def _part(wanted: NDArray[np.bool_]) -> slice:
+    """Return the range of wanted rows or columns of squares, with their surroundings."""
+    squares = np.flatnonzero(wanted)
+    first, last = int(squares[0]), int(squares[-1])
+    return slice(max(first - BESIDE, 0), min(last + 1 + BESIDE, len(wanted)))
 
 
 def _pixels(height: int, width: int, colour: int) -> tuple[Any, Any, NDArray[np.bool_]]:
-    """Return y, x of a colour's pixels, and which are there, (h, half the width) each.
+    """Return y and x of a colour's pixels, and whether they exist, (h, half the width) each.
 
-    A row with a pixel less has its last one twice.
+    A row with a pixel less has its last pixel twice.
     """
     y = np.broadcast_to(np.arange(height)[:, None], (height, -(-width // 2)))
     x = 2 * np.arange(-(-width // 2)) + (y + colour) % 2
@@ -129,7 +131,7 @@ def _pixels(height: int, width: int, colour: int) -> tuple[Any, Any, NDArray[np.
 
 
 def _around(sums: NDArray[Any]) -> Floats:
-    """The sums of squares (rows, columns), with those around each."""
+    """Sums over each square (rows, columns) and its neighbours, weighted by AROUND."""
     padded = np.pad(sums, 1)
     rows = sum(AROUND[i] * padded[i : i + sums.shape[0]] for i in range(3))
     return np.asarray(sum(AROUND[i] * rows[:, i : i + sums.shape[1]] for i in range(3)))

@@ -19,7 +19,7 @@ from clpt.render.wavefront.strategy import Strategy
 
 _BRICKS = "stage/brick_density.cl"
 _CLOUD = "stage/cloud_density.cl"
-UPLOADED = tuple(name for name in TABLES if name != "instances")  # that one is of the trees
+UPLOADED = tuple(name for name in TABLES if name != "instances")  # the trees have the instances
 
 
 class DeviceScene:
@@ -27,8 +27,8 @@ class DeviceScene:
 
     lowered: the scene as it was lowered, which other device scenes may share: nobody writes to it.
     tables: the buffers of its tables by name; trees: over its triangles, shapes and instances.
-    moved_tables: tables that kernels have written since, whose words differ from those of
-    `lowered`; tree_refitted: whether the tree over triangles is another than would be built.
+    moved_tables: tables that kernels have written, whose words differ from the words in
+    `lowered`; tree_refitted: whether the tree over triangles was refitted since it was built.
     quality: of the trees, see clpt.bvh.build; or a scene of the same shapes, whose trees it shares.
 
     Raises MemoryBudgetError, DeviceError.
@@ -67,9 +67,9 @@ class DeviceScene:
         return {**self.tables, **self.trees.arguments}
 
     def fill_grids(self) -> None:
-        """Enqueue that the bricks of densities on a device, and of clouds, follow from these.
+        """Enqueue the kernels that make bricks of densities on a device, and of clouds.
 
-        A density of another context comes over the host, which waits for it.
+        A density of another context is copied through the host, which waits.
         """
         for grid in self.lowered.device_grids:
             source, begin = self._density(grid.values)
@@ -86,16 +86,18 @@ class DeviceScene:
             )
 
     def _density(self, values: Values) -> tuple[cl.Buffer, int]:
-        """A buffer with a density, and the first number of it there."""
+        """A buffer with a density, and the index of its first number."""
         if isinstance(values, CloudDensity):
-            made = self.buffers.allocate("the density of a cloud", 4 * int(np.prod(values.shape)))
+            density = self.buffers.allocate(
+                "the density of a cloud", 4 * int(np.prod(values.shape))
+            )
             self._building.run_each(
                 _CLOUD, "cloud_density", int(np.prod(values.shape)),
                 numbers=self.upload("clouds", values.numbers),
                 permutation=self.upload("noise", PERMUTATION),
-                **dict(zip(("nx", "ny", "nz"), values.shape, strict=True)), values=made,
+                **dict(zip(("nx", "ny", "nz"), values.shape, strict=True)), values=density,
             )  # fmt: skip
-            return made, 0
+            return density, 0
         if values.context == self.device.context:
             self.stream.after(values.events)
             return values.base_data, values.offset // 4

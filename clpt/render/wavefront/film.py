@@ -126,7 +126,7 @@ class Film:
         return self._written
 
     def hold(self) -> None:
-        """Enqueue a copy of what the film holds, for `words`. Raises MemoryBudgetError."""
+        """Enqueue a copy of the film, for `words`. Raises MemoryBudgetError."""
         if not self._held:
             self._held = {
                 name: self._allocate(f"a copy of the {name}", sums.size, "save no films")

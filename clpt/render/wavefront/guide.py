@@ -1,4 +1,4 @@
-"""A guide on the device: it learns where light comes from (transport/guiding/guide.cl)."""
+"""A guide on the device: directions of light, learned from light paths (guiding/guide.cl)."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ class Guide:
 
     @property
     def samples(self) -> int:
-        """The light paths for each pixel from which it learns."""
+        """The light paths for each pixel that train it."""
         return -(-self._learns_from // self._paths.pixels)
 
     def clear(self) -> None:
-        """Enqueue that it knows nothing."""
+        """Enqueue that all sums are zero."""
         self.stream.fill(self.arguments["guide"], 0, 0, self._bytes)
 
     def prepare(self, kernels: Kernels) -> None:
-        """Build what `sum` runs. Raises KernelBuildError."""
+        """Build the program of `sum`. Raises KernelBuildError."""
         kernels.build({PROGRAM: device.assemble(ROOT)})
 
     def sum(self, kernels: Kernels) -> None:
-        """Enqueue that it stands for what light paths have left."""
+        """Enqueue the sums over the records of light paths; the guide is then trained."""
         self.prepare(kernels)
         bound = kernels.programs[PROGRAM].kernel(KERNEL).bind(**self.arguments)
         self.stream.run(bound, (self._rows,), (GROUP,))

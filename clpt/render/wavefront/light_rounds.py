@@ -1,9 +1,8 @@
-"""Light paths of adaptive sampling: one number for all pixels, as each may reach any.
+"""Light paths of adaptive sampling: the same number for all pixels, as each path may reach any.
 
-The number must not depend on what these paths bring, or their mean would be too dark where the
-noise seems to be low by chance. So others decide, which stay out of the picture: beside each four
-light paths one guide is traced, and what the guides' mean does while their number doubles tells
-how many are needed.
+The number must not depend on the values of these paths, or their mean would be too dark where the
+noise seems low by chance. So guides decide: light paths that stay out of the picture, a guide for
+four light paths. The change of their mean while their number doubles gives the noise.
 
 Let v be the relative variance of a sample of the camera in a cell, w that of a sample's light
 paths. n and m of them leave v / n + w / m, and n + m is least for a limit e of that where
@@ -17,7 +16,7 @@ colour take their n. The picture gets the larger m, which leaves less noise.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -26,10 +25,11 @@ from numpy.typing import NDArray
 from clpt.arrays import Floats
 from clpt.render.wavefront.noise_meter import NoiseMeter, divide
 from clpt.render.wavefront.tracer import Selection, Tracer
+from clpt.render.wavefront.wavefront import OnBatch
 from clpt.render.wavefront.work_list import FOREVER
 
-GUIDES = 4  # light paths for each that is a guide
-GUIDE_NUMBERS = 1 << 30  # from which on light paths are guides: no others have these numbers
+GUIDES = 4  # light paths of the picture for each guide
+GUIDE_NUMBERS = 1 << 30  # the number of the first guide, above all light paths of the picture
 
 
 class LightRounds:
@@ -74,32 +74,32 @@ class LightRounds:
 
     @property
     def wanted(self) -> int:
-        """The number of samples with which both colours have enough."""
+        """The number of samples that is enough for both colours."""
         return int(self.stop.max())
 
     @property
     def open(self) -> bool:
-        """Whether a colour does not know how many it wants."""
+        """Whether the number of some colour is not decided."""
         return self.wanted == FOREVER
 
     def skip(self, samples: int) -> None:
-        """Note that the picture has the light paths of all samples before this one."""
+        """Note that the picture has the light paths of all samples up to this number."""
         self.next = max(self.next, samples)
         self.stop = np.maximum(self.stop, samples)
 
     def reopen(self) -> None:
-        """Forget how many are wanted: the limit of noise is another one."""
+        """Forget how many are wanted, for another limit of noise."""
         self.stop[:] = FOREVER
 
-    def sample(self, end: int, on_batch: Callable[[Any], bool]) -> bool:
-        """Add light paths up to a sample, or to those wanted; return whether it was not stopped."""
+    def sample(self, end: int, on_batch: OnBatch) -> bool:
+        """Add light paths up to a sample, at most `wanted`; return whether it was not stopped."""
         first, end = self.next, min(end, self.wanted)
         if first >= end:
             return True
         self.next = end
         return self._tracer.add(Selection("lights", self._pixels), first, end, on_batch)
 
-    def measure(self, look: int, on_batch: Callable[[Any], bool]) -> bool:
+    def measure(self, look: int, on_batch: OnBatch) -> bool:
         """Estimate the variance by guides, at a look after some number of samples.
 
         The film then has the guides in place of the picture's light paths, and must be restored.
@@ -119,9 +119,9 @@ class LightRounds:
         self._guides = end
         undecided = np.tile(self.stop == FOREVER, len(self.variance) // 2)
         begun, ended = loop.numbers(start, start + end)
-        found = self.meter.measure_lights(undecided, float(ended - begun))
+        variance = self.meter.measure_lights(undecided, float(ended - begun))
         if self.meter.knows_brightness:
-            self.variance[undecided] = end * found[undecided]
+            self.variance[undecided] = end * variance[undecided]
             self._measured_at[self.stop == FOREVER] = look
         return True
 

@@ -1,4 +1,4 @@
-"""A meter of the noise in each cell of a film; see clpt.render.wavefront.cells."""
+"""A meter of the noise in each cell of a film; see clpt.render.wavefront.work_list."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats
 from clpt.render.flow import programs
-from clpt.render.wavefront.cells import SIDE
 from clpt.render.wavefront.wavefront import Wavefront
+from clpt.render.wavefront.work_list import SIDE
 
 DARK = 0.01  # of the picture's mean luminance: a darker tile counts as if it were as bright
 
@@ -51,13 +51,13 @@ class NoiseMeter:
         return self._dark is not None
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return what was measured so far, for `restore`; wait for the device."""
+        """Return the measurements so far, for `restore`; wait for the device."""
         mean = np.empty(self._previous_mean.size // 4, np.float32)
         mean = self.wavefront.stream.read(self._previous_mean, mean)
         return {"previous_mean": mean, "dark": np.zeros(0) if self._dark is None else self._dark}
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from what was measured."""
+        """Continue with measurements of `arrays`."""
         mean, dark = arrays["previous_mean"], arrays["dark"]
         if mean.nbytes != self._previous_mean.size:
             raise ValueError("the noise was measured of another film")
@@ -65,9 +65,9 @@ class NoiseMeter:
         self._dark = dark if len(dark) else None
 
     def measure(self, cells: NDArray[np.bool_]) -> Floats:
-        """Return the relative variance of what the camera's paths bring, (cells,) float64.
+        """Return the relative variance of camera paths, (cells,) float64.
 
-        It is that of the pixels' means, on average over each of the cells that are asked for.
+        It is the variance of the pixels' means, on average over each cell.
         """
         sums = self._sums_of_tiles(cells, 0.0)
         if self._dark is None:  # of each colour by itself
@@ -76,7 +76,7 @@ class NoiseMeter:
         return self._of_cells(sums)
 
     def measure_lights(self, cells: NDArray[np.bool_], light_paths: float) -> Floats:
-        """Likewise of what light paths bring; light_paths: of each pixel, that the film holds."""
+        """Return the variance of light paths likewise; light_paths: of each pixel in the film."""
         return self._of_cells(self._sums_of_tiles(cells, light_paths))
 
     def _of_cells(self, sums: Floats) -> Floats:

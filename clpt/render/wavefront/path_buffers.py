@@ -17,12 +17,13 @@ from clpt.errors import MemoryBudgetError
 from clpt.layout import SLAB_BLOCK, Record
 from clpt.records import COUNTER_NUMBERS, PATH, PATH_BITS, SLABS
 from clpt.render.flow.scene_to_tables import Lowered
-from clpt.render.wavefront import queues, work_list
-from clpt.render.wavefront.cells import CellGrid
+from clpt.render.wavefront import work_list
+from clpt.render.wavefront.work_list import CellGrid
 
 COUNTERS = COUNTER_NUMBERS.names
 PADDING = 80  # words between runs of all slots: powers of two collide in a cache
-GROUP = 64  # slots are a multiple of it, and it is the local size of one-lane kernels
+GROUP = 64  # slots are a multiple of it; the local size of kernels with a single lane
+QUEUE_GROUP = 256  # work-items that append to queues together
 FRESH = PATH_BITS["fresh"]
 CPU_SLOTS = 1 << 14
 UNIT_SLOTS = 1 << 14  # of a GPU's compute unit, which runs about an eighth of them at once
@@ -30,8 +31,27 @@ MOST_SLOTS = 1 << 22  # beyond, more slots bring no speed
 # A core keeps its paths in its second cache, and waits the less for the longest of them the more
 # samples each slot has to take: few slots, measured on CPUs.
 LOOP_SLOTS = 1 << 10  # of a core
-WORDS = sum(record.step for record in SLABS) + 2  # of a slot, with those of queues
+WORDS = sum(record.step for record in SLABS) + 2  # of a slot, with the words of queues
 LARGEST = max(record.step for record in SLABS)
+
+
+def queue_sizes(slots: int, kinds: int, queued: bool) -> dict[str, int]:
+    """Return the words of each buffer: a queue for every kind, or a single queue for the loop.
+
+    Queues bring together the slots that wait for a kind of material. `append` reserves entries for
+    a whole group of work-items at once, for a host that enqueues stages. In the loop on the device
+    (kernels/stage/loop.cl) a work-item sorts its own slots. The picture is the same to the bit,
+    since the work of a slot does not depend on its position in a queue.
+    """
+    if not queued:
+        return {"queue": slots}
+    return {"queue": slots * kinds, "queue_starts": kinds, "queue_counts": kinds}
+
+
+def queue_steps(slots: int, kinds: int) -> list[tuple[str, int, int | None]]:
+    """Return the kernels that fill queues, in order: name, work-items, work-items of a group."""
+    appended = -(-slots // QUEUE_GROUP) * QUEUE_GROUP
+    return [("append_begin", kinds, None), ("append", appended, QUEUE_GROUP)]
 
 
 @dataclass(frozen=True)
@@ -54,10 +74,10 @@ class Slots:
 
 
 def default_slots(info: device.DeviceInfo, footprint: int = 0) -> int:
-    """Return how many paths in flight suit a device: more for one with more compute units.
+    """Return the number of paths in flight for a device.
 
-    A CPU gets as many as its cache holds. Any other device gets several times as many as it runs at
-    once, so that no unit is idle while the last work-items of a queue run. footprint: words of a
+    A CPU gets as many as its cache holds. A GPU gets several times as many as it runs at once, so
+    that no compute unit is idle while the last work-items of a queue run. footprint: words of a
     slot beside its state.
     """
     if info.is_cpu:
@@ -74,12 +94,12 @@ def divide_film(
     halves: bool = False,
     footprint: int = 0,
 ) -> Slots:
-    """Return how a film is divided among slots: as many as are wanted, or as memory allows.
+    """Return the division of a film among slots.
 
-    memory: that buffers may take [bytes], of which slots get half; slots: wanted, None for what
-    suits the device; footprint: words of a slot beside its state. A film with fewer pixels than
-    slots gets several planes; one whose even and odd samples are kept apart (halves) an even number
-    of them. The picture does not depend on it.
+    memory: limit of all buffers [bytes]; slots get at most half. slots: the wanted number, None for
+    the default of the device; footprint: words of a slot beside its state. A film with fewer pixels
+    than slots gets several planes, with halves an even number of planes. The picture does not
+    depend on the division.
 
     Raises MemoryBudgetError.
     """
@@ -106,9 +126,9 @@ def divide_film(
 class PathBuffers:
     """The state of the paths in flight on a device.
 
-    settings: a copy of those of the lowered scene, with the numbers of slots and planes and the
-    seed of the samples; pixels: how many have samples, with those around the picture; blocks: slots
-    beyond those of the paths, see kernels/transport/queue.cl; in_blocks: whether slabs are, see
+    settings: a copy of the lowered scene's, with the numbers of slots and planes and the seed of
+    the samples; pixels: number of sampled pixels, with the margin; blocks: slots beyond the slots
+    of the paths, see kernels/transport/queue.cl; in_blocks: whether slabs are in blocks, see
     kernels/core/slab.cl.
 
     Raises MemoryBudgetError.
@@ -160,12 +180,12 @@ class PathBuffers:
         return CellGrid(self.settings)
 
     def new_queue(self, queued: bool, kinds: int) -> dict[str, Any]:
-        """Return what the kernels take that queue slots by material, with new buffers."""
-        sizes = queues.sizes(self.slots, kinds, queued)
+        """Return new buffers for queues of slots, by the names of kernels' arguments."""
+        sizes = queue_sizes(self.slots, kinds, queued)
         return {name: self.buffers.allocate("the queues", 4 * n) for name, n in sizes.items()}
 
     def set_work_list(self, padded_pixels: Integers, ends: Integers | None = None) -> None:
-        """Enqueue that slots sample these pixels from now on, each up to its own end."""
+        """Enqueue that slots sample these pixels from now on, each up to its end."""
         table = work_list.table(self.settings, padded_pixels, ends)
         self.stream.write(self._fixed["work_list"], table)
 
@@ -198,7 +218,7 @@ class PathBuffers:
         self.stream.fill(self._fixed["counters"], 0, 0, 8 * len(COUNTERS))
 
     def read_counters(self) -> tuple[NDArray[np.uint64], cl.Event]:
-        """Enqueue that the counters are read; return where to, and the event."""
+        """Enqueue a read of the counters; return the array on the host, and the event."""
         host = np.zeros(len(COUNTERS), np.uint64)
         return host, self.stream.read_later(self._fixed["counters"], host)
 

@@ -1,4 +1,4 @@
-"""Photons of a pass: their memory, and the kernels that sort them by the cells where they are."""
+"""Photons of a pass: their memory, and the kernels that sort them by cells."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PROGRAM, ROOT = "photons", "transport/photons/sort.cl"
 
 
 class Photons:
-    """The photons of one pass, which the next pass replaces.
+    """The photons of a pass, which the next pass replaces.
 
     settings: of the scene, with `photon_places` and so on; arguments: of kernels, by name.
 
@@ -54,11 +54,11 @@ class Photons:
         return sum(buffer.size for buffer in self.arguments.values()) + self._sums.size
 
     def clear(self) -> None:
-        """Enqueue that there are none."""
+        """Enqueue that no photon is stored."""
         self.stream.fill(self._numbers, NONE, 0, 4 * self.places)
 
     def prepare(self, kernels: Kernels) -> None:
-        """Build what `sort` runs. Raises KernelBuildError."""
+        """Build the program of `sort`. Raises KernelBuildError."""
         if self._sorting:
             return
         kernels.build({PROGRAM: device.assemble(ROOT)})
@@ -73,9 +73,9 @@ class Photons:
             ("photons_place", self.places, {**place, "order": order}),
             ("photons_order", self.cells, {**cell, "order": order}),
         ]
-        for name, items, given in steps:
+        for name, items, arguments in steps:
             group = GROUP if items > 1 else 1
-            bound = program.kernel(name).bind(**given)
+            bound = program.kernel(name).bind(**arguments)
             self._sorting.append(Step(name, bound, (-(-items // group) * group,), (group,)))
 
     def sort(self, kernels: Kernels) -> None:

@@ -13,18 +13,19 @@ from clpt.errors import SceneError
 from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.records import Features
 
-BRUTE_SHAPES = 32  # analytic shapes up to which a ray tests all of them
-INTERLEAVED_TRIANGLES = 1 << 20  # from which interleaved rays pay; see bench/notes/traversal.md
+BRUTE_SHAPES = 32  # the most analytic shapes that a ray tests without a tree
+INTERLEAVED_TRIANGLES = 1 << 20  # least number for interleaved rays: bench/notes/traversal.md
 INTERLEAVED_PIECES = 1 << 14  # of curves; see bench/notes/traversal.md
-FEW_OTHERS = 64  # shapes beside them that are no triangles, each of which is tested in all lanes
+FEW_OTHERS = 64  # the most other analytic shapes beside curves, which all lanes test
 SHARE = 512  # slots of a work-item of the loop on a CPU, which fit into the second cache of a core
 
 
 @dataclass(frozen=True)
 class Tuning:
-    """Wishes of the caller for a `Strategy`; None for what suits the device and the scene.
+    """Wishes of the caller for a `Strategy`; None: the default of the device and the scene.
 
-    Members are those of `Strategy`; cancel_seconds: in which a run is to end that is stopped [s].
+    layout, queued: as in `Strategy`; cancel_seconds: the longest time from a request to stop to the
+    end of the run [s].
     """
 
     layout: str | None = None
@@ -37,7 +38,7 @@ UNTUNED = Tuning()
 
 @dataclass(frozen=True)
 class Strategy:
-    """The way in which kernels trace and shade the paths of a scene.
+    """Choices for the kernels that trace and shade the paths of a scene.
 
     layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS; queued: whether stages that the
     host enqueues shade along queues by material; interleaved: whether a work-item traces the rays
@@ -82,7 +83,7 @@ def _layout(on: device.Device, lowered: Lowered, layout: str | None) -> str:
 
 
 def _queued(on: device.Device, lowered: Lowered, wanted: bool | None) -> bool:
-    """Whether there are queues: only for work-items that shade one path each."""
+    """Whether there are queues: only for work-items that shade a single path."""
     several = len(lowered.features.materials.kinds) > 1
     return on.lanes == 1 and (several if wanted is None else wanted)
 

@@ -1,22 +1,20 @@
-"""Samples that adaptive sampling adds to a film: which ones, and who adds them.
+"""Selections of samples, and tracers, which add them to a film for adaptive sampling.
 
-It is the film's own wavefront, or other devices and machines, whose films are added to it.
+The tracer is the film's own wavefront, or other devices and machines, whose films are summed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import pyopencl as cl
 
 from clpt.arrays import Integers
-from clpt.render.wavefront.wavefront import Wavefront
+from clpt.render.wavefront.wavefront import OnBatch, Wavefront
 
-OnBatch = Callable[[Any], bool]
-# Of all kinds and pixels, see `Wavefront.render_samples`; or of one kind: those of the camera,
-# those of lights, and those of lights that leave the picture as it is.
+# Paths of all kinds and pixels, paths from the camera, light paths, or light paths that leave the
+# picture unchanged.
 Paths = Literal["all", "camera", "lights", "guides"]
 
 
@@ -24,8 +22,8 @@ Paths = Literal["all", "camera", "lights", "guides"]
 class Selection:
     """Samples that any wavefront of a scene may add to its film, number by number.
 
-    pixels: how many have these samples. ends: (cells,) the sample before which the pixels of each
-    cell are left, 0 for a cell that has none; None: all pixels have all of them.
+    pixels: number of pixels with these samples. ends: (cells,) the end of the samples of each cell,
+    0 for a cell without samples; None: all pixels have all samples.
     """
 
     paths: Paths
@@ -77,19 +75,19 @@ class Tracer:
         return selection.add(self.wavefront, first, end, on_batch)
 
     def gather(self) -> None:
-        """Let the film hold all that was added so far."""
+        """Complete the film, if other devices have taken samples."""
 
     def keep(self) -> None:
-        """Keep what the film holds, for `give_back`."""
+        """Keep a copy of the film, for `give_back`."""
         wavefront = self.wavefront
         for name, sums in wavefront.film.sums.items():
             if name not in self._copies:
-                what = f"a copy of the {name}"
-                self._copies[name] = wavefront.buffers.allocate(what, sums.size)
+                label = f"a copy of the {name}"
+                self._copies[name] = wavefront.buffers.allocate(label, sums.size)
             wavefront.stream.copy(self._copies[name], sums)
 
     def give_back(self) -> None:
-        """Let the film hold what it did at `keep`."""
+        """Restore the film of `keep`."""
         for name, sums in self.wavefront.film.sums.items():
             self.wavefront.stream.copy(sums, self._copies[name])
         self.wavefront.refresh()

@@ -24,7 +24,7 @@ from clpt.render.flow import programs
 from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.records import Features
 from clpt.render.wavefront import strategy
-from clpt.render.wavefront.bounce_loop import BounceLoop, Ending, Kernels, Step
+from clpt.render.wavefront.bounce_loop import BounceLoop, Ending, Kernels, OnCounters, Step
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.film import Film
 from clpt.render.wavefront.guide import Guide
@@ -57,8 +57,11 @@ class Counts:
         return self.closest + self.shadow
 
     def plus(self, other: Counts) -> Counts:
-        """Return the sums of what happened."""
+        """Return the sums of both counts."""
         return Counts(**{name: value + vars(other)[name] for name, value in vars(self).items()})
+
+
+OnBatch = Callable[[Any], bool]  # returns whether a run goes on
 
 
 class Wavefront:
@@ -85,12 +88,12 @@ class Wavefront:
         photons = Photons(self.stream, self.buffers, paths.settings) if merged else None
         guide = Guide(self.stream, paths) if guided else None
         self.photons, self.guide = photons, guide
-        own = (photons.arguments if photons else {}) | (guide.arguments if guide else {})
-        # What follows knows nothing of this wavefront: memory is given back without a collector.
+        learned = (photons.arguments if photons else {}) | (guide.arguments if guide else {})
+        # The function has no reference to this wavefront: memory is freed without a collector.
         self.kernels = Kernels(
             self.device,
             lambda: {
-                **scene.arguments, **paths.arguments, **film.arguments, **own
+                **scene.arguments, **paths.arguments, **film.arguments, **learned
             },
         )  # fmt: skip
         self.leave = device.Flag(self.device)
@@ -146,7 +149,9 @@ class Wavefront:
             divided = replace(divided, octaves=2)
         scene = DeviceScene(stream, buffers, lowered, chosen, trees)
         share = strategy.loop_share(on)
-        blocks = -(-divided.total // share) * on.lanes if share > on.lanes else 0  # one each
+        blocks = (
+            -(-divided.total // share) * on.lanes if share > on.lanes else 0
+        )  # a block for each work-item
         in_flight = PathBuffers(
             stream, buffers, lowered, divided, blocks, chosen.queued, in_blocks=on.lanes == 1
         )
@@ -203,12 +208,12 @@ class Wavefront:
         """Build what `render_samples` runs, so that its first samples come at once."""
         for loop in self._all_loops:
             loop.prepare()
-        for one in (self.photons, self.guide):
-            if one is not None:
-                one.prepare(self.kernels)
+        for store in (self.photons, self.guide):
+            if store is not None:
+                store.prepare(self.kernels)
 
     def build_ahead(self, lowered: Lowered, chosen: Strategy) -> None:
-        """Build the programs that are in use for another lowering, so that no later build fails."""
+        """Build the programs in use for another lowering, so that no later build fails."""
         device.build_all(self.device, programs.film_sources(lowered.features, chosen.layout))
         for loop in self._all_loops:
             loop.build_ahead(lowered, chosen)
@@ -222,7 +227,7 @@ class Wavefront:
             loop.bind_again()
 
     def show_in(self, picture: device.DeviceArray) -> None:
-        """Let the picture of the film be in the memory of another one's, of the same size."""
+        """Put the picture of the film into the memory of another picture of the same size."""
         self.film.show_in(picture)
         self.bind_again(rebuilt=False)
 
@@ -257,9 +262,7 @@ class Wavefront:
         self._note_paths(first, end)
         self.accumulate_film()
 
-    def render_samples(
-        self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None
-    ) -> bool:
+    def render_samples(self, first: int, end: int, on_batch: OnBatch | None = None) -> bool:
         """Add samples first to end - 1 of every pixel to the film, and wait.
 
         on_batch is called every few iterations with the counts; if it returns False, every path is
@@ -278,25 +281,19 @@ class Wavefront:
             self.refresh()
         return finished
 
-    def render_from_camera(
-        self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None
-    ) -> bool:
+    def render_from_camera(self, first: int, end: int, on_batch: OnBatch | None = None) -> bool:
         """Add samples as `render_samples`, without light paths."""
         finished = self._run(self.loops[-1], first, end, on_batch)
         self.accumulate_film()
         return finished
 
-    def render_from_lights(
-        self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None
-    ) -> bool:
+    def render_from_lights(self, first: int, end: int, on_batch: OnBatch | None = None) -> bool:
         """Add the light paths of samples as `render_samples`, without the samples."""
         finished = self.trace_from_lights(first, end, on_batch)
         self.refresh()
         return finished
 
-    def trace_from_lights(
-        self, first: int, end: int, on_batch: Callable[[Counts], bool] | None = None
-    ) -> bool:
+    def trace_from_lights(self, first: int, end: int, on_batch: OnBatch | None = None) -> bool:
         """As `render_from_lights`, but leave the picture as it is."""
         return self._run(self.loops[0], first, end, on_batch)
 
@@ -337,20 +334,18 @@ class Wavefront:
         self._accumulate = self.kernels.bind("accumulate", "accumulate", light_paths=0.0)
 
     def _turns(self, first: int, end: int) -> list[tuple[int, int]]:
-        """Return the numbers of samples that all kinds of paths take one after the other.
+        """Return ranges of samples, which all kinds of paths take in turn.
 
-        They are few at a time, so that the film is balanced whenever a render stops. No samples are
-        one turn of none.
+        Ranges are short, so that the film is balanced whenever a render stops. An empty range gives
+        a single empty turn.
         """
         if len(self.loops) == 1 or first == end:
             return [(first, end)]
         step = 1 if self.photons else max(TURN_SAMPLES, TURN_PATHS // self.paths.pixels)
         return [(at, min(at + step, end)) for at in range(first, end, step)]
 
-    def _run(
-        self, loop: BounceLoop, first: int, end: int, on_batch: Callable[[Counts], bool] | None
-    ) -> bool:
-        """Trace one kind of paths for samples first to end - 1; return whether all were traced."""
+    def _run(self, loop: BounceLoop, first: int, end: int, on_batch: OnBatch | None) -> bool:
+        """Trace samples first to end - 1 of a single kind; return whether all were traced."""
         wanted = True
         self._before(loop)
 
@@ -365,9 +360,7 @@ class Wavefront:
             self.learn(looped=self.looped)
         return self._trace(loop, first, end, count)
 
-    def _trace(
-        self, loop: BounceLoop, first: int, end: int, count: Callable[[NDArray[np.uint64]], bool]
-    ) -> bool:
+    def _trace(self, loop: BounceLoop, first: int, end: int, count: OnCounters) -> bool:
         """Run a loop; `finish` does what is left where an interrupt ends it."""
         self._in_flight = loop
         finished = loop.run(first, end, count)
@@ -376,7 +369,7 @@ class Wavefront:
 
     @property
     def _all_loops(self) -> list[BounceLoop]:
-        """All that trace paths."""
+        """All loops, with the loop that trains a guide."""
         return [*([self._trainer] if self._trainer else []), *self.loops]
 
     def learn(self, *, looped: bool) -> None:

@@ -1,6 +1,9 @@
-"""The work list: which pixels of the film each slot of a plane samples, in what order, how far.
+"""Pixels of a film: the work list of the slots, and the cells of adaptive sampling.
 
-Indices of pixels are of padded ones, in the order of 4x4 tiles, see kernels/film/film.cl.
+The work list gives each slot of a plane its pixels, their order, and the end of their samples.
+Pixels are numbered in the order of 4x4 tiles, with padding, see kernels/film/film.cl. For adaptive
+sampling the film is cut into squares, and the pixels of a square into the two colours of a
+chessboard: two cells.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ from numpy.typing import NDArray
 from clpt.arrays import Integers
 
 FOREVER = np.iinfo(np.int32).max  # an end that no sample reaches
+SIDE = 16  # pixels of a square's side, a multiple of four
 
 
 def pixels(settings: NDArray[np.void]) -> tuple[Integers, Integers]:
@@ -26,7 +30,7 @@ def inside(settings: NDArray[np.void]) -> Integers:
 
 
 def picture(settings: NDArray[np.void], stored: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Return what pixels have (padded_pixels,), as they are stored, row by row: (h, w)."""
+    """Return stored values of pixels, (padded_pixels,), as a picture, (h, w)."""
     across, margin = int(settings["tiles_x"]), int(settings["margin"])
     rows = stored.reshape(-1, across, 4, 4).swapaxes(1, 2).reshape(-1, 4 * across)
     width, height = int(settings["width"]), int(settings["height"])
@@ -39,7 +43,7 @@ def sampled(settings: NDArray[np.void]) -> Integers:
 
 
 def _within(settings: NDArray[np.void], margin: int) -> Integers:
-    """The pixels in the picture and in so many around it."""
+    """The pixels in the picture and in a margin around it."""
     x, y = pixels(settings)
     width, height = int(settings["width"]), int(settings["height"])
     across = (-margin <= x) & (x < width + margin)
@@ -51,8 +55,8 @@ def table(
 ) -> NDArray[np.uint32]:
     """Deal pixels in turn to the slots of a plane; return `work_list` of kernels/film/film.cl.
 
-    order: which pixels, and in what order; ends: the sample before which each of them is left, by
-    default where the render ends. (2 * padded_pixels + per_plane,) uint32: the pixel that follows
+    order: the pixels, in the order of their samples; ends: the end of the samples of each pixel, by
+    default the end of the render. (2 * padded_pixels + per_plane,) uint32: the pixel that follows
     each pixel, the end of each, and the first pixel of each slot; padded_pixels stands for none.
     """
     padded_pixels, slots = int(settings["padded_pixels"]), int(settings["per_plane"])
@@ -63,3 +67,19 @@ def table(
         words[padded_pixels + order] = ends
     words[2 * padded_pixels :][: len(order)] = order[:slots]
     return words
+
+
+class CellGrid:
+    """The cell of each pixel; settings: of the paths, which give the film's size.
+
+    across: squares in a row; inside: the pixels of the picture, see `inside`; cell:
+    (padded_pixels,) of each pixel; pixels: (cells,) number of pixels in each cell.
+    """
+
+    def __init__(self, settings: NDArray[np.void]):
+        x, y = pixels(settings)
+        self.inside = inside(settings)
+        self.across, down = (-(-int(settings[name]) // SIDE) for name in ("width", "height"))
+        self.cell: Integers = 2 * (y // SIDE * self.across + x // SIDE) + (x + y) % 2
+        count = 2 * self.across * down
+        self.pixels: Integers = np.bincount(self.cell[self.inside], minlength=count)

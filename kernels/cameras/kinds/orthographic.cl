@@ -8,3 +8,12 @@ CameraRay orthographic_ray(global const OrthographicCamera *camera, vec2 film, v
     r.far = camera->far - camera->near;
     return r;
 }
+
+/* Step screen: where parallel rays see a point; what is infinitely far is nowhere on the film. */
+vec2 orthographic_screen(global const OrthographicCamera *camera, vec3 p, mask away, mask *seen)
+{
+    vec3 d = screen_point_back(camera->to_world, p);
+    *seen = *seen & !away;
+    vec2 film = {0.5f - 0.5f * d.x, 0.5f - 0.5f * d.y / camera->aspect};
+    return film;
+}

@@ -11,3 +11,18 @@ CameraRay perspective_ray(global const PerspectiveCamera *camera, vec2 film, vec
     r.far = (camera->far - camera->near) / d.z;
     return r;
 }
+
+/* Step connect: a point as the pinhole sees it: see film/connect.cl. */
+CameraPoint perspective_connect(global const PerspectiveCamera *camera, global const Settings *settings, vec3 p,
+                                mask away, vec2 lens)
+{
+    vec2 middle = {0.0f, 0.0f};
+    return pinhole_connect(settings, camera->to_world, camera->extent, camera->offset, camera->near, camera->far, 1.0f,
+                           middle, p, away);
+}
+
+/* Step screen: where the pinhole sees a point. */
+vec2 perspective_screen(global const PerspectiveCamera *camera, vec3 p, mask away, mask *seen)
+{
+    return pinhole_screen(camera->to_world, camera->extent, camera->offset, p, away, seen);
+}

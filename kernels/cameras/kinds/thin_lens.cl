@@ -39,3 +39,19 @@ CameraRay thin_lens_glass_ray(global const ThinLensCamera *camera, vec2 film, ve
                            (0.5f - film.y - camera->offset[1]) * camera->extent[1] - p.y * s, (real)(1.0f)));
     return thin_lens_through(camera, p, d);
 }
+
+/* Step connect: a point as a point of the aperture sees it: see film/connect.cl. A pixel gathers from all of the
+ * aperture. */
+CameraPoint thin_lens_connect(global const ThinLensCamera *camera, global const Settings *settings, vec3 p, mask away,
+                              vec2 lens)
+{
+    vec2 q = thin_lens_point(camera, lens);
+    return pinhole_connect(settings, camera->to_world, camera->extent, camera->offset, camera->near, camera->far,
+                           camera->focus_distance, q, p, away);
+}
+
+/* Step screen: where the middle of the lens sees a point. */
+vec2 thin_lens_screen(global const ThinLensCamera *camera, vec3 p, mask away, mask *seen)
+{
+    return pinhole_screen(camera->to_world, camera->extent, camera->offset, p, away, seen);
+}

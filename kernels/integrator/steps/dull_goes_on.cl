@@ -1,4 +1,4 @@
-/* Russian roulette of light paths at a diffuse first surface (transport/diffuse_roulette.cl): returns the paths of
+/* Russian roulette of light paths at a diffuse first surface (transport/roulette.cl): returns the paths of
  * `next` that continue, and scales their throughput. */
 inline mask dull_goes_on(mask next, mask null, Scattering scatter, BsdfSample bs, MisRatio *r, Spectrum *beta)
 {

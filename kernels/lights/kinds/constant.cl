@@ -1,5 +1,5 @@
-/* The same radiance from every direction; sampled by the cosine to the normal of `hemisphere`,
- * evenly over the sphere where none is given. */
+/* The same radiance from every direction; sampled by the cosine to `hemisphere`, or evenly over the sphere where
+ * `hemisphere` is 0. */
 Spectrum constant_radiance(Constant l, Scene scene, vec3 d, Wavelengths lambdas)
 {
     return emission_load(scene, l.radiance, texture_point_nowhere(), lambdas);

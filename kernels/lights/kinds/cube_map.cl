@@ -1,6 +1,6 @@
-/* Six square images around the scene, placed as OpenGL places a cube map's faces (OpenGL 4.6 core,
- * table 8.19), with a border of one texel of their neighbours. Bilinear between texels; the cells of
- * the grid are half a texel wide. */
+/* Six square images around the scene, placed as OpenGL places a cube map's faces (OpenGL 4.6 core, table 8.19), with a
+ * border of a single texel of their neighbours. Bilinear between texels; the cells of the grid are half a texel
+ * wide. */
 #include "core/grid.cl"
 
 typedef struct {

@@ -1,4 +1,4 @@
-/* Parallel light; `direction` is the unit vector in which it travels. */
+/* Parallel light; `direction` is the unit vector along its rays. */
 LightSample directional_sample(Directional l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
 {
     LightSample s;

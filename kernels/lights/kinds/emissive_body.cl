@@ -1,12 +1,12 @@
-/* A homogeneous medium that emits, inside of a boundary. A direction to it is that to a point chosen evenly in a ball
- * or box around: where the ray is inside from t0 to t1 it has the density (t1^3 - t0^3) / (3 V) [1/sr], much where the
- * way is long, as the light of a thin medium. Rays that go through the medium weigh all that they gather along their
- * direction against that, see media/body_weight.cl.
+/* A homogeneous medium that emits, inside a boundary. A sampled direction leads to a uniform point of a ball or box
+ * around the medium. If the ray is inside from t0 to t1, its density is (t1^3 - t0^3) / (3 V) [1/sr]: large for a long
+ * way inside, as the light of a thin medium is. A ray through the medium weighs all emission that it gathers against
+ * this density (MIS, media/flight.cl).
  *
- * Where on the way light comes from is chosen as the extinction has it; a shadow ray goes there, dims the light, and
- * tells whether that point is in the medium. So where nothing stands in the medium, and it is grey and fills ball or
- * box, every direction has just its radiance. */
-#define BODY_THIN 1e-3f /* optical depth below which light begins anywhere on its way */
+ * The distance of the emission along the ray is sampled by the extinction. A shadow ray to that point applies the
+ * transmittance, and finds whether the point is in the medium. So the estimate of a direction has no noise if the
+ * medium is grey, fills the ball or box, and holds no shapes. */
+#define BODY_THIN 1e-3f /* optical depth below which the distance is uniform */
 
 typedef struct {
     mask meets;
@@ -55,7 +55,7 @@ real emissive_body_pdf(EmissiveBody l, vec3 p, vec3 d)
     return emissive_body_way_pdf(l, emissive_body_way(l, p, d));
 }
 
-/* A point in the ball or box, of a cube of random numbers; then in the world. */
+/* A uniform point of the ball or box, in the world. */
 inline vec3 emissive_body_point(EmissiveBody l, vec2 u, real third)
 {
     vec3 unit = v3(2.0f * u.x - 1.0f, 2.0f * u.y - 1.0f, 2.0f * third - 1.0f);
@@ -64,8 +64,8 @@ inline vec3 emissive_body_point(EmissiveBody l, vec2 u, real third)
     return madd3(l.edge_x, unit.x, madd3(l.edge_y, unit.y, madd3(l.edge_z, unit.z, l.center)));
 }
 
-/* How far on its way light begins [m]: chosen as one of the wavelengths is dimmed, which `choice` chooses evenly: not
- * the hero's, as others may be dimmed far less. */
+/* Distance of the emission along the ray inside [m], by the extinction at a random wavelength, which `choice` selects:
+ * not at the hero wavelength, as the extinction at others may be far smaller. */
 inline real body_depth(Spectrum sigma_t, real length, real u, real choice)
 {
     real place = 0.0f, sigma = 0.0f;
@@ -111,4 +111,12 @@ LightSample emissive_body_sample(EmissiveBody l, Scene scene, vec3 p, vec2 u, Wa
     s.radiance = spectrum_scale(emits, 1.0f / sel(known, chance, (real)(1.0f)));
     s.pdf = sel(known & (spectrum_max(emits) > 0.0f), emissive_body_way_pdf(l, way), (real)(0.0f));
     return s;
+}
+
+/* Step chosen: the density of next-event estimation from p for a direction d to a body [1/sr]. */
+inline real body_light_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 d)
+{
+    LightRow l = light_at(scene, row);
+    real pdf = emissive_body_pdf(emissive_body_row(scene.light_params, l.params), p, d);
+    return pdf * light_pmf(scene, row, l, p, receiver);
 }

@@ -1,8 +1,8 @@
-/* A brick of a medium that emits: eight cells along each axis of its grid. A point of it is chosen evenly. What the
- * point emits into a metre counts as if it came from all of the brick's mean chord c, four times its volume over its
- * surface. So its radiance is c times that, and its density [1/sr] that of the point, t^2 times 1 / V, times c: on
- * average one over the solid angle of the brick. Rays that go through the medium weigh what they gather against that,
- * see media/grid_flight.cl (Villemin and Hery 2013 sample flames as lights; the weights are ours). */
+/* A brick of a medium that emits: eight cells along each axis of its grid. A sampled point is uniform in the brick. Its
+ * emission per metre stands for the whole mean chord c of the brick, four times the volume over the surface. So the
+ * radiance of the sample is c times the emission, and its density [1/sr] is c t^2 / V: on average 1 over the solid
+ * angle of the brick. A ray through the medium weighs the emission that it gathers against this density (MIS,
+ * media/grid_flight.cl). Villemin and Hery 2013 sample flames as lights; the weights are ours. */
 
 real emissive_brick_pdf(EmissiveBrick l, real t) { return l.inverse * l.chord * t * t; }
 
@@ -24,4 +24,12 @@ LightSample emissive_brick_sample(EmissiveBrick l, Scene scene, vec3 p, vec2 u, 
     s.radiance = spectrum_scale(emits, l.chord);
     s.pdf = sel(known & (spectrum_max(emits) > 0.0f), emissive_brick_pdf(l, t), (real)(0.0f));
     return s;
+}
+
+/* Step chosen: the density of next-event estimation from p for a point of a brick at distance t [1/sr]. */
+inline real brick_light_pdf(Scene scene, integer row, vec3 p, Receiver receiver, real t)
+{
+    LightRow l = light_at(scene, row);
+    real pdf = emissive_brick_pdf(emissive_brick_row(scene.light_params, l.params), t);
+    return pdf * light_pmf(scene, row, l, p, receiver);
 }

@@ -1,7 +1,7 @@
-/* An image in latitude and longitude, as Mitsuba's envmap: +y is up, the image's middle lies at +z, its
- * left and right edges at -z, and +x a quarter from the left. Rows run from pole to pole, the first and the
- * last one on the poles; columns wrap. Radiance is bilinear between texels in both modes, while Mitsuba's
- * spectral variants interpolate a spectrum's shape and its factor separately. */
+/* An image in latitude and longitude, as Mitsuba's envmap: +y is up, the image's middle lies at +z, its left and right
+ * edges at -z, and +x a quarter from the left. Rows run from pole to pole, the first and the last row on the poles;
+ * columns wrap. Radiance is bilinear between texels in both modes, while Mitsuba's spectral variants interpolate a
+ * spectrum's shape and its factor separately. */
 #include "core/grid.cl"
 
 inline Grid envmap_grid(Envmap l)

@@ -13,12 +13,19 @@ inline Spectrum goniometric_intensity(Goniometric l, Scene scene, vec3 d, Wavele
 
 LightSample goniometric_sample(Goniometric l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
 {
-    vec3 to = sub3(l.position, p);
-    real t2 = max_r(dot3(to, to), (real)(1e-20f)), t = sqrt(t2);
-    LightSample s;
-    s.wi = scale3(to, 1.0f / t);
-    s.t = t;
+    real t2;
+    LightSample s = light_toward(l.position, p, &t2);
     s.radiance = spectrum_scale(goniometric_intensity(l, scene, neg3(s.wi), lambdas), 1.0f / t2);
     s.pdf = -1.0f;
     return s;
 }
+
+/* Step emission: a point with an image sends its rays evenly; their power follows the image. */
+LightRay goniometric_emit(Goniometric l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas)
+{
+    LightRay r = light_ray_along(l.position, uniform_sphere(v));
+    r.power = spectrum_scale(goniometric_intensity(l, scene, r.d, lambdas), 4.0f * PI);
+    return r;
+}
+
+real goniometric_emit_pdf(Goniometric l, vec3 d) { return INV_4PI; }

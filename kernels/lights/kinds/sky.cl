@@ -1,9 +1,9 @@
-/* A sky: an image of the sky's dome over one of the ground below, and the sun's disc. +y is up, z the level direction
+/* A sky: an image of the sky's dome above an image of the ground, and the sun's disc. +y is up, z the level direction
  * toward the sun. Rows of the dome's image run from the zenith to the horizon, those of the ground's from the horizon
- * to the nadir, both dense at the horizon (their angle to it is a square); columns go around from z toward x. Its two
- * halves are alike, so that texels hold one. The disc has an image of its own: its rows run from its lower edge to its
- * upper one, its columns from the edge to the middle by the cosine at the sun's surface. Radiance [W m^-2 sr^-1 nm^-1]
- * is what clpt/sky/skylight.py found. */
+ * to the nadir, both dense at the horizon (their angle to it is a square); columns go around from z toward x. Both
+ * halves are equal, so texels hold a single half. The disc has an image of its own: its rows run from the lower edge to
+ * the upper edge, its columns from the edge to the middle by the cosine at the sun's surface. Radiance [W m^-2 sr^-1
+ * nm^-1] comes from clpt/sky/skylight.py. */
 #include "core/grid.cl"
 #include "generated/sky_sizes.cl"
 

@@ -13,14 +13,9 @@ inline Spectrum spectral_envmap_between(SpectralEnvmap l, Scene scene, integer r
                                         Wavelengths lambdas)
 {
     integer right = sel_i(column + 1 == l.width, (integer)(0), column + 1), left = row * l.width;
-    integer below = left + l.width;
-    Spectrum numbers = spectra_row(scene, l.number, lambdas), sum = spectrum_of(0.0f);
-    for (int corner = 0; corner < 4; corner++) {
-        integer texel = ((corner >> 1) ? below : left) + ((corner & 1) ? right : column);
-        real weight = ((corner & 1) ? at.x : 1.0f - at.x) * ((corner >> 1) ? at.y : 1.0f - at.y);
-        sum = spectrum_madd(bands_texel(scene, l.texels + l.bands * texel, l.bands, numbers), weight, sum);
-    }
-    return bands_lit(sum, l.bands, numbers);
+    integer below = left + l.width, texels[4] = {left + column, left + right, below + column, below + right};
+    Spectrum numbers = spectra_row(scene, l.number, lambdas);
+    return bands_lit(bands_between(scene, l.texels, l.bands, texels, at, numbers), l.bands, numbers);
 }
 
 Spectrum spectral_envmap_radiance(SpectralEnvmap l, Scene scene, vec3 d, Wavelengths lambdas)

@@ -11,13 +11,8 @@ inline Sky spectral_sky_image(SpectralSky l)
 
 inline Spectrum spectral_sky_between(SpectralSky l, Scene scene, integer first, SkyTexels t, Spectrum numbers)
 {
-    Spectrum sum = spectrum_of(0.0f);
-    for (int corner = 0; corner < 4; corner++) {
-        integer texel = (corner >> 1) ? ((corner & 1) ? t.i11 : t.i01) : ((corner & 1) ? t.i10 : t.i00);
-        real weight = ((corner & 1) ? t.at.x : 1.0f - t.at.x) * ((corner >> 1) ? t.at.y : 1.0f - t.at.y);
-        sum = spectrum_madd(bands_texel(scene, first + l.bands * texel, l.bands, numbers), weight, sum);
-    }
-    return sum;
+    integer texels[4] = {t.i00, t.i10, t.i01, t.i11};
+    return bands_between(scene, first, l.bands, texels, t.at, numbers);
 }
 
 inline Spectrum spectral_sky_of(SpectralSky l, Scene scene, SkyPoint p, mask disc, SkyTexels sun, Wavelengths lambdas)

@@ -1,24 +1,16 @@
 /* Lambertian scattering to both sides: f = reflectance / pi on the side of wo, transmittance / pi on
  * the other [1/sr]. A sum of both above 1 is scaled down, wavelength by wavelength. */
 
-/* What goes to the side of wi. */
+/* The albedo toward the side of wi. */
 inline Spectrum diffuse_transmission_share(DiffuseTransmission m, mask crossed)
 {
-    Spectrum r = spectrum_sel(crossed, m.transmittance, m.reflectance);
-#define C(c) r.c /= max_r(m.reflectance.c + m.transmittance.c, (real)(1.0f));
-    SPECTRUM_EACH(C)
-#undef C
-    return r;
-}
-inline real diffuse_transmission_probability(DiffuseTransmission m)
-{
-    real r = spectrum_mean(m.reflectance), t = spectrum_mean(m.transmittance);
-    return sel(r + t > 0.0f, t / max_r(r + t, (real)(1e-20f)), (real)(0.5f));
+    Spectrum share = spectrum_sel(crossed, m.transmittance, m.reflectance);
+    return spectrum_mul(share, two_lobes_scale(m.reflectance, m.transmittance));
 }
 
 real diffuse_transmission_pdf(DiffuseTransmission m, vec3 wo, vec3 wi)
 {
-    real p = diffuse_transmission_probability(m);
+    real p = two_lobes_probability(m.reflectance, m.transmittance);
     real share = sel(wo.z * wi.z < 0.0f, p, 1.0f - p);
     return sel(wo.z * wi.z != 0.0f, share * fabs(wi.z) * INV_PI, (real)(0.0f));
 }
@@ -33,7 +25,7 @@ BsdfSample diffuse_transmission_sample(DiffuseTransmission m, vec3 wo, vec3 u)
 {
     BsdfSample s = bsdf_nothing();
     vec2 uv = {u.x, u.y};
-    real p = diffuse_transmission_probability(m);
+    real p = two_lobes_probability(m.reflectance, m.transmittance);
     mask crossed = u.z < p;
     s.wi = cosine_hemisphere(uv);
     s.wi.z *= sel((wo.z < 0.0f) == crossed, (real)(1.0f), (real)(-1.0f));

@@ -5,7 +5,7 @@
  * of each the product of a longitudinal and an azimuthal distribution and the share that is left.
  * f |cos| [1/sr]. All leaves from where wo came in; the fibre's far side is taken for nothing. */
 #include "materials/fresnel.cl"
-#include "core/bessel.cl"
+#include "core/math.cl"
 #define HAIR_LOBES 4
 #define HAIR_NARROWEST 0.01f /* roughness, below which lobes are too narrow for float32 */
 

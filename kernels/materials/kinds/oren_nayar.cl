@@ -5,7 +5,7 @@
  * 0.046 at grazing angles: reflectances above 1 - min(0.046, 0.16 sigma) count as that. */
 
 typedef struct {
-    real single, twice; /* f cos / r of one facet, and f cos / r^2 of two */
+    real single, twice; /* f cos / r of a single facet, and f cos / r^2 of two */
 } OrenNayarTerms;
 
 /* Both terms times the cosine of wi, 0 behind. */

@@ -3,7 +3,7 @@
  * sides where light is let through. f [1/sr]. With a dispersive index each wavelength is refracted with
  * a half vector of its own; directions are sampled for the hero. */
 #include "materials/principled.cl"
-#include "materials/refracting_facet.cl"
+#include "materials/microfacet.cl#refracting"
 
 /* The index, kept away from 1 where light is refracted: h would be undefined. */
 inline Spectrum principled_index(Principled m)

@@ -1,5 +1,5 @@
 /* A thin slab, both sides: it reflects a share, and transmits the remainder undeviated. */
-#include "materials/thin_slab.cl"
+#include "materials/fresnel.cl#thin_slab"
 
 BsdfSample thin_dielectric_sample(ThinDielectric m, vec3 wo, vec3 u)
 {

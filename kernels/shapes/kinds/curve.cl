@@ -1,16 +1,18 @@
-/* A piece of a strand: what spheres cover whose centre c(s) and radius r(s) run along a cubic, s from 0 to 1. A ray
+/* A piece of a strand: the union of spheres with centre c(s) and radius r(s), both cubics, s from 0 to 1. A ray
  * o + t d meets the sphere at s where t = z -+ sqrt(D), with D = r^2 - x^2 - y^2 and x, y, z the centre across and
  * along the ray. The surface is met at the least (or greatest) t: where
  *     F(s) = +-z' sqrt(D) - D' / 2 = 0,
- * which also says that the normal leans by r' against the curve. F is below 0 before and above 0 behind, and where the
- * ray passes the spheres it leads to where D is greatest; so the zero is between the ends of the piece, or not on it.
- * Near s the curve is taken as straight and its radius as linear, whose zero is known: exact for straight pieces, else
- * the next guess, and a bisection where that leaves the bounds. (That local cones converge fast: Reshetov and Luebke
+ * which also means that the normal leans by r' against the curve. F is negative before the zero and positive behind
+ * it, and where the ray misses the spheres the zero is at the greatest D; so the zero lies between the ends of the
+ * piece, or the piece is not met.
+ * A step takes the curve as straight and the radius as linear near s, where the zero has a closed form: exact for
+ * straight pieces, else the next estimate; a bisection replaces a step that leaves the bounds. (That local cones
+ * converge fast: Reshetov and Luebke
  * 2018, "Phantom Ray-Hair Intersector".) u is the azimuth over 2 pi, v runs along. Lengths in metres. */
-#include "tracing/analytic.cl"
+#include "core/rounding.cl"
 #define CURVE_STEPS 24
-#define CURVE_NEAR 2e-4f    /* of a piece: a step of less is the last; the error that is left is far smaller */
-#define CURVE_OVERLAP 2e-3f /* [rad] by which a piece is met beyond its end, so that no ray passes between two */
+#define CURVE_NEAR 2e-4f    /* of a piece: a smaller step is the last; the error that remains is far smaller */
+#define CURVE_OVERLAP 2e-3f /* [rad] overlap of a piece beyond its end, so that no ray passes between two pieces */
 
 typedef struct { real a, b, c, d; } Cubic; /* a + b s + c s^2 + d s^3 */
 inline Cubic cubic_of(real p0, real p1, real p2, real p3)
@@ -49,7 +51,7 @@ inline real curve_reach(Curve q) { return max_r(max_r(fabs(q.r0), q.r1), max_r(q
 inline real least4(real a, real b, real c, real d) { return min_r(min_r(a, b), min_r(c, d)); }
 inline real most4(real a, real b, real c, real d) { return max_r(max_r(a, b), max_r(c, d)); }
 
-/* A piece as a ray sees it, and what is known at s. */
+/* A piece as a ray sees it, and the state of the search at s. */
 typedef struct { real x, y, r, dx, dy, dz, dr; } CurveEnd;
 typedef struct { Cubic x, y, z, r; CurveEnd first, last; } CurveView;
 typedef struct { real square, half_slope, bend, along, f; } CurveState; /* D, D'/2, -D''/2, -+z', F */
@@ -68,14 +70,14 @@ inline CurveState curve_state(CurveView c, real side, real s)
     return n;
 }
 
-/* F at an end, and by how much it may be beyond, squared. */
+/* F at an end, and the square of its tolerance. */
 inline real curve_end(CurveEnd e, real side, real *over)
 {
     *over = sqr(CURVE_OVERLAP * e.r) * (e.dx * e.dx + e.dy * e.dy + e.dz * e.dz);
     return -side * e.dz * sqrt_r((e.r - e.x) * (e.r + e.x) - e.y * e.y) - (e.r * e.dr - e.x * e.dx - e.y * e.dy);
 }
 
-/* Where the surface is met, on the near side (-1) or the far one (1), and whether it is. */
+/* Finds where the surface is met, on the near (-1) or far (1) side; returns the lanes that meet it. */
 inline mask curve_find(CurveView c, real side, mask closed0, mask closed1, mask active, real *at)
 {
     real over0, over1, first = curve_end(c.first, side, &over0), last = curve_end(c.last, side, &over1);
@@ -112,7 +114,7 @@ ShapeHit curve_intersect(Curve q, vec3 o, vec3 d, real tmin, real tmax)
     h.n = v3(0.0f, 0.0f, 1.0f);
     h.uv.x = 0.0f;
     h.uv.y = 0.0f;
-    /* From the point of the ray that is beside the piece, so that little is lost to rounding. */
+    /* Relative to the point of the ray beside the piece, so that rounding stays small. */
     real reach = curve_reach(q);
     real shift = 0.5f * (dot3(sub3(q.p0, o), d) + dot3(sub3(q.p3, o), d));
     vec3 from = madd3(d, shift, o);
@@ -122,7 +124,7 @@ ShapeHit curve_intersect(Curve q, vec3 o, vec3 d, real tmin, real tmax)
     mask alive = (nearest < tmax) & (shift + most4(z0, z1, z2, z3) + reach > tmin);
     vec3 chord = sub3(f3, f0), across = cross3(chord, d);
     real size2 = dot3(across, across);
-    /* Past all control points on one side: an early way out for most pieces whose boxes are met. */
+    /* The ray passes all control points on a single side: an early exit for most pieces whose boxes are met. */
     real w0 = dot3(f0, across), w1 = dot3(f1, across), w2 = dot3(f2, across), w3 = dot3(f3, across);
     real beside = max_r(max_r(least4(w0, w1, w2, w3), -most4(w0, w1, w2, w3)), (real)(0.0f));
     alive = alive & (beside * beside <= reach * reach * size2);
@@ -165,14 +167,14 @@ ShapeHit curve_intersect(Curve q, vec3 o, vec3 d, real tmin, real tmax)
     h.uv.y = q.v + s * q.dv;
 
     vec3 begin = curve_tangent(curve_slope(q, (real)(0.0f)), chord), slope = curve_tangent(curve_slope(q, s), chord);
-    /* The axis of the beginning, turned as the tangent is turned. */
+    /* The axis at the beginning, rotated as the tangent is. */
     real turn = dot3(q.axis, slope) / max_r(1.0f + dot3(begin, slope), (real)(1e-6f));
     vec3 e = madd3(add3(begin, slope), -turn, q.axis);
     h.uv.x = turn_of(dot3(out, cross3(slope, e)), dot3(out, e));
     return h;
 }
 
-/* Where on the curve the sphere touches the surface at p, which is close to it. */
+/* The parameter of the sphere that touches the surface at p, for p close to it. */
 inline real curve_foot(Curve q, vec3 p)
 {
     vec3 chord = sub3(q.p3, q.p0);

@@ -1,9 +1,9 @@
-/* Strands of many pieces in one shape: the row at `params` of `geometry` has what they share, and says where in
- * `spheres` each of them lies. One piece has the functions of kernels/shapes/kinds/curve.cl. */
+/* Strands of many pieces in a single shape: the row at `params` of `geometry` has the members that they share, and
+ * their place in `spheres`. A piece has the functions of kernels/shapes/kinds/curve.cl. */
 
 #include "generated/curve_sizes.cl"
 
-/* The piece that is primitive `prim`, where `active`; elsewhere one of them. */
+/* The piece of primitive `prim`, where `active`; elsewhere any piece. */
 inline Curve curves_one(Scene scene, integer params, integer prim, mask active)
 {
     Curve q = curve_row(scene.geometry, params);

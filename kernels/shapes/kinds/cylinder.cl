@@ -1,9 +1,9 @@
 /* An open tube; sampled evenly over its area. u is the azimuth over 2 pi, v runs along the axis. */
-#include "tracing/analytic.cl"
+#include "core/rounding.cl"
 
 real cylinder_size(Cylinder q) { return EXACT_SIZE * (q.radius + size3(q.axis) + size3(q.p0)); }
 
-/* By how much the square of the distance (x, y) from the axis is more than that of the radius. */
+/* The square of the distance (x, y) from the axis, minus the square of the radius. */
 inline Twofold cylinder_beyond(Cylinder q, Twofold x, Twofold y)
 {
     Twofold square = twofold_add(twofold_sqr(x), twofold_sqr(y));
@@ -81,3 +81,17 @@ vec3 cylinder_dpdu(Cylinder q, vec3 p, vec2 uv)
 }
 
 vec3 cylinder_dpdv(Cylinder q, vec3 p, vec2 uv) { return q.axis; }
+
+/* Step emission: a point of an open tube as a light, evenly over its area [m]: see lights/emission.cl. */
+SurfacePoint cylinder_point(Cylinder s, vec2 u)
+{
+    real sine, cosine;
+    sincos_2pi(u.x, &sine, &cosine);
+    vec3 outward = madd3(s.x, cosine, scale3(s.y, sine));
+    SurfacePoint q;
+    q.p = madd3(outward, s.radius, madd3(s.axis, u.y, s.p0));
+    q.n = scale3(outward, s.side);
+    q.uv = u;
+    q.area = 1.0f / cylinder_pdf_area(s);
+    return q;
+}

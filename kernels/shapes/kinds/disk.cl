@@ -1,6 +1,6 @@
 /* A disk, or an ellipse where its transform stretches it; sampled evenly over its area. u is the
  * distance from the centre (1 at the rim), v the azimuth over 2 pi. */
-#include "tracing/analytic.cl"
+#include "core/rounding.cl"
 
 inline real disk_reach(Disk q) { return size3(q.s) + size3(q.t); }
 real disk_size(Disk q) { return EXACT_SIZE * (disk_reach(q) + size3(q.center)); }
@@ -67,4 +67,17 @@ vec3 disk_dpdv(Disk q, vec3 p, vec2 uv) /* around the centre */
     real s, c, around = 2.0f * PI * uv.x;
     sincos_2pi(uv.y, &s, &c);
     return add3(scale3(q.s, -around * s), scale3(q.t, around * c));
+}
+
+/* Step emission: a point of a disk or ellipse as a light, evenly over its area [m]: see lights/emission.cl. */
+SurfacePoint disk_point(Disk s, vec2 u)
+{
+    vec2 b = disk_of(u);
+    SurfacePoint q;
+    q.p = madd3(s.s, b.x, madd3(s.t, b.y, s.center));
+    q.n = s.n;
+    q.uv.x = sqrt_r(u.x);
+    q.uv.y = u.y;
+    q.area = 1.0f / disk_pdf_area(s);
+    return q;
 }

@@ -1,10 +1,10 @@
-/* A sphere. As a light it is sampled evenly over the cone that it fills from outside, and evenly over
- * its area from inside. u is the azimuth about its z axis over 2 pi, v the angle from it over pi. */
-#include "tracing/analytic.cl"
+/* A sphere. As a light it is sampled evenly over the cone that it subtends from outside, and evenly over its area from
+ * inside. u is the azimuth about its z axis over 2 pi, v the angle from it over pi. */
+#include "core/rounding.cl"
 
 real sphere_size(Sphere q) { return EXACT_SIZE * (q.radius + size3(q.center)); }
 
-/* By how much the square of the distance `f` from the centre is more than that of the radius. */
+/* The square of the distance `f` from the centre, minus the square of the radius. */
 inline Twofold sphere_beyond(Sphere q, Twofold3 f)
 {
     return twofold_add(twofold_square3(f), twofold_neg(twofold_product(q.radius, q.radius)));
@@ -19,8 +19,8 @@ inline vec2 sphere_uv(Sphere q, vec3 outward)
     return uv;
 }
 
-/* Whether a point at distance d from the centre is outside. One on the surface is not, though rounding
- * may put it there: it would find no light, while a ray from its offset inside meets all of it. */
+/* Whether a point at distance d from the centre is outside. A point on the surface is not, though rounding may put it
+ * there: it would sample no light, while a ray from its offset inside meets the whole sphere. */
 inline mask sphere_outside(Sphere q, real d)
 {
     return d > q.radius + 2.0f * SURFACE_ROUNDING * (size3(q.center) + 2.0f * q.radius);
@@ -124,4 +124,16 @@ vec3 sphere_dpdv(Sphere q, vec3 p, vec2 uv)
     real x = dot3(f, q.x), y = dot3(f, q.y), z = dot3(f, q.z), r2 = x * x + y * y;
     real inv = PI / sqrt(max_r(r2, (real)(1e-20f)));
     return madd3(q.x, x * z * inv, madd3(q.y, y * z * inv, scale3(q.z, -r2 * inv)));
+}
+
+/* Step emission: a point of a sphere as a light, evenly over its area [m]: see lights/emission.cl. */
+SurfacePoint sphere_point(Sphere s, vec2 u)
+{
+    vec3 outward = uniform_sphere(u);
+    SurfacePoint q;
+    q.p = madd3(outward, s.radius, s.center);
+    q.n = scale3(outward, s.side);
+    q.uv = sphere_uv(s, outward);
+    q.area = 4.0f * PI * s.radius * s.radius;
+    return q;
 }

@@ -1,7 +1,7 @@
-/* Many spheres in one shape: the row at `params` of `geometry` says how all of them are turned, `spheres`
- * has the centre and the radius of each. Where one is has the functions of kernels/shapes/kinds/sphere.cl. */
+/* Many spheres in a single shape: the row at `params` of `geometry` has their orientation, `spheres` the centre and the
+ * radius of each. Each sphere has the functions of kernels/shapes/kinds/sphere.cl. */
 
-/* The sphere that is primitive `prim`, where `active`; elsewhere the first. */
+/* The sphere of primitive `prim`, where `active`; elsewhere the first sphere. */
 inline Sphere spheres_one(Scene scene, integer params, integer prim, mask active)
 {
     Sphere q = sphere_row(scene.geometry, params);

@@ -1,6 +1,11 @@
 /* An image on the unit square of uv: texel centres at (i + 1/2) / size, as in Mitsuba's bitmap. Row 0
  * lies at v = 0 of the transformed uv; the host has turned v round. Between texels the evaluated
  * values are interpolated, not the coefficients of their spectra. */
+
+/* The image of a texture with the same members. */
+#define BITMAP_OF(t) \
+    {t.kind, t.to_u, t.to_v, t.mapping, t.transform, t.width, t.height, t.first, t.filter, t.wrap_u, t.wrap_v, t.decode}
+
 typedef struct {
     integer x0, x1, y0, y1; /* columns and rows of the four texels, inside the image */
     real u0, u1, v0, v1;    /* their weights */

@@ -3,8 +3,7 @@
 
 inline Bitmap mip_bitmap_level(MipBitmap t, Scene scene, integer level)
 {
-    Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.transform, t.width, t.height, t.first, t.filter, t.wrap_u,
-                t.wrap_v, t.decode};
+    Bitmap b = BITMAP_OF(t);
     return mip_level(b, scene, t.table, level);
 }
 

@@ -1,16 +1,9 @@
 /* An image of 8 bits a channel, placed on uv as in textures/kinds/bitmap.cl, in fewer bytes: a number takes 1, a
  * colour 4, or 8 as a spectrum (spectrum_packed_texel). `decode` is the first of the 256 values of bytes. All
  * four texels are read before the first is decoded, so that the processor waits for memory once. */
-inline Bitmap packed_bitmap_image(PackedBitmap t)
-{
-    Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.transform, t.width, t.height, t.first, t.filter, t.wrap_u,
-                t.wrap_v, t.decode};
-    return b;
-}
-
 Spectrum packed_bitmap_reflectance(PackedBitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    Bitmap image = packed_bitmap_image(t);
+    Bitmap image = BITMAP_OF(t);
     BitmapTexels b = bitmap_texels(image, scene, point);
     PackedTexel texels[4];
     real weights[4];
@@ -32,7 +25,8 @@ Spectrum packed_bitmap_reflectance(PackedBitmap t, Scene scene, TexturePoint poi
 Spectrum packed_bitmap_texel(PackedBitmap t, Scene scene, TexturePoint point, vec2 u, Wavelengths lambdas)
 {
     mask inside;
-    integer index = bitmap_random(packed_bitmap_image(t), scene, point, u, &inside);
+    Bitmap image = BITMAP_OF(t);
+    integer index = bitmap_random(image, scene, point, u, &inside);
     PackedTexel texel = spectrum_packed_words(scene.images, t.first, index);
     Spectrum value = spectrum_packed_texel(scene.images, texel, t.decode, lambdas);
     return spectrum_sel(inside, value, spectrum_of(0.0f));
@@ -46,7 +40,7 @@ Spectrum packed_bitmap_emission(PackedBitmap t, Scene scene, TexturePoint point,
 
 real packed_bitmap_real(PackedBitmap t, Scene scene, TexturePoint point)
 {
-    Bitmap image = packed_bitmap_image(t);
+    Bitmap image = BITMAP_OF(t);
     BitmapTexels b = bitmap_texels(image, scene, point);
     real sum = 0.0f;
     for (int corner = 0; corner < 4; corner++) {

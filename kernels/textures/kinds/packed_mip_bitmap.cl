@@ -3,11 +3,9 @@
 
 inline PackedBitmap packed_mip_bitmap_level(PackedMipBitmap t, Scene scene, integer level)
 {
-    Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.transform, t.width, t.height, t.first, t.filter, t.wrap_u,
-                t.wrap_v, t.decode};
+    Bitmap b = BITMAP_OF(t);
     b = mip_level(b, scene, t.table, level);
-    PackedBitmap p = {b.kind, b.to_u, b.to_v, b.mapping, b.transform, b.width, b.height, b.first, b.filter, b.wrap_u,
-                      b.wrap_v, b.decode};
+    PackedBitmap p = BITMAP_OF(b);
     return p;
 }
 

@@ -2,16 +2,9 @@
  * goes on beyond its first and last band as it is there, light ends. */
 #include "textures/band_texels.cl"
 
-inline Bitmap spectral_bitmap_image(SpectralBitmap t)
-{
-    Bitmap b = {t.kind, t.to_u, t.to_v, t.mapping, t.transform, t.width, t.height, t.first, t.filter, t.wrap_u,
-                t.wrap_v, t.decode};
-    return b;
-}
-
 inline Spectrum spectral_bitmap_at(SpectralBitmap t, Scene scene, TexturePoint point, Spectrum numbers)
 {
-    Bitmap image = spectral_bitmap_image(t);
+    Bitmap image = BITMAP_OF(t);
     BitmapTexels b = bitmap_texels(image, scene, point);
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 4; corner++) {
@@ -25,7 +18,8 @@ inline Spectrum spectral_bitmap_at(SpectralBitmap t, Scene scene, TexturePoint p
 Spectrum spectral_bitmap_texel(SpectralBitmap t, Scene scene, TexturePoint point, vec2 u, Wavelengths lambdas)
 {
     mask inside;
-    integer at = t.first + t.bands * bitmap_random(spectral_bitmap_image(t), scene, point, u, &inside);
+    Bitmap image = BITMAP_OF(t);
+    integer at = t.first + t.bands * bitmap_random(image, scene, point, u, &inside);
     Spectrum value = bands_texel(scene, at, t.bands, spectra_row(scene, t.number, lambdas));
     return spectrum_sel(inside, value, spectrum_of(0.0f));
 }

@@ -1,28 +1,30 @@
 /* Path guiding: where scattered light comes from, learned from light paths before the first sample (Jensen 1995,
  * "Importance Driven Path Tracing using the Photon Map").
  *
- * Space is a grid of cells. A cell has a row for each of six directions that a surface may mostly face, and one for
- * collisions in media; a hash numbers the rows. A row has the equal parts of the sphere of transport/guiding/bins.cl.
- * stage/train.cl adds what light paths carry to the part from which they come, but for those straight from a light,
- * which next-event estimation finds: of these it counts what a row has got, behind all rows.
- * transport/guiding/sum.cl turns that to sums: guide[row + k] is light from part k and those before it. Then it stays
- * as it is, so that no pixel depends on the order of samples.
+ * Space is a grid of cells. A cell has a row for each of the six main directions of normals, and a row for collisions
+ * in media; a hash numbers the rows. A row is a histogram over the sphere: GUIDE_BINS bins of equal solid angle.
+ * stage/train.cl adds the power of each light path to the bin that it comes from. Paths straight from a light are left
+ * out, as next-event estimation finds them; their power is counted once for each row, behind all rows.
+ * transport/guiding/sum.cl turns histograms to cumulative sums: guide[row + k] is the light from bins 0 to k. Then the
+ * guide stays constant, so that no pixel depends on the order of samples.
  *
- * Where something is known, two directions are drawn for a camera's path, one by the guide and one by the material,
- * and one of them is taken by what it brings (guide_sample). So a sharp lobe keeps to itself, and a dull one follows
- * the guide, without a word of the material's. There Russian roulette compares what the path will bring, throughput
- * times the light of the row, with that where it met the guide first, as throughput alone is low where the guide is
- * right (after Vorba and Krivanek 2016, "Adjoint-Driven Russian Roulette and Splitting in Light Transport
+ * Where a row has light, a camera path samples two candidate directions, by the guide and by the material, and
+ * resampling selects a candidate (guide_sample). So narrow lobes follow the material and wide lobes the guide, without
+ * a parameter of the material. There Russian roulette compares the expected contribution, throughput times the light of
+ * the row, with the expected contribution where the path first met the guide, because the throughput alone is low where
+ * the guide is right (after Vorba and Krivanek 2016, "Adjoint-Driven Russian Roulette and Splitting in Light Transport
  * Simulation"). */
-#include "transport/guiding/bins.cl"
+
+/* Step. */
+#include "transport/guiding/guide.cl#bins"
 #include "transport/photons/cells.cl"
 
-#define GUIDE_EVEN 2.0f /* light from everywhere that is expected beside what is known, over that */
-#define GUIDE_STRAIGHT 4.0f /* the same of what comes straight from lights, which may be from anywhere above */
-#define GUIDE_LEAST 0.5f /* chance that a path goes on */
-#define GUIDE_FACES 0x01000193 /* sets the faces of a cell apart, in its hash */
+#define GUIDE_EVEN 2.0f /* uniform light that is expected in addition, over the light of the row */
+#define GUIDE_STRAIGHT 4.0f /* likewise over direct light, which may come from any direction above */
+#define GUIDE_LEAST 0.5f /* probability to continue */
+#define GUIDE_FACES 0x01000193 /* distinguishes the faces of a cell in its hash */
 
-/* Where the row of a point begins. n: normal, on the side from which it is seen. */
+/* The first word of a point's row. n: normal, on the viewer's side. */
 inline integer guide_row(Scene scene, vec3 p, vec3 n)
 {
     real x = fabs(n.x), y = fabs(n.y), z = fabs(n.z);
@@ -33,13 +35,13 @@ inline integer guide_row(Scene scene, vec3 p, vec3 n)
     return cell_number(scene, cell_at(scene, p, (real)(scene.settings->guide_side)), face * GUIDE_FACES) * GUIDE_BINS;
 }
 
-/* The word of what comes straight from lights to a row. */
+/* The word of a row's direct light. */
 inline integer guide_straight(Scene scene, integer row)
 {
     return scene.settings->photon_cells * GUIDE_BINS + row / GUIDE_BINS;
 }
 
-/* The part of the sphere that holds a direction; some part also where it is not finite, as in idle lanes. */
+/* The bin of a direction; any bin where it is not finite, as in idle lanes. */
 inline integer guide_bin(vec3 d)
 {
     real turn = atan2_r(d.y, d.x) * (0.5f / PI);
@@ -50,7 +52,7 @@ inline integer guide_bin(vec3 d)
 }
 
 #if BSDF_GUIDED
-/* d: the direction in which the path arrives. */
+/* d: direction of the incident ray. */
 inline Guided guide_at(Scene scene, Surface s, vec3 d MERGE_ARGS)
 {
     Guided g;
@@ -64,7 +66,7 @@ inline Guided guide_at(Scene scene, Surface s, vec3 d MERGE_ARGS)
     return g;
 }
 
-/* Density of the directions of a part by the guide alone [1/sr]. own: light that comes from there. */
+/* Density of the directions of a bin by the guide alone [1/sr]. own: light of the bin. */
 inline real guide_density_of(Guided g, real own)
 {
     return own * (GUIDE_BINS / (4.0f * PI)) / max_r(g.light, (real)(1e-30f));
@@ -79,15 +81,15 @@ inline real guide_density(global const uint *guide, Guided g, vec3 d)
     return guide_density_of(g, own);
 }
 
-/* Density by guide and material together, which alone has the density p [1/sr]: the mean, by which light is weighed
- * that is found in two ways. */
+/* Density of guide and material together, where the material alone has the density p [1/sr]: their mean, which MIS
+ * weights use. */
 inline real guide_pdf(global const uint *guide, Guided g, vec3 d, real p)
 {
     mask known = g.light > 0.0f;
     return any(known) ? sel(known, 0.5f * (p + guide_density(guide, g, d)), p) : p;
 }
 
-/* The place of `light` among four bits of sums from `first` on, every `step`-th: what lies below and up to there. */
+/* Binary search of `light` in GUIDE_ROWS sums from `first` on, in steps of `step`; below, above: the sums around it. */
 inline integer guide_search(global const uint *guide, integer first, int step, real light, real *below, real *above)
 {
     integer found = 0;
@@ -108,8 +110,8 @@ inline real guide_left(real light, real below, real above)
     return clamp_r(left, (real)(0.0f), (real)(0.99999994f));
 }
 
-/* A direction of the guide. u: its x goes to the height, its y to the turn, so that what is spread evenly stays so.
- * density: of it [1/sr]. */
+/* Samples a direction of the guide. u: x selects the height, y the azimuth, so that stratification is kept. density: of
+ * the direction [1/sr]. */
 inline vec3 guide_direction(global const uint *guide, Guided g, vec2 u, real *density)
 {
     real light = u.x * g.light, below = 0.0f, above = g.light;
@@ -123,11 +125,11 @@ inline vec3 guide_direction(global const uint *guide, Guided g, vec2 u, real *de
     return v3(level * c, level * s, z);
 }
 
-/* A direction that may be next. */
+/* A candidate for the next direction. */
 typedef struct {
     vec3 wi;
-    real guided, material; /* densities of both techniques [1/sr]; guided is 0 where the guide cannot sample it */
-    real weight;           /* of what it brings by the mean of the wavelengths: the chance that it is taken, unscaled */
+    real guided, material; /* densities of both techniques [1/sr]; guided is 0 where the guide cannot sample wi */
+    real weight;           /* expected contribution, by the mean of the wavelengths: unnormalized probability */
 } Candidate;
 
 inline Candidate guide_candidate(vec3 wo, vec3 wi, real guided, real material)
@@ -139,12 +141,12 @@ inline Candidate guide_candidate(vec3 wo, vec3 wi, real guided, real material)
     return c;
 }
 
-/* The radiance that is expected from a direction, over all that the guide knows. */
+/* The radiance that is expected from a direction, over all light of the row. */
 inline real guide_expects(Guided g, Candidate c) { return c.guided / guide_cosine(c.wi) + g.even * (0.25f / PI); }
 
-/* The next direction: one of the material and one of the guide are drawn, and one of both is taken, by what it brings
- * of the light that is expected (resampling: Talbot et al. 2005). uv, lobe: of the material; toward: of the guide;
- * chance: uniform in [0, 1), takes one. */
+/* The next direction by resampling (Talbot et al. 2005): a candidate of the material and a candidate of the guide,
+ * selected in proportion to their expected contributions. u: random numbers of the material; toward: of the guide;
+ * chance: uniform in [0, 1), selects the candidate. */
 inline BsdfSample guide_sample(global const uint *guide, Guided g, Bsdf m, Frame frame, vec3 wo, vec3 u, vec2 toward,
                                real chance, Spectrum *ratio)
 {
@@ -179,8 +181,8 @@ inline BsdfSample guide_sample(global const uint *guide, Guided g, Bsdf m, Frame
     return s;
 }
 
-/* Russian roulette where something is known; returns which paths played. brings: throughput times albedo; u: uniform in
- * [0, 1); beta: the throughput behind. */
+/* Russian roulette where the row has light; returns the lanes that took part. brings: throughput times albedo; u:
+ * uniform in [0, 1); beta: the throughput after the vertex. */
 inline mask guide_roulette(Slab path, uint at, Guided g, real brings, real u, mask *next, Spectrum *beta)
 {
     if (!any(g.light > 0.0f)) return mask_of(0);
@@ -193,3 +195,66 @@ inline mask guide_roulette(Slab path, uint at, Guided g, real brings, real u, ma
     return plays;
 }
 #endif
+
+/* Step at_surface: the guide at a surface: it holds the flux on the side of wo alone. */
+#define GUIDE_COSINE 0.1f /* the least cosine that divides flux for radiance */
+#define GUIDE_LOBE LOBE_REFLECT
+#define guide_row_at(scene, s, d) guide_row(scene, (s).p, sel3(dot3((s).n, d) < 0.0f, (s).n, neg3((s).n)))
+#define guide_leads(wo, wi) ((wi).z * (wo).z > 0.0f)
+#define guide_cosine(wi) max_r(fabs((wi).z), (real)(GUIDE_COSINE))
+
+/* Step at_collision: the guide at a collision in a medium: it holds light of all directions, without a cosine. */
+#include "transport/guiding/guide.cl#row_of_collision"
+
+#define GUIDE_LOBE LOBE_TRANSMIT
+#define guide_row_at(scene, s, d) guide_row_of_collision(scene, (s).p)
+#define guide_leads(wo, wi) mask_of(1)
+#define guide_cosine(wi) ((real)(1.0f))
+
+/* Step bins: the bins of a guide's row over the sphere, of equal solid angle: in height, and around z. */
+#define GUIDE_ROWS 16
+#define GUIDE_COLUMNS 16
+#define GUIDE_BINS (GUIDE_ROWS * GUIDE_COLUMNS)
+
+/* Step row_of_collision: the first word of the row of a point in a medium. */
+#include "transport/guiding/guide.cl#bins"
+#include "transport/photons/cells.cl"
+
+#define GUIDE_IN_MEDIUM 0x600d10c5 /* distinguishes it from the faces of its cell */
+
+inline integer guide_row_of_collision(Scene scene, vec3 p)
+{
+    return cell_number(scene, cell_at(scene, p, (real)(scene.settings->guide_side)), (integer)(GUIDE_IN_MEDIUM)) *
+           GUIDE_BINS;
+}
+
+/* Step collisions: light paths that collide in media add their power to rows of their own. */
+#include "generated/medium.cl"
+#include "generated/phases.cl"
+#include "transport/photons/media.cl"
+#include "transport/guiding/guide.cl#row_of_collision"
+
+#define GUIDE_THIN 0.0625f /* limits of 4 sigma_s times a cell's side: beyond them */
+#define GUIDE_DENSE 4.0f   /* whole numbers would not resolve the power */
+
+/* The row of a light path, which is `row` on a surface. shared: divisor of its light, so that Russian roulette can
+ * compare collisions and surfaces: in uniform light, the power that collides in a cell is 4 sigma_s times the cell's
+ * side of the power on a side. */
+inline integer collision_row(Scene scene, Slab path, Slab hit, uint at, mask active, integer row, real *shared)
+{
+    integer part = merging_part(scene, active, load_hit_material(hit, at));
+    mask collides = active & is_phase(MATERIAL_KIND(part));
+    if (!any(collides)) return row;
+    integer name = sel_i(collides, load_path_medium(path, at), (integer)(0));
+    real sigma = spectrum_mean(medium_load(scene, name, load_path_lambdas(path, at)).sigma_s);
+    real counts = clamp_r(4.0f * sigma * scene.settings->guide_side, (real)(GUIDE_THIN), (real)(GUIDE_DENSE));
+    *shared = sel(collides, counts, *shared);
+    vec3 p = madd3(load_path_d(path, at), load_hit_t(hit, at), load_path_o(path, at));
+    return sel_i(collides, guide_row_of_collision(scene, p), row);
+}
+
+/* Twin, where there are no media. */
+inline integer collision_row(Scene scene, Slab path, Slab hit, uint at, mask active, integer row, real *shared)
+{
+    return row;
+}

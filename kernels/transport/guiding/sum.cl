@@ -1,6 +1,6 @@
-/* What light paths have left in each part of a row, as sums of the parts so far: see transport/guiding/guide.cl. */
-#include "bvh/no_vectorize.cl"
-#include "transport/guiding/bins.cl"
+/* Turns the histogram of each row to cumulative sums: see transport/guiding/guide.cl. */
+#include "bvh/hints.cl"
+#include "transport/guiding/guide.cl#bins"
 
 kernel NO_VECTORIZE void guide_sum(global uint *restrict guide)
 {

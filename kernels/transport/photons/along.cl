@@ -1,18 +1,18 @@
-/* Merging along a ray through a medium: photons are collisions of light paths there, and a ray from the camera gathers
- * those beside it, wherever it will collide itself (Jarosz 2008; Krivanek 2014, "Unifying Points, Beams and Paths", the
- * estimator "point-beam 2D"). With T what passes up to where a photon is along the ray, sum T f power / (N pi r^2) is
- * radiance: power holds the scattered share already, f is the phase function.
+/* Merging along a ray through a medium: photons are collisions of light paths in the medium, and a camera ray gathers
+ * the photons near it, wherever the ray itself collides (Jarosz 2008; Krivanek 2014, "Unifying Points, Beams and
+ * Paths", the estimator "point-beam 2D"). With the transmittance T along the ray to a photon and the phase function f,
+ * sum T f power / (N pi r^2) is radiance: power includes the scattering albedo.
  *
- * Of a long ray a window of some length is asked alone, whose middle is chosen as collisions are, and light is divided
- * by the chance that the window holds the photon. */
+ * Only a window of a long ray gathers photons. Its middle is sampled as collisions are, and light is divided by the
+ * probability that the window contains the photon. */
 #include "core/octahedral.cl"
 #include "transport/photons/cells.cl"
-#include "transport/photons/photon_light.cl"
+#include "transport/photons/weight.cl#light"
 #include "transport/photons/media.cl"
 
 #define MERGING_STEPS 64.0f  /* of a window at most */
 #define MERGING_DEPTH 1.0f   /* its optical depth at most */
-#define MERGING_CLEAR 1e-4f  /* share of the mean extinction: what is less has no photons worth a window */
+#define MERGING_CLEAR 1e-4f  /* share of the mean extinction: wavelengths with less do not determine the window */
 
 /* A camera's ray in a medium. */
 typedef struct {
@@ -24,19 +24,19 @@ typedef struct {
     real arrives; /* mis_ratio */
 } MergingRay;
 
-/* The part of a ray that is asked. */
+/* The part of a ray that gathers photons. */
 typedef struct {
-    real from, to, reach; /* [m]; reach: half of the window's length, FAR where it holds all of the ray */
-    real sigma, all;     /* extinction by which its middle is chosen, chance of a collision before the end */
+    real from, to, reach; /* [m]; reach: half of the window's length, FAR if it contains the whole ray */
+    real sigma, all;     /* extinction that samples its middle; probability of a collision before the end */
 } MergingWindow;
 
-/* Chance of a middle before t. */
+/* Probability of a middle before t. */
 inline real merging_before(MergingWindow w, MergingRay ray, real t)
 {
     return (1.0f - exp_r(-w.sigma * clamp_r(t, (real)(0.0f), ray.end))) / w.all;
 }
 
-/* u: chooses it. step: length of a step [m]. */
+/* u: samples the window; step: length of a step [m]. */
 inline MergingWindow merging_window(MergingRay ray, real step, real u)
 {
     MergingWindow w;
@@ -55,7 +55,7 @@ inline MergingWindow merging_window(MergingRay ray, real step, real u)
     return w;
 }
 
-/* The chance that the window holds t. */
+/* The probability that the window contains t. */
 inline real merging_chance(MergingWindow w, MergingRay ray, real t)
 {
     real inside = merging_before(w, ray, t + w.reach) - merging_before(w, ray, t - w.reach);
@@ -73,8 +73,7 @@ inline Spectrum merge_photon_along(Photon photon, mask near, MergingRay ray, Mer
     return spectrum_mul(light, spectrum_exp(spectrum_scale(ray.m.sigma_t, -t)));
 }
 
-/* The light of all photons beside a ray, by the share of it that merging takes, without what the path carries. u: as
- * good a number as any. */
+/* The light of all photons near a ray with their MIS weights, without the path's throughput. u: uniform in [0, 1). */
 inline Spectrum merge_along(Scene scene, mask active, MergingRay ray, Bsdf bsdf, integer pass, real u MERGE_ARGS)
 {
     global const Settings *settings = scene.settings;

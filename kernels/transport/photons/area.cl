@@ -1,28 +1,28 @@
-/* The disk in which paths from the camera and photons are merged. A pass is a sample of every pixel, with the light
- * paths beside it; its radius shrinks from pass to pass, so that the picture converges (Hachisuka and Jensen 2009). */
-#define PATH_BEGUN (PATH_ALIVE | PATH_SHARP) /* the state in which a path begins at the camera */
+/* The disk where camera paths and photons are merged. A pass is a sample of every pixel, with the light paths beside
+ * it; its radius shrinks from pass to pass, so that the picture converges (Hachisuka and Jensen 2009). */
+#define PATH_BEGUN (PATH_ALIVE | PATH_SHARP) /* initial state of a camera path */
 
-/* The pass of a light path. That of a sample of the camera has the sample's number. */
+/* The pass of a light path. A camera path's pass is the number of its sample. */
 inline integer merging_pass(Scene scene, integer light_path)
 {
     return divide(light_path, (int)scene.settings->light_paths);
 }
 
-/* The radius in a pass [m]: the first one over the eighth root of the pass's number from 1, so that radius squared
- * falls as the pass to the power of alpha - 1, alpha being 3/4 (Georgiev 2012). */
+/* The radius in a pass [m]: the first radius over the eighth root of the pass's number from 1, so that the squared
+ * radius falls as the pass to the power of alpha - 1 with alpha = 3/4 (Georgiev 2012). */
 inline real merging_radius(Scene scene, integer pass)
 {
     return scene.settings->radius / sqrt(sqrt(sqrt(to_real(pass + 1))));
 }
 
-/* The disk's area times the number of photons' paths that may meet a path from the camera there [m^2]. */
+/* The disk's area times the number of light paths whose photons may be merged with a camera path [m^2]. */
 inline real merging_area(Scene scene, integer pass)
 {
     return PI * scene.settings->photon_paths * sqr(merging_radius(scene, pass));
 }
 
-/* Whether a path from the camera in such a state is merged: where all its surfaces so far were sharp. Where light paths
- * are joined to the camera, what it sees by itself is left to them. */
+/* Whether a camera path is merged at a vertex: all its vertices before must be specular. With light paths that are
+ * connected to the camera, its first vertex is left to them. */
 inline mask merging_here(integer state, integer depth)
 {
     mask sharp = (state & PATH_SHARP) != 0;
@@ -32,14 +32,15 @@ inline mask merging_here(integer state, integer depth)
     return sharp;
 }
 
-/* Paths are merged that have the same wavelengths: each pass has some groups of them, a path's own u chooses one. */
+/* The group of a path: only paths with equal wavelengths are merged. Each pass has several groups; a path's own u
+ * selects a group. */
 inline integer merging_group(Scene scene, real u)
 {
     int groups = scene.settings->wavelength_groups;
     return min_i(to_integer(u * (float)groups), (integer)(groups - 1));
 }
 
-/* That of a path by its sampler. */
+/* The group of a path by its sampler. */
 #if SPECTRUM_SIZE == 4
 #define merging_group_of(scene, sampler) \
     merging_group(scene, sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH)).x)
@@ -47,8 +48,8 @@ inline integer merging_group(Scene scene, real u)
 #define merging_group_of(scene, sampler) ((integer)(0))
 #endif
 
-/* What stands for `own`, a random number, where the time is drawn: all paths of a pass and a group are at one time, so
- * that photons are met where and as they were left. From pass to pass it goes in steps of the golden ratio. */
+/* Replaces the random number `own` of the time: all paths of a pass and a group have the same time, so that camera
+ * paths find photons where they were stored. From pass to pass it advances by the golden ratio. */
 inline real merging_moment(Scene scene, real u, real own, integer pass)
 {
     float groups = (float)scene.settings->wavelength_groups;
@@ -57,8 +58,8 @@ inline real merging_moment(Scene scene, real u, real own, integer pass)
     return moment - floor(moment);
 }
 
-/* What stands for u where wavelengths are drawn: the same for all of a group. From pass to pass it goes through the
- * group's part of the unit interval as van der Corput's sequence, whose beginning the seed chooses. */
+/* Replaces the random number u of the wavelengths: equal for all paths of a group. From pass to pass it is van der
+ * Corput's sequence over the group's part of the unit interval, with an offset by the seed. */
 inline real merging_wavelength(Scene scene, real u, integer pass)
 {
     natural bits = reverse_bits(as_natural(pass));
@@ -66,8 +67,8 @@ inline real merging_wavelength(Scene scene, real u, integer pass)
     return (to_real(merging_group(scene, u)) + inside) / (float)scene.settings->wavelength_groups;
 }
 
-/* Twin, where no photons are merged: each path has a time and wavelengths of its own. */
-#define PATH_BEGUN PATH_ALIVE /* the state in which a path begins at the camera */
+/* Twin, without photon merging: each path has a time and wavelengths of its own. */
+#define PATH_BEGUN PATH_ALIVE /* initial state of a camera path */
 inline real merging_moment(Scene scene, real u, real own, integer pass) { return own; }
 inline real merging_wavelength(Scene scene, real u, integer pass) { return u; }
 inline integer merging_pass(Scene scene, integer light_path) { return light_path; }

@@ -1,6 +1,6 @@
-/* The cells of a grid, of which `photon_cells` are told apart. A cell's side is the diameter of the merging disk, so
- * that such a disk lies in eight cells at most, two along each axis. The lowest bits of a cell's coordinates are those
- * of its number: neighbours have different numbers, and no photon is found twice. */
+/* The cells of a hash grid with `photon_cells` numbers. A cell's side is the diameter of the merging disk, so a disk
+ * lies in eight cells at most, two along each axis. The lowest bits of a cell's coordinates are the lowest bits of its
+ * number: neighbours have different numbers, and no photon is found twice. */
 typedef struct { integer x, y, z; } Cell;
 
 inline Cell cell_at(Scene scene, vec3 p, real side)

@@ -7,9 +7,9 @@ typedef struct {
 /* Step. */
 #include "transport/photons/media.cl"
 
-#include "transport/photons/part.cl"
+#include "transport/photons/media.cl"
 
-/* Whether light paths collide, and where a medium has no photons they are `active` no more. */
+/* The collisions of light paths; clears `active` in media without photons. */
 inline Collision collision_met(Scene scene, Slab path, Slab hit, uint at, mask *active)
 {
     integer part = merging_part(scene, *active, load_hit_material(hit, at));
@@ -20,7 +20,7 @@ inline Collision collision_met(Scene scene, Slab path, Slab hit, uint at, mask *
     return c;
 }
 
-/* What photons there have of their own: the medium in the place of a normal, and no cosine. */
+/* Members of a photon at a collision: the medium in place of a normal, and no cosine. */
 inline void collision_photon(Slab path, Slab hit, uint at, Collision c, Photon *photon, integer *group)
 {
     vec3 p = madd3(load_path_d(path, at), load_hit_t(hit, at), load_path_o(path, at));

@@ -2,11 +2,11 @@
  *
  * A photon is a vertex of a light path behind a specular vertex. The photons in a disk of radius r around x are light
  * per area, so that sum f power / (N pi r^2) is radiance, N being the number of light paths; f has no cosine. Each is
- * weighed (MIS) against all other techniques for its path, see transport/mis_ratio.cl. Photons on surfaces that face
- * another way, or off the disk's plane, are left out. */
+ * weighed (MIS) against all other techniques for its path, see transport/mis_ratio.cl. Photons on surfaces of another
+ * orientation, or off the disk's plane, are left out. */
 #include "core/octahedral.cl"
 #include "transport/photons/cells.cl"
-#include "transport/photons/photon_light.cl"
+#include "transport/photons/weight.cl#light"
 
 #define MERGING_FLAT 0.5f    /* largest distance of photons off the plane, over the radius */
 #define MERGING_TURN 0.866f  /* least cosine between the normals */

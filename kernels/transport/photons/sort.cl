@@ -1,11 +1,11 @@
-/* Photons sorted by the cells where they are, so that each cell's are found at once: a counting sort.
+/* Sorts photons by their cells with a counting sort.
  *
- * numbers: of the cell of each place, PHOTON_NONE where there is no photon. cells: one word more than there are cells;
- * in the end those of cell k are order[cells[k]] and further, below order[cells[k + 1]], in ascending order. */
-#include "bvh/no_vectorize.cl"
+ * numbers: the cell of each photon, PHOTON_NONE for an empty place. cells: a word more than there are cells; afterwards
+ * the photons of cell k are order[cells[k]] up to, but without, order[cells[k + 1]], in ascending order. */
+#include "bvh/hints.cl"
 #include "generated/photon_numbers.cl"
 
-/* How many photons are in each cell; cells: zeros. */
+/* Counts the photons of each cell; cells: zeros. */
 kernel NO_VECTORIZE void photons_count(global const uint *restrict numbers, uint count, global uint *restrict cells)
 {
     uint place = get_global_id(0);
@@ -19,7 +19,7 @@ kernel NO_VECTORIZE void photons_sum(global const uint *restrict cells, uint cou
     sums[get_global_id(0)] = sum;
 }
 
-/* Sums made positions, by one work-item. */
+/* Exclusive scan of the sums, by a single work-item. */
 kernel NO_VECTORIZE void photons_scan(global uint *restrict sums, uint runs)
 {
     uint total = 0;
@@ -30,7 +30,7 @@ kernel NO_VECTORIZE void photons_scan(global uint *restrict sums, uint runs)
     }
 }
 
-/* Of each cell where its photons begin. */
+/* The first photon of each cell. */
 kernel NO_VECTORIZE void photons_begin(global uint *restrict cells, uint count, global const uint *restrict sums)
 {
     uint begin = get_global_id(0) * PHOTON_RUN, end = min(begin + PHOTON_RUN, count), at = sums[get_global_id(0)];
@@ -41,7 +41,7 @@ kernel NO_VECTORIZE void photons_begin(global uint *restrict cells, uint count, 
     }
 }
 
-/* Photons put in their cells, and where these begin made where they end. */
+/* Places photons in their cells; `cells` advances from the first photon of each cell to the end. */
 kernel NO_VECTORIZE void photons_place(global const uint *restrict numbers, uint count, global uint *restrict cells,
                                        global uint *restrict order)
 {
@@ -49,7 +49,7 @@ kernel NO_VECTORIZE void photons_place(global const uint *restrict numbers, uint
     if (place < count && numbers[place] != PHOTON_NONE) order[atomic_inc(cells + 1 + numbers[place])] = place;
 }
 
-/* Lets what is at k sink in a heap of n, the largest on top. */
+/* Sifts entry k down in a max-heap of n entries. */
 inline void photons_sink(global uint *order, uint k, uint n)
 {
     uint value = order[k];
@@ -62,7 +62,7 @@ inline void photons_sink(global uint *order, uint k, uint n)
     order[k] = value;
 }
 
-/* The photons of a cell in ascending order: they were put there in any. */
+/* Sorts the photons of a cell in ascending order. */
 kernel NO_VECTORIZE void photons_order(global const uint *restrict cells, uint count, global uint *restrict order)
 {
     uint cell = get_global_id(0);

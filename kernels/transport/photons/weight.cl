@@ -15,3 +15,15 @@ inline real photon_weight(real of_light, real of_camera, real number, real area,
     real light = of_light * number * p, camera = of_camera * p_back;
     return 1.0f / (1.0f + sqr(light / area) + sqr(camera / area));
 }
+
+/* Step light: the light of a photon for a camera path in the lanes of `near`, without the path's throughput. scale: MIS
+ * weight over the area of merging. */
+inline Spectrum photon_light(Photon photon, mask near, BsdfPair pair, Spectrum ratio, real scale)
+{
+#if USES_DISPERSION /* the pdfs of both parts for each wavelength as the hero, over their mean */
+    scale /= max_r(spectrum_mean(spectrum_mul(ratio, photon.ratio)), (real)(1e-20f));
+#endif
+    Spectrum light = spectrum_scale(spectrum_mul(pair.f, photon.power), scale);
+    near = near & !mis_specular(mask_of(0), pair.p, pair.p_back);
+    return spectrum_sel(near & (spectrum_max(pair.f) > 0.0f), light, spectrum_of(0.0f));
+}

@@ -33,4 +33,4 @@ def _one(name: str, kind: str, *values: Any) -> Parameter:
 
 def define(into: State, values: str, name: str, kind: str, **given: Any) -> None:
     """A `Texture` directive."""
-    into.shared.textures[values, name] = [Definition(kind, params(**given), into)]
+    into.shared.textures[values, name] = [(0, Definition(kind, params(**given), into))]

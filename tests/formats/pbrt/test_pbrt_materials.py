@@ -262,14 +262,14 @@ def test_mixtures_nest():
         ("glass", "dielectric", {}),
         ("inner", "mix", {"materials": ("string", "red", "glass"), "amount": ("float", 0.25)}),
     ):
-        at.shared.materials[name] = [Definition(kind, params(**given), at)]
+        at.shared.materials[name] = [(0, Definition(kind, params(**given), at))]
     made = make("mix", at, materials=("string", "inner", "red"))
     assert isinstance(made, materials.Blend) and made.weight == 0.5
     assert made.first.weight == 0.25  # of the glass, which is the second
     assert isinstance(made.first.second, materials.Dielectric)
     assert made.first.first is made.second
     assert isinstance(made.second, materials.Diffuse) and "behind" in at.shared.warnings[0]
-    at.shared.materials["grey"] = [Definition("diffuse", params(), at)]
+    at.shared.materials["grey"] = [(0, Definition("diffuse", params(), at))]
     opaque = make("mix", at, materials=("string", "grey", "red"))
     assert isinstance(opaque.first, TwoSided)
 

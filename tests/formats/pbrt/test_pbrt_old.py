@@ -301,3 +301,22 @@ def test_rough_matte_and_substrate(read):
     made = surface(read, '"substrate" "float uroughness" .1 "float vroughness" .2')
     assert made.kind == "ashikhmin_shirley"
     assert made.alpha_u == pytest.approx(0.46176, abs=1e-4) and made.alpha_u < made.alpha_v
+
+
+NAMED = 'MakeNamedMaterial "m" "string type" "matte" "rgb Kd" [{0} {0} {0}]'
+PAINT = 'Texture "t" "color" "constant" "rgb value" [{0} {0} {0}]'
+
+
+@pytest.mark.parametrize("define, use", [
+    (NAMED, 'NamedMaterial "m"'), (PAINT, 'Material "matte" "texture Kd" "t"'),
+])  # fmt: skip
+@pytest.mark.parametrize("scope", ["Attribute", "Object", "Transform"])
+def test_definitions_end_with_their_scope(read, define, use, scope):
+    """GraphicsState of src/core/api.cpp holds the names; a TransformBegin does not save it."""
+    name = ' "o"' if scope == "Object" else ""
+    inner = f"{scope}Begin{name} {define.format(0.25)} {use} {DISK} {scope}End"
+    outer = f"{define.format(0.5)} {inner} {use} {DISK} {define.format(0.75)} {use} {DISK}"
+    shapes = read(outer).shapes
+    found = [shape.material.front.reflectance.r for shape in shapes]
+    first = [] if scope == "Object" else [0.25]
+    assert found == [*first, 0.25 if scope == "Transform" else 0.5, 0.75]

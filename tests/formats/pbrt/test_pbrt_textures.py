@@ -10,7 +10,6 @@ import clpt
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats.pbrt.textures import map_values, textured
-from clpt.scene.pixels import pixels
 from clpt.scene.roles import REAL, REFLECTANCE
 from clpt.scene.textures import Bitmap, Checkerboard, Checkers, Dots, Mix, Noise, Product
 from tests.formats.pbrt.directives import define, params, state
@@ -112,7 +111,7 @@ def test_numbers_between_texels_are_alpha_or_a_mean(tmp_path):
             "imagemap", "float", tmp_path, filename=("string", path.name), **given
         )
         assert not warnings
-        return float(pixels(made, REAL)[0, 0, 0])
+        return float(made.pixels(REAL)[0, 0, 0])
 
     linear = srgb(np.array([200, 100, 50, 128]) / 255.0)
     for filter in ("bilinear", "trilinear"):

@@ -18,7 +18,7 @@ from clpt import transforms as tf
 from clpt.errors import MemoryBudgetError, SceneError
 from clpt.render.edit.rebuild import has_other_paths
 from clpt.render.flow.scene_to_tables import lower
-from clpt.render.makers.device_film import DeviceFilm
+from clpt.render.makers import planning
 from clpt.scene import Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
@@ -140,7 +140,7 @@ def test_values_are_a_few_words(
     monkeypatch.setattr(
         stream, "write", lambda b, a, *more: (written.append(a.nbytes), write(b, a, *more))[1]
     )
-    monkeypatch.setattr(DeviceFilm, "_rebuild", None)
+    monkeypatch.setattr(planning, "_rebuilt", None)
     buffers, used = renderer._wavefront.arguments, renderer._wavefront.buffers.used
     with caplog.at_level(logging.INFO, "clpt"):
         renderer.update(materials={RED: m.Diffuse(reflectance=(0.1, 0.2, 0.3))})

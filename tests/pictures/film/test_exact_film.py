@@ -14,7 +14,7 @@ import pytest
 import clpt
 from clpt import images
 from clpt.__main__ import run
-from clpt.cli.render.refused import refusals
+from clpt.cli.render.report import refusals
 from clpt.errors import SceneError
 from clpt.images import exr_files
 from clpt.render.film.state import FILM_WORDS, SAMPLES_WORD, SUM_WORDS, FilmState

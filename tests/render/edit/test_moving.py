@@ -14,7 +14,7 @@ import trimesh
 from clpt import device as dev
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.render.edit.moving import Moving
+from clpt.render.edit.moving import Move, Moving
 from clpt.render.records import TransportFeatures
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
@@ -154,7 +154,7 @@ def test_what_cannot_be_is_told(renderer: Renderer) -> None:
 def test_where_light_is_traced_from_lights_nothing_moves_in_place(renderer: Renderer) -> None:
     target = renderer._wavefront.scene
     moving, lowered = Moving(target, renderer.scene), target.lowered
-    assert callable(moving.plan(renderer.scene, {}))
+    assert isinstance(moving.plan(renderer.scene, {}), Move)
     features = dataclasses.replace(lowered.features, transport=TransportFeatures(light_paths=True))
     target.lowered = dataclasses.replace(lowered, features=features)
     assert "traced from lights" in str(moving.plan(renderer.scene, {}))

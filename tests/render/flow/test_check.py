@@ -225,9 +225,9 @@ def test_a_quick_update_tells_gloss() -> None:
     former, edited = (Scene(shapes=[ball], **given) for ball in balls)
     device = SimpleNamespace(lowered=lower(former), tables={"materials": None})
     device.stream = SimpleNamespace(write=lambda *_: None)
-    write = patch(cast(Any, device), former, edited)
-    assert callable(write)
-    write()
+    plan = patch(cast(Any, device), former, edited)
+    assert not isinstance(plan, str)
+    plan.write()
     expected = lower(edited).tables["materials"]
     np.testing.assert_array_equal(device.lowered.tables["materials"], expected)
 

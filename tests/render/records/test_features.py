@@ -10,7 +10,7 @@ import pytest
 
 from clpt.device import kernels_folder
 from clpt.render.records import Features, MaterialFeatures, MediaFeatures, MotionFeatures
-from clpt.render.records.macros import said
+from clpt.render.records.macros import macros_of
 from clpt.scene import materials
 from clpt.scene.params import device_params
 from clpt.scene.roles import INDEX
@@ -58,7 +58,7 @@ def test_records_of_features_are_small_and_of_one_subject() -> None:
     """At most ten fields each; their macros are told apart; they are keys, and travel."""
     found = records(Features())
     assert max(len(dataclasses.fields(record)) for record in found.values()) <= 10
-    names = [name for name, _ in said(Features())]
+    names = [name for name, _ in macros_of(Features())]
     assert len(names) == len(set(names))
     assert pickle.loads(pickle.dumps(Features())) == Features()
     assert len({Features(), Features(media=MediaFeatures(present=True)), Features()}) == 2
@@ -66,8 +66,8 @@ def test_records_of_features_are_small_and_of_one_subject() -> None:
 
 def test_a_macro_is_defined_where_its_field_holds() -> None:
     """A flag where it holds, a number wherever there is one."""
-    nothing, moves = (dict(said(MotionFeatures(row=row))) for row in (None, 0))
+    nothing, moves = (dict(macros_of(MotionFeatures(row=row))) for row in (None, 0))
     assert nothing["MOTION_ROW"] is None and moves["MOTION_ROW"] == 0
-    found = dict(said(MotionFeatures(vertices=True)))
+    found = dict(macros_of(MotionFeatures(vertices=True)))
     assert found["MOVES_VERTICES"] == 1 and found["MOVES_INSTANCES"] is None
     assert found["MOVES_VERTICES"] is not True, "true is 1 in kernels"

@@ -13,7 +13,8 @@ import pytest
 import clpt
 from clpt.errors import SceneError
 from clpt.render.flow.scene_to_tables import Lowered, lower
-from clpt.render.transport import guides, worth
+from clpt.render.transport import guides, hard_light
+from clpt.render.transport.hard_light import TRIAL_SAMPLES
 from clpt.render.trials import cost, trial
 from clpt.scene import Scene
 from clpt.scene.integrators import Auto, Integrator, Path
@@ -32,7 +33,7 @@ WAYS: list[tuple[Any, bool]] = [(0.25, False), (0, False), (0, True)]
 def long(scene: Scene, integrator: Integrator = AUTO, **changes: Any) -> Scene:
     """A scene of which so many samples are wanted that a trial is worth it."""
     pixels = scene.film.width * scene.film.height
-    changes = {"spp": -(-worth.PLAIN_RAYS // pixels), "integrator": integrator, **changes}
+    changes = {"spp": -(-cost.PLAIN_RAYS // pixels), "integrator": integrator, **changes}
     return dataclasses.replace(scene, **changes)
 
 
@@ -53,7 +54,7 @@ def test_ways_that_are_tried() -> None:
     assert ways(photons) == [(1, False), *WAYS[1:]] and lower(photons).integrator.kind == "vcm"
     shallow = Path(light_paths="auto", max_depth=2)
     assert ways(long(slit(), shallow)) == []
-    assert ways(long(caustic(), spp=worth.SAMPLES // (16 * 12))) == []
+    assert ways(long(caustic(), spp=TRIAL_SAMPLES // (16 * 12))) == []
 
 
 @pytest.mark.parametrize(
@@ -95,7 +96,7 @@ def test_an_edit_has_no_trial() -> None:
 
 def test_a_guide_learns_the_longer_the_more_samples_there_are() -> None:
     """Unless somebody says from how many light paths."""
-    learned = {1 << 20: 20, worth.SAMPLES: 20, worth.GUIDE_RAYS: 22}
+    learned = {1 << 20: 20, TRIAL_SAMPLES: 20, cost.GUIDE_RAYS: 22}
     learned |= {1 << 28: 22, 1 << 29: 23, 1 << 30: 24, 1 << 40: 24}
     for samples, power in learned.items():
         assert guides.paths_for(samples) == 1 << power
@@ -140,9 +141,9 @@ def test_a_guide_learns_from_a_whole_number_of_light_paths(wrong: Any) -> None:
 def test_a_trial_takes_a_share_of_the_film() -> None:
     """Where it is long enough for more pixels than the fewest that tell something."""
     trial_samples = cost.ROUNDS * cost.SAMPLES
-    for samples in (worth.SAMPLES, 1 << 24, 1 << 27):
+    for samples in (TRIAL_SAMPLES, 1 << 24, 1 << 27):
         share = cost.pixels_for(samples) * trial_samples / samples
-        assert share <= 1.0 / worth.SHARE
+        assert share <= 1.0 / cost.SHARE
     assert cost.pixels_for(1) == cost.FEWEST
     assert cost.pixels_for(1 << 40) == cost.PIXELS
 
@@ -200,7 +201,7 @@ def test_no_guide_is_compiled_where_there_is_little_noise(monkeypatch: pytest.Mo
 
 
 def test_no_guide_is_compiled_for_few_rays(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = long(caustic(), spp=-(-worth.SAMPLES // (16 * 12)))
+    scene = long(caustic(), spp=-(-TRIAL_SAMPLES // (16 * 12)))
     ground: Any = None
     pictures = cost.ROUNDS * cost.SAMPLES * 32 * 64
     for each, guides_too in ((15, False), (17, True)):  # rays of a sample
@@ -226,8 +227,8 @@ def little(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trials of few samples, in which guides learn from few light paths."""
     monkeypatch.setattr(guides, "PATHS", 1 << 12)
     monkeypatch.setattr(guides, "LONG_PATHS", 1 << 12)
-    for name in ("SAMPLES", "GUIDE_RAYS"):
-        monkeypatch.setattr(worth, name, 1)
+    monkeypatch.setattr(hard_light, "TRIAL_SAMPLES", 1)
+    monkeypatch.setattr(trial, "GUIDE_RAYS", 1)
     monkeypatch.setattr(trial, "ROUNDS", 2)
     monkeypatch.setattr(trial, "SAMPLES", 4)
     monkeypatch.setattr(trial, "QUIET", 0.0)
@@ -266,7 +267,7 @@ def test_a_film_is_gone_on_with_in_its_way(
     scene, file = dataclasses.replace(slit(), integrator=Auto()), tmp_path / "a.film"
 
     def made(samples: int) -> clpt.Renderer | clpt.MultiRenderer:
-        monkeypatch.setattr(worth, "SAMPLES", samples)
+        monkeypatch.setattr(hard_light, "TRIAL_SAMPLES", samples)
         return clpt.MultiRenderer(scene, [narrow()]) if several else clpt.Renderer(scene, narrow())
 
     for first, guiding in ((1 << 40, False), (1, True)):

@@ -19,7 +19,7 @@ from clpt.render.flow import programs
 from clpt.render.flow.blocks import blocks_text, members, unused
 from clpt.render.flow.scene_to_tables import lower
 from clpt.render.flow.signatures import scene_text
-from clpt.render.wavefront import queues
+from clpt.render.wavefront.path_buffers import queue_sizes, queue_steps
 from clpt.scene import Scene, integrators
 from clpt.scene.cameras import Perspective
 
@@ -40,7 +40,7 @@ KINDS = 5
 VIRTUAL = {
     "generated/scene.cl": scene_text(),
     "generated/spectrum.cl": '#include "spectra/rgb.cl"\n',
-    "generated/spectrum_read.cl": '#include "spectra/rgb_read.cl"\n',
+    "generated/spectrum_read.cl": '#include "spectra/rgb.cl#read"\n',
     "generated/block.cl": blocks_text([lower(Scene(camera=Perspective())).features]),
     "sorting.cl": """
 #include "core/base.cl"
@@ -169,10 +169,10 @@ def test_sorting_against_numpy(slots: int, begin: int, end: int, lanes: int) -> 
 def test_appending_gathers_the_same(slots: int) -> None:
     """Every slot that waits is once in the queue of its kind; what is behind is left alone."""
     host, waits, kind = some(slots)
-    host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queues.sizes(slots, KINDS, True).items()}
+    host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queue_sizes(slots, KINDS, True).items()}
     numbers = {"stride": stride_of(slots), "slots": slots}
     made = on_device(
-        assembled("stage/append.cl"), tuple(queues.steps(slots, KINDS)), host, **numbers
+        assembled("stage/append.cl"), tuple(queue_steps(slots, KINDS)), host, **numbers
     )
     counts = made["queue_counts"]
     assert np.array_equal(counts, np.bincount(kind, minlength=KINDS))
@@ -184,8 +184,8 @@ def test_appending_gathers_the_same(slots: int) -> None:
 
 def test_nothing_waits() -> None:
     host = slabs(100, 1, *np.zeros((3, 100)))
-    host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queues.sizes(100, KINDS, True).items()}
-    steps = tuple(queues.steps(100, KINDS))
+    host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queue_sizes(100, KINDS, True).items()}
+    steps = tuple(queue_steps(100, KINDS))
     made = on_device(assembled("stage/append.cl"), steps, host, stride=128, slots=100)
     assert not made["queue_counts"].any()
 

@@ -1,1 +1,0 @@
-"""Opens scenes, devices of this machine, and the workers of a cluster, for commands that render."""

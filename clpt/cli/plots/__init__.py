@@ -1,1 +1,0 @@
-"""The plots of commands, by matplotlib."""

@@ -1,1 +1,0 @@
-"""Prints the progress of a render, and tables."""

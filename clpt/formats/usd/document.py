@@ -1,0 +1,106 @@
+"""An open stage at a time code: values, placements, files, and what a reader leaves out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Usd, UsdGeom
+
+from clpt.arrays import Matrix
+from clpt.errors import SceneError
+from clpt.files import budget
+from clpt.scene.studio import Up
+
+MOST_TOLD = 4  # prims that a warning names
+Kept = TypeVar("Kept")
+
+
+class Document:
+    """A stage that is read at one time code.
+
+    file: of the root layer; code: the time code; metres: of a unit of the stage; up: "y" or "z";
+    level: of subdivision, None for that which suits each mesh. left_out: prim paths by message.
+    """
+
+    def __init__(
+        self,
+        file: Path,
+        stage: Usd.Stage,
+        time: float,
+        level: int | None = None,
+    ):
+        self.file, self.stage, self.level = file, stage, level
+        self.metres = float(UsdGeom.GetStageMetersPerUnit(stage))
+        self.up: Up = "z" if UsdGeom.GetStageUpAxis(stage) == "Z" else "y"
+        self.to_metres = np.diag([self.metres] * 3 + [1.0])
+        self.left_out: dict[str, list[str]] = {}
+        self.memory: dict[object, Any] = {}
+        self.set_time(time)
+
+    def set_time(self, code: float) -> None:
+        """Read at another time code from now on."""
+        self.code, self.time = code, Usd.TimeCode(code)
+        self.transforms = UsdGeom.XformCache(self.time)
+
+    def warn(self, message: str, path: object) -> None:
+        """Note what is left out or replaced at a prim."""
+        paths = self.left_out.setdefault(message, [])
+        if str(path) not in paths:
+            paths.append(str(path))
+
+    def warnings(self) -> list[str]:
+        """Return a warning for each message, which names its first prims."""
+        lines = []
+        for message, paths in self.left_out.items():
+            more = f" and {len(paths) - MOST_TOLD} more" if len(paths) > MOST_TOLD else ""
+            lines.append(f"{', '.join(paths[:MOST_TOLD])}{more}: {message}")
+        return lines
+
+    def error(self, message: str, path: object) -> SceneError:
+        """Return the error of a prim."""
+        return SceneError(message, file=self.file, where=str(path))
+
+    def once(self, key: object, make: Callable[[], Kept]) -> Kept:
+        """Return what `make` returned when it was first asked for this key."""
+        if key not in self.memory:
+            self.memory[key] = make()
+        kept: Kept = self.memory[key]
+        return kept
+
+    def value(self, prim: Usd.Prim, name: str, default: object = None) -> Any:
+        """Return an attribute's value at the time; `default` for none."""
+        value = prim.GetAttribute(name).Get(self.time)
+        return default if value is None else value
+
+    def number(self, prim: Usd.Prim, name: str, default: float) -> float:
+        """Return an attribute that is a finite number. Raises SceneError for another."""
+        value = self.value(prim, name, default)
+        if not isinstance(value, (int, float)) or not np.isfinite(value):
+            raise self.error(f"{name} must be a finite number, not {value!r}", prim.GetPath())
+        return float(value)
+
+    def array(self, prim: Usd.Prim, name: str, width: int, kind: type = np.float32) -> Any:
+        """Return an attribute's rows, (n, width), or (n,) where width is 0; None for none."""
+        value = self.value(prim, name)
+        if value is None:
+            return None
+        size = len(value) * max(width, 1) * np.dtype(kind).itemsize
+        budget.check(size, f"{name} of {prim.GetPath()}", self.file)
+        return rows(value, width, kind)
+
+    def placement(self, prim: Usd.Prim) -> Matrix:
+        """Return a prim's transform to the world, or of a prototype's prim to the prototype."""
+        matrix = np.array(self.transforms.GetLocalToWorldTransform(prim), np.float64).T
+        if not np.isfinite(matrix).all():
+            raise self.error("its transform is not finite", prim.GetPath())
+        return matrix
+
+
+def rows(value: object, width: int, kind: type = np.float32) -> Any:
+    """Return USD's array as numpy's, (n, width), or (n,) where width is 0."""
+    array: NDArray[Any] = np.asarray(value, kind)
+    return array.reshape(-1) if width == 0 else array.reshape(-1, width)

@@ -1,0 +1,209 @@
+"""Materials: UsdPreviewSurface 2.6, and gprims without a material in their display color."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from pxr import Usd, UsdShade
+
+from clpt.formats.usd import textures
+from clpt.formats.usd.document import Document
+from clpt.formats.usd.nodes import Node
+from clpt.formats.usd.textures import Uses
+from clpt.scene import gltf_material
+from clpt.scene.lights import Area
+from clpt.scene.materials import Blend, GltfSurface, Material, ThinDielectric, TwoSided
+from clpt.scene.params import Kind, fields_of
+from clpt.scene.texture_values import Texture
+from clpt.scene.textures import Bitmap, MeshAttribute
+from clpt.scene.values import Textured
+
+PREVIEW = "UsdPreviewSurface"
+GREY = (0.18, 0.18, 0.18)
+COLOR, ATTRIBUTE = "displayColor", "vertex_"  # a primvar, and how names of attributes begin
+NORMALS = ((2.0, 2.0, 2.0), (-1.0, -1.0, -1.0))  # scale and bias of a map of 8 bits
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A material, what it emits, and the primvars that it reads.
+
+    uv_sets: names of sets of texture coordinates; fallbacks: values of a mesh without a primvar.
+    """
+
+    material: Material
+    emission: Area | None = None
+    uv_sets: tuple[str, ...] = ()
+    fallbacks: dict[str, tuple[float, ...]] = field(default_factory=dict)
+
+    @property
+    def primvars(self) -> dict[str, int]:
+        """The width of each primvar that it reads, by name."""
+        widths = {name: len(values) for name, values in self.fallbacks.items()}
+        return {**widths, **dict.fromkeys(self.uv_sets, 2)}
+
+    def settled(self, value_of: Callable[[str], tuple[float, ...] | None]) -> Surface:
+        """Return the surface of a shape without primvars: numbers stand for them.
+
+        value_of: gives them by a primvar's name, None for its fallback.
+        """
+        if not self.fallbacks:
+            return self
+        rows = {name: value_of(name) or row for name, row in self.fallbacks.items()}
+        emission = None if self.emission is None else _settled(self.emission, rows)
+        return Surface(_settled(self.material, rows), emission, self.uv_sets)
+
+
+def _settled(part: Any, rows: dict[str, tuple[float, ...]]) -> Any:
+    """Return a kind with numbers in place of the primvars in it."""
+    if isinstance(part, MeshAttribute):
+        row = rows[part.name.removeprefix(ATTRIBUTE)]
+        return row[0] if len(row) == 1 else row
+    kinds = {name: value for name, value in fields_of(part).items() if isinstance(value, Kind)}
+    changes = {name: _settled(value, rows) for name, value in kinds.items()}
+    return dataclasses.replace(part, **changes)
+
+
+def surface(
+    document: Document, bound: UsdShade.Material | None, prim: Usd.Prim, *, both: bool
+) -> Surface:
+    """Return the surface of a gprim.
+
+    bound: its material, None for its display color. both: what it emits leaves its back too.
+    """
+    if bound:
+        path = str(bound.GetPath())
+        return document.once(("material", path, both), lambda: _bound(document, bound, both))
+    if prim.HasAttribute(f"primvars:{COLOR}") and prim.GetAttribute(f"primvars:{COLOR}").HasValue():
+        return document.once(("material", COLOR), _coloured)
+    return document.once(
+        ("material", ""), lambda: Surface(_sided(GltfSurface(base_color=GREY, roughness=0.5)))
+    )
+
+
+def _coloured() -> Surface:
+    shown = MeshAttribute(name=f"{ATTRIBUTE}{COLOR}")
+    return Surface(_sided(GltfSurface(base_color=shown, roughness=0.5)), fallbacks={COLOR: GREY})
+
+
+def _sided(inner: Material) -> Material:
+    return TwoSided(front=inner)
+
+
+def _bound(document: Document, material: UsdShade.Material, both: bool) -> Surface:
+    """Return a material that a prim binds: its universal surface."""
+    name, path = material.GetPrim().GetName(), str(material.GetPath())
+    shader = material.ComputeSurfaceSource("")[0]
+    node = Node(document, shader) if shader else None
+    if node is None or node.kind != PREVIEW:
+        kind = (
+            "it has no universal surface"
+            if node is None
+            else f"{node.kind or 'its shader'} is not read"
+        )
+        document.warn(f"{kind}; grey stands for it", path)
+        return Surface(_sided(GltfSurface(base_color=GREY, roughness=0.5, name=name)))
+    if material.ComputeDisplacementSource("")[0] and node.source("displacement"):
+        document.warn("displacement is left out", path)
+    uses = Uses()
+    inner, emission = _preview(node, uses, name)
+    if emission is not None:
+        emission = dataclasses.replace(emission, two_sided=both)
+    if len(uses.uv_sets) > 2:
+        document.warn(
+            f"textures use over two sets of coordinates; {uses.uv_sets[0]} replaces the others",
+            path,
+        )
+    return Surface(inner, emission, tuple(uses.uv_sets), uses.fallbacks)
+
+
+def _preview(node: Node, uses: Uses, name: str) -> tuple[Material, Area | None]:
+    """Return a UsdPreviewSurface and what it emits."""
+    values: dict[str, Any] = {
+        "base_color": _limited(textures.colour(node, "diffuseColor", GREY, uses)),
+        "roughness": textures.number(node, "roughness", 0.5, uses),
+        "clearcoat": textures.number(node, "clearcoat", 0.0, uses),
+        "clearcoat_roughness": textures.number(node, "clearcoatRoughness", 0.01, uses),
+    }
+    index = node.number("ior", 1.5)
+    if node.number("useSpecularWorkflow", 0):
+        color = textures.colour(node, "specularColor", (0.0,) * 3, uses)
+        values |= {"ior": 0.0, "specular_color": _limited(color)}
+    else:
+        metallic = textures.number(node, "metallic", 0.0, uses)
+        values |= {"ior": max(index, 1.0), "metallic": metallic}
+    shares = ("roughness", "metallic", "clearcoat", "clearcoat_roughness")
+    values |= {
+        k: min(max(v, 0.0), 1.0) for k, v in values.items() if k in shares and isinstance(v, float)
+    }
+    inner: Material = _with_normals(node, GltfSurface(name=name, **values), uses)
+    return gltf_material.finished(
+        *_opacity(node, inner, index, uses), _emission(node, uses), both=True
+    )
+
+
+def _limited(color: Textured) -> Textured:
+    """Return a reflectance with numbers of at most one."""
+    return tuple(min(value, 1.0) for value in color) if isinstance(color, tuple) else color
+
+
+def _emission(node: Node, uses: Uses) -> Area | None:
+    color = textures.colour(node, "emissiveColor", (0.0,) * 3, uses)
+    dark = isinstance(color, tuple) and not any(color)
+    return None if dark else Area(radiance=color)
+
+
+def _opacity(node: Node, inner: Material, index: float, uses: Uses) -> tuple[Material, Any]:
+    """Return a material of which a part lets light through, and the share of it that is there.
+
+    Without a threshold and in the mode "transparent" it is a pane of glass where it is not opaque:
+    that reflects. Else it is not there.
+    """
+    share = textures.number(node, "opacity", 1.0, uses)
+    threshold = node.number("opacityThreshold", 0.0)
+    if share == 1.0:
+        return inner, None
+    if threshold > 0.0:
+        if isinstance(share, float):
+            return inner, None if share >= threshold else 0.0
+        return inner, _cut(node, share, threshold)
+    if str(node.value("opacityMode", "transparent")) == "presence":
+        return inner, share
+    pane = ThinDielectric(int_ior=max(index, 1.0), ext_ior=1.0)
+    return Blend(first=pane, second=inner, weight=share), None
+
+
+def _cut(node: Node, share: Texture, threshold: float) -> Any:
+    """Return a texture that is 1 where a share reaches a threshold, else 0."""
+    if not isinstance(share, Bitmap):
+        node.document.warn("opacityThreshold is compared with images alone", node.path)
+        return share
+    values = textures.pixels(share)
+    channel = "rgba".find(share.channel)
+    if channel >= values.shape[2]:
+        channel = -1 if share.channel == "a" and values.shape[2] in (2, 4) else 0
+    there = (values[..., channel] >= threshold - 1e-6).astype(np.float32)
+    return dataclasses.replace(share, image=there, raw=True, channel="luminance")
+
+
+def _with_normals(node: Node, inner: GltfSurface, uses: Uses) -> Material:
+    """Return a surface with its normal map, if it has one."""
+    source = node.source("normal")
+    if source is None:
+        return inner
+    if source[0].kind != textures.IMAGE:
+        node.document.warn(f"{source[0].kind} is not read as normals", source[0].path)
+        return inner
+    map_ = textures.bitmap_of(source[0], uses, channel=None)
+    if map_ is None:
+        return inner
+    scale = source[0].numbers("scale", (1.0,) * 4)[:3]
+    bias = source[0].numbers("bias", (0.0,) * 4)[:3]
+    if (scale, bias) != NORMALS:
+        normals = textures.pixels(map_)[..., :3] * np.array(scale) + np.array(bias)
+        map_ = dataclasses.replace(map_, image=(0.5 * normals + 0.5).astype(np.float32), raw=True)
+    return gltf_material.with_normals(inner, map_)

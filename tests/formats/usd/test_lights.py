@@ -1,0 +1,144 @@
+"""Lights of UsdLux: what they send out, where, and in which colors."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from clpt.scene import Scene
+from clpt.scene.lights import Constant, Directional, Goniometric, Point, Spot
+from clpt.scene.shapes import Shape
+from tests.formats.usd.conftest import SQUARE, Loader
+
+pytest.importorskip("pxr")
+
+MESH = f'def Mesh "M" {{ {SQUARE} }}\n'
+SCALED = 'double3 xformOp:scale = (2, 2, 2)\n uniform token[] xformOpOrder = ["xformOp:scale"]'
+
+
+def rgb(emitted: object) -> tuple[float, float, float]:
+    return emitted.r, emitted.g, emitted.b
+
+
+def lamp(scene: Scene) -> Shape:
+    return next(shape for shape in scene.shapes if shape.emission is not None)
+
+
+@pytest.mark.parametrize(
+    ("kind", "attributes", "area"),
+    [
+        ("RectLight", "float inputs:width = 2\n float inputs:height = 3", 6.0),
+        ("DiskLight", "float inputs:radius = 2", 4.0 * math.pi),
+        ("SphereLight", "float inputs:radius = 2", 16.0 * math.pi),
+        ("CylinderLight", "float inputs:radius = 2\n float inputs:length = 3", 12.0 * math.pi),
+    ],
+)
+def test_areas_divide_what_is_normalized(
+    stage: Loader, kind: str, attributes: str, area: float
+) -> None:
+    brightness = "float inputs:intensity = 5\n float inputs:exposure = 1"
+    text = f'{MESH} def {kind} "L" {{ {attributes}\n {brightness}\n %s }}'
+    plain = lamp(stage(text % "color3f inputs:color = (1, 0.5, 0)"))
+    assert rgb(plain.emission.radiance) == pytest.approx((10.0, 5.0, 0.0))
+    norm = lamp(stage(text % f"bool inputs:normalize = 1\n{SCALED}", "metersPerUnit = 0.01"))
+    assert rgb(norm.emission.radiance) == pytest.approx((10.0 / (4.0 * area),) * 3)
+
+
+def test_a_rectangle_shines_along_minus_z(stage: Loader) -> None:
+    shape = lamp(
+        stage(MESH + 'def RectLight "L" { float inputs:width = 2\n float inputs:height = 3 }')
+    )
+    corner = shape.to_world @ [1.0, 1.0, 0.0, 1.0]
+    assert np.allclose(corner, [-1.0, 1.5, 0.0, 1.0])
+    assert np.allclose(shape.to_world[:3, 2], [0, 0, -1])
+
+
+def test_distant_lights_by_their_angle(stage: Loader) -> None:
+    light = 'def DistantLight "L" { float inputs:intensity = 100\n float inputs:angle = 1\n %s }'
+    scene = stage(MESH + light % "")
+    assert isinstance(scene.lights[0], Directional)
+    assert np.allclose(scene.lights[0].direction, [0, 0, -1])
+    expected = 100.0 * math.pi * math.sin(math.radians(0.5)) ** 2
+    assert rgb(scene.lights[0].irradiance) == pytest.approx((expected,) * 3)
+    scene = stage(MESH + light % "bool inputs:normalize = 1")
+    assert rgb(scene.lights[0].irradiance) == pytest.approx((100.0,) * 3)
+    usual = stage(MESH + 'def DistantLight "L" {}').lights[0]
+    assert rgb(usual.irradiance)[0] == pytest.approx(
+        50000.0 * math.pi * math.sin(math.radians(0.265)) ** 2
+    )
+
+
+def test_points_are_spheres_from_afar(stage: Loader) -> None:
+    """A sphere's radiance times the disk that one sees of it, in square metres."""
+    text = MESH + 'def SphereLight "L" { bool treatAsPoint = 1\n float inputs:radius = %s\n %s }'
+    point = stage(text % (3, ""), "metersPerUnit = 0.01").lights[0]
+    assert isinstance(point, Point)
+    assert rgb(point.intensity)[0] == pytest.approx(9.0 * math.pi * 1e-4)
+    point = stage(text % (0, "float inputs:intensity = 8\n bool inputs:normalize = 1")).lights[0]
+    assert rgb(point.intensity)[0] == pytest.approx(2.0)
+
+
+def test_cones_and_profiles(stage: Loader) -> None:
+    text = (
+        MESH
+        + """def SphereLight "L" (prepend apiSchemas = ["ShapingAPI"]) {
+        bool treatAsPoint = 1
+        bool inputs:normalize = 1
+        float inputs:shaping:cone:angle = 30
+        float inputs:shaping:cone:softness = 0.5
+        %s
+    }"""
+    )
+    spot = stage(text % "").lights[0]
+    assert isinstance(spot, Spot)
+    assert (spot.cutoff, spot.beam_width) == pytest.approx((30.0, 15.0))
+    assert np.allclose(spot.to_world[:3, 2], [0, 0, -1])
+    focused = stage(text % "float inputs:shaping:focus = 2").lights[0]
+    assert isinstance(focused, Goniometric)
+    image = np.asarray(focused.image.image)
+    row = len(image) - 1 - 20  # 10 degrees off the axis, where the cone is whole
+    assert image[row, 0, 0] == pytest.approx(math.cos(math.radians(10.25)) ** 2, rel=1e-3)
+    assert image[len(image) - 1 - 61].max() == 0.0
+    nadir = focused.to_world @ [0.0, -1.0, 0.0, 0.0]
+    assert np.allclose(nadir, [0, 0, -1, 0])
+
+
+def test_colors_of_temperatures(stage: Loader) -> None:
+    text = (
+        MESH
+        + """def RectLight "L" {
+        bool inputs:enableColorTemperature = 1
+        float inputs:colorTemperature = %s
+    }"""
+    )
+    warm = rgb(lamp(stage(text % 2700)).emission.radiance)
+    assert warm[0] > warm[1] > warm[2]
+    assert np.dot(warm, [0.2126, 0.7152, 0.0722]) == pytest.approx(1.0, rel=1e-3)
+
+
+def test_domes(stage: Loader) -> None:
+    text = (
+        MESH + 'def DomeLight "L" { float inputs:intensity = 2\n color3f inputs:color = (1, 2, 3) }'
+    )
+    dome = stage(text).lights[0]
+    assert isinstance(dome, Constant)
+    assert rgb(dome.radiance) == pytest.approx((2.0, 4.0, 6.0))
+
+
+def test_what_lights_cannot_do_is_told(stage: Loader) -> None:
+    text = (
+        MESH
+        + """
+    def RectLight "A" {
+        float inputs:specular = 0
+        rel collection:lightLink:excludes = </M>
+    }
+    def PortalLight "P" {}"""
+    )
+    assert stage(text).warnings == [
+        "/A: lightLink is left out: the light shines on everything",
+        "/A: inputs:specular is left out",
+        "/P: PortalLight is left out",
+    ]
