@@ -6,6 +6,8 @@ Each rule is one test. It fails with every place that breaks the rule, and what 
 from __future__ import annotations
 
 import ast
+import importlib
+import importlib.util
 import re
 import subprocess
 import sys
@@ -69,6 +71,7 @@ SHARED = {
     "samplers", "shapes", "spectra", "textures", "tracing", "transport", "transport/guiding",
     "transport/photons",
 }  # fmt: skip
+SCRIPTS = ("scenes", "examples", "docs", "bench", "packaging")
 KINDS = {
     "cameras/kinds", "lights/kinds", "materials/kinds", "media/kinds",
     "samplers/kinds", "shapes/kinds", "textures/kinds",
@@ -374,3 +377,23 @@ def exists(name: str) -> bool:
     if name.endswith(".cl"):
         return name.startswith("generated/") or (KERNELS / name.removeprefix("kernels/")).is_file()
     return (ROOT / name).is_file()
+
+
+def test_scripts_import_names_that_are_there() -> None:
+    """Programs that no test runs, such as those that generate scenes, follow what moves."""
+    missing = []
+    for script in sorted(f for room in SCRIPTS for f in (ROOT / room).rglob("*.py")):
+        for node in ast.walk(ast.parse(script.read_text("utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "clpt":
+                missing += [f"{script.relative_to(ROOT)}: {name}" for name in _missing(node)]
+    assert missing == []
+
+
+def _missing(node: ast.ImportFrom) -> list[str]:
+    """Return the names that an import of a script does not get."""
+    assert node.module is not None
+    if importlib.util.find_spec(node.module) is None:
+        return [node.module]
+    module = importlib.import_module(node.module)
+    names = [alias.name for alias in node.names if not hasattr(module, alias.name)]
+    return [n for n in names if importlib.util.find_spec(f"{node.module}.{n}") is None]

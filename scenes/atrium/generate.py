@@ -1,4 +1,4 @@
-"""Writes the meshes that scene.json is made of, 8 MB; `clpt.benchmark.atrium` has the formulas.
+"""Writes the meshes that scene.json is made of, 8 MB; `clpt.bench.atrium` has the formulas.
 
 python scenes/atrium/generate.py
 """
@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from clpt.benchmark.atrium import atrium
+
+from clpt.bench.atrium import atrium
 
 
 def main() -> None:

@@ -12,12 +12,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from clpt.spectral_exr import SpectralImage
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from scipy.optimize import linprog
 
-from clpt import spectral_exr
+from clpt.images import spectral_exr
+from clpt.images.spectral_exr import SpectralImage
 from clpt.spectra import LED, RGB, cie_xyz, illuminant
 
 Array = NDArray[np.float64]

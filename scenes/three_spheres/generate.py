@@ -10,10 +10,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from clpt.render.analysis.lights.image_lights import face_directions
 from numpy.typing import NDArray
 
 from clpt import images
+from clpt.render.lights.images import face_directions
 
 Array = NDArray[np.float64]
 
