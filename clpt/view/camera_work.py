@@ -177,9 +177,9 @@ class CameraWork:
         if isinstance(camera, ThinLens):
             camera = dataclasses.replace(camera, focus_distance=distance)
         elif isinstance(camera, Perspective):
-            given = fields_of(camera)
+            fields = fields_of(camera)
             radius = LENS_SHARE * distance
-            camera = ThinLens(**given, focus_distance=distance, aperture_radius=radius)
+            camera = ThinLens(**fields, focus_distance=distance, aperture_radius=radius)
         else:
             raise CommandError(f"the camera {camera.kind} has no lens")
         self._move(camera)

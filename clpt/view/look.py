@@ -98,9 +98,9 @@ _L = TypeVar("_L", bound=Light)
 def with_spectrum(light: _L, lamp: str) -> _L:
     """Return a light with a lamp's spectrum and its own luminance; textures and images stay."""
     changes: dict[str, Any] = {}
-    given = fields_of(light)
+    fields = fields_of(light)
     for name, param in params(type(light)).items():
-        value = given[name]
+        value = fields[name]
         if param.role is EMISSION and isinstance(value, Spectrum):
             changes[name] = illuminant(lamp, _luminance(value))
     return dataclasses.replace(light, **changes) if changes else light

@@ -322,32 +322,32 @@ def parse(message: str | bytes) -> Request:
     if len(message) > LARGEST_MESSAGE:
         raise CommandError("the message is too long")
     try:
-        found = json.loads(message, parse_constant=_no_constant)
+        decoded = json.loads(message, parse_constant=_no_constant)
     except (ValueError, RecursionError):
         raise CommandError("the message is not JSON") from None
-    return checked(found)
+    return checked(decoded)
 
 
-def checked(found: object) -> Request:
+def checked(message: object) -> Request:
     """Return the command that a message is, with values of its declared types.
 
     Here alone a command is looked up. Raises CommandError.
     """
-    if not isinstance(found, dict) or not isinstance(found.get("do"), str):
+    if not isinstance(message, dict) or not isinstance(message.get("do"), str):
         raise CommandError("a message is an object that says what to do")
-    name = found["do"]
+    name = message["do"]
     command = COMMANDS.get(name)
     if command is None:
         raise CommandError(f"there is no command {_shown(name)}")
-    for key in found:
+    for key in message:
         if key != "do" and key not in command.parameters:
             raise CommandError(f"{name} has no parameter {_shown(key)}")
     values = {}
     for key, kind in command.parameters.items():
-        if key not in found and not isinstance(kind, Optional):
+        if key not in message and not isinstance(kind, Optional):
             raise CommandError(f"{name} needs {key}")
         try:
-            values[key] = kind.check(found.get(key))
+            values[key] = kind.check(message.get(key))
         except CommandError as error:
             raise CommandError(f"{name}: {key} {error}") from None
     return Request(name, values)

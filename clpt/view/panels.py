@@ -62,23 +62,23 @@ def panels(scene: Scene) -> list[dict[str, Any]]:
     become, by KIND as the key; metals: those that METAL as the key takes; shapes: indices of those
     that have a material or an emission; parameters: see `_parameter`.
     """
-    found: list[dict[str, Any]] = []
-    for target, things in _targets(scene).items():
-        for index, (thing, owners) in enumerate(things[: MOST_PANELS - len(found)]):
-            found.append(
+    described: list[dict[str, Any]] = []
+    for target, targets in _targets(scene).items():
+        for index, (target_kind, owners) in enumerate(targets[: MOST_PANELS - len(described)]):
+            described.append(
                 {
                     "target": target,
                     "index": index,
-                    "title": _title(target, thing, owners, scene),
-                    "kind": thing.kind,
+                    "title": _title(target, target_kind, owners, scene),
+                    "kind": target_kind.kind,
                     "kinds": list(_material_kinds()) if target == "material" else [],
-                    "metals": list(spectra.metals()) if _is_metal(thing) else [],
-                    "doc": (type(thing).__doc__ or "").strip().splitlines()[0],
+                    "metals": list(spectra.metals()) if _is_metal(target_kind) else [],
+                    "doc": (type(target_kind).__doc__ or "").strip().splitlines()[0],
                     "shapes": owners[:MOST_OBJECTS],
-                    "parameters": _parameters(target, thing),
+                    "parameters": _parameters(target, target_kind),
                 }
             )
-    return found
+    return described
 
 
 def names(with_view: bool) -> dict[str, list[str]]:
@@ -120,7 +120,7 @@ def for_people(name: str) -> str:
 
     It is short, and has no signs that are not seen, such as those that turn the text around.
     """
-    shown = "".join(one if one.isprintable() else "?" for one in name[: LONGEST_NAME + 1])
+    shown = "".join(letter if letter.isprintable() else "?" for letter in name[: LONGEST_NAME + 1])
     return shown if len(shown) <= LONGEST_NAME else f"{shown[: LONGEST_NAME - 3]}..."
 
 
@@ -130,19 +130,19 @@ def edited(scene: Scene, target: str, index: int, key: str, value: object) -> tu
     value: as in scene.json, but it names no file; of a material KIND is a key too. Raises
     CommandError, SceneError.
     """
-    things = _targets(scene).get(target, [])
-    if index >= len(things):
+    targets = _targets(scene).get(target, [])
+    if index >= len(targets):
         raise CommandError(f"the scene has no {target} {index + 1}")
-    thing = things[index][0]
+    edited_kind = targets[index][0]
     if key == KIND and target == "material":
-        return _replaced(scene, target, thing, _of_kind(thing, value))
-    if key == METAL and target == "material" and _is_metal(thing):
-        return _replaced(scene, target, thing, _of_metal(thing, value))
-    param = params(type(thing)).get(key)
+        return _replaced(scene, target, edited_kind, _of_kind(edited_kind, value))
+    if key == METAL and target == "material" and _is_metal(edited_kind):
+        return _replaced(scene, target, edited_kind, _of_metal(edited_kind, value))
+    param = params(type(edited_kind)).get(key)
     if param is None or not _editable(target, key, param):
-        raise CommandError(f"{thing.kind}.{key} cannot be edited")
-    new = dataclasses.replace(thing, **{key: read(key, value, param)})
-    return _replaced(scene, target, thing, new)
+        raise CommandError(f"{edited_kind.kind}.{key} cannot be edited")
+    new = dataclasses.replace(edited_kind, **{key: read(key, value, param)})
+    return _replaced(scene, target, edited_kind, new)
 
 
 @cache
@@ -156,8 +156,8 @@ def _material_kinds() -> dict[str, type[Material]]:
     }
 
 
-def _is_metal(thing: Kind) -> bool:
-    return any(METAL in shorthand.arguments for shorthand in thing.shorthands)
+def _is_metal(material: Kind) -> bool:
+    return any(METAL in shorthand.arguments for shorthand in material.shorthands)
 
 
 def _of_metal(material: Material, metal: object) -> Material:
@@ -189,11 +189,11 @@ def _of_kind(material: Material, kind: object) -> Material:
         return cls(name=material.name)
 
 
-def written(thing: Kind) -> dict[str, Any]:
+def written(kind: Kind) -> dict[str, Any]:
     """Return a camera or a light as scene.json has it, without what cannot be shown."""
-    given, declared = fields_of(thing), params(type(thing)).items()
-    known = {name: _shown(given[name], param) for name, param in declared}
-    return {"type": thing.kind, **{key: value for key, value in known.items() if value is not None}}
+    values, declared = fields_of(kind), params(type(kind)).items()
+    known = {name: _shown(values[name], param) for name, param in declared}
+    return {"type": kind.kind, **{key: value for key, value in known.items() if value is not None}}
 
 
 def _targets(scene: Scene) -> dict[str, list[tuple[Any, list[int]]]]:
@@ -222,18 +222,18 @@ def _members(shape: Shape) -> tuple[Shape, ...]:
     return shape.group.shapes if isinstance(shape, Instance) else (shape,)
 
 
-def _title(target: str, thing: Any, owners: list[int], scene: Scene) -> str:
-    if getattr(thing, "name", ""):
-        return for_people(thing.name)
+def _title(target: str, kind: Any, owners: list[int], scene: Scene) -> str:
+    if getattr(kind, "name", ""):
+        return for_people(kind.name)
     named = [scene.shapes[i].name for i in owners if scene.shapes[i].name]
-    return for_people(named[0]) if named else thing.kind.replace("_", " ")
+    return for_people(named[0]) if named else kind.kind.replace("_", " ")
 
 
-def _parameters(target: str, thing: Kind) -> list[dict[str, Any]]:
-    given, default = fields_of(thing), defaults(type(thing))
+def _parameters(target: str, kind: Kind) -> list[dict[str, Any]]:
+    values, default = fields_of(kind), defaults(type(kind))
     return [
-        _parameter(name, param, given[name], default[name])
-        for name, param in params(type(thing)).items()
+        _parameter(name, param, values[name], default[name])
+        for name, param in params(type(kind)).items()
         if _editable(target, name, param)
     ]
 
@@ -282,7 +282,7 @@ def _curve(value: Any, param: Param) -> list[float] | None:
         else:
             plain = isinstance(value, (int, float))
             spectrum = spectra.Constant(float(value)) if plain else value
-        return [float(f"{one:.4g}") for one in spectrum.sample(np.array(CURVE_AT, float))]
+        return [float(f"{number:.4g}") for number in spectrum.sample(np.array(CURVE_AT, float))]
     except (SceneError, AttributeError):
         return None
 

@@ -148,7 +148,7 @@ class ErrorMap:
         return not self._films or samples >= 2.0 * float(self._films[-1][..., 3].mean())
 
     def note(self, film: Image) -> None:
-        """Note a film (h, w, 4), to compare later ones with."""
+        """Note a film (h, w, 4), to compare later films with."""
         self._films = [*self._films[-1:], film]
 
     def of(self, film: Image) -> NDArray[np.float64] | None:
@@ -157,9 +157,8 @@ class ErrorMap:
         It is a mean over the pixels around it, whose brightness it is relative to.
         """
         count = film[..., 3].astype(float)
-        former = next(
-            (one for one in reversed(self._films) if 1.5 * one[..., 3].mean() <= count.mean()), None
-        )
+        most = count.mean() / 1.5
+        former = next((f for f in reversed(self._films) if f[..., 3].mean() <= most), None)
         if former is None:
             return None
         before = former[..., 3].astype(float)

@@ -51,8 +51,8 @@ def plain(integrator: Integrator) -> tuple[Integrator, str]:
 def _differ_by_camera(former: Scene, scene: Scene) -> bool:
     """Whether all but the cameras of two scenes are the same objects."""
     parts = [
-        (one.shapes, one.lights, one.film, one.integrator, one.sampler, one.seed)
-        for one in (former, scene)
+        (each.shapes, each.lights, each.film, each.integrator, each.sampler, each.seed)
+        for each in (former, scene)
     ]
     return all(old is new for old, new in zip(*parts, strict=True))
 
@@ -155,9 +155,11 @@ class Probe:
 
     def _answer(self, question: Question) -> None:
         if self._hits is None:
-            own = Device.open(self._device.info, context=self._device.context)
-            own.compilers = self._device.compilers  # else the picture waits for the driver's lock
-            self._hits, self._spectra = Follower(own), Follower(own)
+            device = Device.open(self._device.info, context=self._device.context)
+            device.compilers = (
+                self._device.compilers
+            )  # else the picture waits for the driver's lock
+            self._hits, self._spectra = Follower(device), Follower(device)
         scene, x, y = question.scene, question.x, question.y
         hit = first_hit(self._hits, scene, x, y)
         if question.then is not None:
@@ -178,8 +180,8 @@ class Probe:
                 return
             renderer.run(BATCH)
             total = tuple(
-                np.asarray(one, float).ravel() * batch
-                for one in (renderer.image(), renderer.colours())
+                np.asarray(picture, float).ravel() * batch
+                for picture in (renderer.image(), renderer.colours())
             )
             means.append((total[0] - before[0], total[1] - before[1]))
             before = total

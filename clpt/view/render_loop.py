@@ -160,7 +160,7 @@ class RenderLoop:
             if not discarded and (self._budget.due() or self._stale):
                 self._offer(self._full.follow(self.scene), 1)
         elif self._stale or not self._offered:
-            self._offer(self._full.follow(self.scene), 1, rest=True)
+            self._offer(self._full.follow(self.scene), 1, at_rest=True)
         else:
             return False
         return True
@@ -258,7 +258,7 @@ class RenderLoop:
     def _make(self, scene: Scene, beside: Renderer | None = None, **more: Any) -> Renderer:
         """Return a renderer on the device, beside one that there is."""
         others = beside, self._full.renderer, self._preview.renderer
-        beside = next((one for one in others if isinstance(one, Renderer)), None)
+        beside = next((renderer for renderer in others if isinstance(renderer, Renderer)), None)
         return Renderer(scene, self.device, beside=beside, **self._options, **more)
 
     def _make_whole(self, scene: Scene) -> Renderer:
@@ -316,7 +316,7 @@ class RenderLoop:
             self._errors.note(renderer.film.get())
 
     def _offer(
-        self, renderer: Renderer, divider: int, rest: bool = False, rendered: float = 0.0
+        self, renderer: Renderer, divider: int, at_rest: bool = False, rendered: float = 0.0
     ) -> None:
         """Offer the picture as it is; rest: equal to `Renderer.resolve` to the byte.
 
@@ -328,25 +328,25 @@ class RenderLoop:
             self.has_shown, self._film = True, None
         shown = None if legend is None else dataclasses.asdict(legend)
         took = {"samples": renderer.samples, "rendered": rendered}
-        self._send(pixels, divider, rest=rest, legend=shown, **took)
-        self._stale, self._offered = False, rest
+        self._send(pixels, divider, at_rest=at_rest, legend=shown, **took)
+        self._stale, self._offered = False, at_rest
         self._budget.spend(time.perf_counter() - began)
         self.tell(renderer)
 
-    def _send(self, pixels: Bytes, divider: int, *, rest: bool = False, **told: object) -> None:
+    def _send(self, pixels: Bytes, divider: int, *, at_rest: bool = False, **facts: object) -> None:
         """Send a picture, with a header of its size and of what else is `told` of it."""
-        data = pictures.png(pixels) if rest else pictures.jpeg(pixels)
+        data = pictures.png(pixels) if at_rest else pictures.jpeg(pixels)
         self._frame += 1
         film = self.scene.film
         header = {
             "frame": self._frame,
-            "format": "png" if rest else "jpeg",
+            "format": "png" if at_rest else "jpeg",
             "size": [pixels.shape[1], pixels.shape[0]],
             "film": [film.width, film.height],
             "crop": film.crop,
             "divider": divider,
             "samples": 0,
-            "rest": rest,
+            "rest": at_rest,
             "solid": False,
             "difference": self._difference(),
             "changes": self._changes,
@@ -355,7 +355,7 @@ class RenderLoop:
             "shows": self.shows,
             "legend": None,
         }
-        self.outlet.picture(header | told, data)
+        self.outlet.picture(header | facts, data)
 
     def _shown(self, renderer: Renderer, whole: bool) -> tuple[NDArray[np.uint8], Any]:
         """Return what a renderer has for the screen, and the legend of its colours or None."""
@@ -365,9 +365,11 @@ class RenderLoop:
             return pictures.denoised(renderer, self.display), None
         if whole and self.shows == pictures.SAMPLES:
             return pictures.samples(renderer.film.get())
-        found = self._errors.shown(renderer.film.get()) if self.shows == pictures.ERROR else None
-        if found is not None and whole:
-            return found
+        error_map = (
+            self._errors.shown(renderer.film.get()) if self.shows == pictures.ERROR else None
+        )
+        if error_map is not None and whole:
+            return error_map
         return pictures.shown(renderer, self.display), None
 
     def _difference(self) -> dict[str, float] | None:
@@ -375,7 +377,7 @@ class RenderLoop:
         film = None if self.kept is None else self.film
         if self.kept is None or film is None or self.kept.shape != film.shape:
             return None
-        kept, now = (one[..., :3].astype(np.float64) for one in (self.kept, film))
+        kept, now = (picture[..., :3].astype(np.float64) for picture in (self.kept, film))
         error, mean = np.abs(now - kept), max(float(kept.mean()), 1e-30)
         return {
             "relative_mean": float(error.mean()) / mean,

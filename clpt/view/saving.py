@@ -72,9 +72,9 @@ def request(document: object) -> Request:
     if not isinstance(document, dict) or "camera" not in document:
         raise CommandError("this is no view: it has no camera")
     display = document.get("display")
-    given = {"exposure": 0.0, "tone": "none", **(display if isinstance(display, dict) else {})}
+    look = {"exposure": 0.0, "tone": "none", **(display if isinstance(display, dict) else {})}
     kinds_of = COMMANDS["open_view"].parameters
-    values = {"camera": document["camera"], **given}
+    values = {"camera": document["camera"], **look}
     checked = {name: kind.check(values[name]) for name, kind in kinds_of.items()}
     camera_of(checked["camera"])
     return Request("open_view", checked)

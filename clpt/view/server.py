@@ -170,10 +170,10 @@ class Viewer:
         self.rate = Rate(RATE, BURST)
 
     def tell(self, message: dict[str, Any]) -> None:
-        """Let a message be sent; of what is true only now, in the place of one that waits."""
+        """Queue a message; a message about the present replaces a queued message of its kind."""
         kind = message["type"]
         if kind in PRESENT:
-            self.messages = deque(one for one in self.messages if one[0] != kind)
+            self.messages = deque(queued for queued in self.messages if queued[0] != kind)
         self.messages.append((kind, as_json(message)))
         if len(self.messages) > MOST_MESSAGES:  # it takes nothing
             self.messages.clear()

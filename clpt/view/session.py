@@ -219,8 +219,8 @@ class Session(CameraWork):
         if not self._requests:
             return
         with self._wake:
-            requests = [one for one in self._requests if is_quick(one[0])]
-            kept = [one for one in self._requests if not is_quick(one[0])]
+            requests = [waiting for waiting in self._requests if is_quick(waiting[0])]
+            kept = [waiting for waiting in self._requests if not is_quick(waiting[0])]
             self._requests = deque(kept)
         self._handle(requests)
 
@@ -395,8 +395,8 @@ class Session(CameraWork):
     def _do_hide(self, reply: Reply, shape: int, hidden: bool) -> None:
         if shape >= len(self.scene.shapes):
             raise CommandError(f"the scene has {len(self.scene.shapes)} objects")
-        one = {shape}
-        self._look(hidden=self.look.hidden | one if hidden else self.look.hidden - one)
+        others = self.look.hidden - {shape}
+        self._look(hidden=others | {shape} if hidden else others)
 
     def _do_hide_at(self, reply: Reply, x: int, y: int) -> None:
         look = self.look
@@ -521,12 +521,12 @@ def is_quick(request: Request) -> bool:
 
 def merged(requests: list[tuple[Request, Reply]]) -> list[tuple[Request, Reply]]:
     """Return requests with moves of one kind that follow each other added up."""
-    found: list[tuple[Request, Reply]] = []
+    kept: list[tuple[Request, Reply]] = []
     for request, reply in requests:
-        last = found[-1][0] if found else None
+        last = kept[-1][0] if kept else None
         if last is not None and request.name == last.name and request.name in MOVES:
             values = {key: last.values[key] + value for key, value in request.values.items()}
-            found[-1] = Request(request.name, values), reply
+            kept[-1] = Request(request.name, values), reply
         else:
-            found.append((request, reply))
-    return found
+            kept.append((request, reply))
+    return kept

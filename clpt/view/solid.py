@@ -37,16 +37,16 @@ SIDE = 64  # texels of an image along a side that its mean is of, about
 
 def bare(shape: Shape, **more: object) -> Shape:
     """Return a shape without light and media; more: further fields that it is to have."""
-    given = fields_of(shape)
+    fields = fields_of(shape)
     wanted = PLAIN | more
-    own = {name: value for name, value in wanted.items() if given[name] is not value}
-    return dataclasses.replace(shape, **own) if own else shape
+    changed = {name: value for name, value in wanted.items() if fields[name] is not value}
+    return dataclasses.replace(shape, **changed) if changed else shape
 
 
 def each(shapes: Iterable[Shape], change: Callable[[Shape], Shape | None]) -> list[Shape]:
-    """Return the shapes as `change` makes them, without those of which it makes None.
+    """Return the shapes as `change` returns them, without shapes that it returns None for.
 
-    What several instances place is changed once.
+    A group of several instances is changed once.
     """
     groups: dict[int, Group] = {}
     changed: list[Shape | None] = []
@@ -54,7 +54,7 @@ def each(shapes: Iterable[Shape], change: Callable[[Shape], Shape | None]) -> li
         if isinstance(shape, Instance):
             group = shape.group
             if id(group) not in groups:
-                kept = [one for one in map(change, group.shapes) if one is not None]
+                kept = [inner for inner in map(change, group.shapes) if inner is not None]
                 groups[id(group)] = Group(shapes=tuple(kept), name=group.name)
             changed.append(dataclasses.replace(shape, group=groups[id(group)]))
         else:
@@ -106,18 +106,20 @@ def shaded(renderer: Renderer) -> Bytes:
 
 def colour(part: Kind) -> Floats:
     """Return about what a material reflects, linear (3,): the mean of the colours in it."""
-    found = [_mean(value) for value in _colours(part)]
-    return np.mean(found, axis=0) if found else np.full(3, OTHER)
+    means = [_mean(value) for value in _colours(part)]
+    return np.mean(means, axis=0) if means else np.full(3, OTHER)
 
 
 def _colours(part: Kind) -> list[Any]:
     """Return the first colour of each material in a material."""
-    given = fields_of(part)
-    inner = [value for value in given.values() if isinstance(value, Material)]
+    fields = fields_of(part)
+    inner = [value for value in fields.values() if isinstance(value, Material)]
     if inner:
-        return [one for value in inner for one in _colours(value)]
-    own = [given[name] for name, param in params(type(part)).items() if param.role is REFLECTANCE]
-    return own[:1]
+        return [part_colour for value in inner for part_colour in _colours(value)]
+    reflectances = [
+        fields[name] for name, param in params(type(part)).items() if param.role is REFLECTANCE
+    ]
+    return reflectances[:1]
 
 
 def _mean(value: object) -> Floats:
@@ -128,9 +130,9 @@ def _mean(value: object) -> Floats:
         mean = value.pixels(REFLECTANCE, side=SIDE).mean(axis=(0, 1), dtype=np.float64)
         return np.broadcast_to(mean, 3)
     inner = [] if not isinstance(value, Kind) else [
-        one for one in fields_of(value).values() if isinstance(one, (Spectrum, Kind))
+        part for part in fields_of(value).values() if isinstance(part, (Spectrum, Kind))
     ]  # fmt: skip
-    return np.mean([_mean(one) for one in inner], axis=0) if inner else np.full(3, OTHER)
+    return np.mean([_mean(part) for part in inner], axis=0) if inner else np.full(3, OTHER)
 
 
 def _painted(rgb: NDArray[Any]) -> Diffuse:

@@ -153,8 +153,8 @@ class Widget(anywidget.AnyWidget):
         return data if header["format"] == "png" else _as_png(data)
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        found = super()._repr_mimebundle_(**kwargs)
-        data, *more = found if isinstance(found, tuple) else (found,)
+        bundle = super()._repr_mimebundle_(**kwargs)
+        data, *more = bundle if isinstance(bundle, tuple) else (bundle,)
         return ({**(data or {}), "image/png": self._png()}, *more)
 
 
