@@ -1,4 +1,4 @@
-"""Who may see the page: one-time tokens, cookies, and the names under which it may be asked for."""
+"""Access to the page: tokens for a single use, cookies, and the names of the server."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def is_wildcard(host: str) -> bool:
 
 
 def outward_address(host: str) -> str:
-    """Return the address of this machine from which others are reached; host: of its family.
+    """Return the address that this machine sends from to others; host: of the same family.
 
     127.0.0.1, or ::1, without a network. Nothing is sent.
     """
@@ -44,11 +44,11 @@ def outward_address(host: str) -> str:
 
 
 class Access:
-    """The secrets of one server; only their digests are kept.
+    """The secrets of a server; only their digests are kept.
 
-    A token of 256 bits stands in an address, opens the page once, and becomes a cookie. The page
-    is in a folder with a name of 128 bits: browsers send a cookie to all ports of a host, of which
-    another may be a stranger's, but only for the folder that it is of.
+    A token of 256 bits stands in an address, opens the page once, and becomes a cookie. The page is
+    in a folder with a name of 128 bits: browsers send a cookie to all ports of a host, some perhaps
+    a stranger's, but only for the folder of the cookie.
     """
 
     def __init__(self, port: int):

@@ -23,9 +23,9 @@ PATIENCE = 0.4  # [s]
 
 
 class Making:
-    """Makes a renderer in a thread of its own, which waits before it compiles anything new.
+    """Makes a renderer in a separate thread, which waits before it compiles anything new.
 
-    device: the one that it is made on; make: makes it.
+    device: of the renderer; make: returns it.
     """
 
     def __init__(self, device: Device, make: Callable[[], Renderer]):
@@ -131,9 +131,9 @@ class Beginning:
         self._making.wait(seconds)
 
     def show(self, scene: Scene, offer: Callable[[Bytes], None]) -> None:
-        """Offer a picture of the solid scene if it takes long until there is another one.
+        """Offer a picture of the solid scene if the real picture takes long.
 
-        Kernels are compiled only after the first one.
+        Kernels are compiled only after the first picture.
         """
         soon = not self._making.is_new and time.monotonic() - self._began < PATIENCE
         if soon or self._fails:

@@ -43,7 +43,7 @@ def as_json(message: object) -> str:
 
 
 def finite(value: object) -> Any:
-    """Return a message in which what is no finite number is None."""
+    """Return a message with None in place of numbers that are not finite."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -52,9 +52,9 @@ def finite(value: object) -> Any:
 
 
 def error_message(error: BaseException, before: str = "") -> dict[str, Any]:
-    """Return what a viewer is told of an error, on one line.
+    """Return a viewer's message about an error, on a single line.
 
-    before: begins the line. Of a file only the name is told, not its folder.
+    before: begins the line. A file has its name there, not its folder.
     """
     text = f"{before}{_reason(error)}"
     for folder in (CUT_NAME, QUOTED_FOLDER, FOLDER, CUT_FOLDER):
@@ -89,7 +89,7 @@ def _reason(error: BaseException) -> str:
 
 
 class CommandError(ClptError):
-    """A message that is no command, or one that cannot be done; its text is for the viewer."""
+    """A message without a command, or a command that fails; its text is for the viewer."""
 
 
 class Type(Protocol):
@@ -141,7 +141,7 @@ class Flag:
 
 @dataclass(frozen=True)
 class Choice:
-    """One of some names."""
+    """A name among several."""
 
     names: tuple[str, ...]
 
@@ -189,11 +189,11 @@ class Optional:
 
 @dataclass(frozen=True)
 class Command:
-    """One command.
+    """A command.
 
-    parameters: types by name; all but `Optional` ones must be given. steers: only the viewer who
-    steers may send it. restarts: the picture so far is of no use afterwards. quick: it does
-    not wait until samples that are being taken are there.
+    parameters: types by name; all but `Optional` parameters are required. steers: only the viewer
+    who steers may send it. restarts: the picture so far is of no use afterwards. quick: it does not
+    wait for the samples of the present pass.
     """
 
     doc: str
@@ -369,7 +369,7 @@ def _shown(value: object) -> str:
 def _check_value(value: object, levels: int) -> int:
     """Return how many parts a value has.
 
-    Raises CommandError for what is nested too deeply, and numbers too large or not finite.
+    Raises CommandError for values nested too deeply, and numbers too large or not finite.
     """
     if levels == 0:
         raise CommandError("is nested too deeply")

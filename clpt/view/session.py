@@ -1,4 +1,4 @@
-"""The session behind a page: a thread that does what viewers ask for, and renders meanwhile."""
+"""The session behind a page: a thread that serves requests of viewers, and renders meanwhile."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Session(CameraWork):
         self.where = where or device.info.label
         self.scene = self._first = scene
         self.look = Look()
-        self._works = self.scene, self.look  # the last ones that could be rendered
+        self._works = self.scene, self.look  # the last scene and look that could be rendered
         self._history = History()
         self._has_worked = False
         self._rests = False  # nothing can be rendered until something is asked for
@@ -116,12 +116,12 @@ class Session(CameraWork):
             self._wake.notify_all()
         if left_out is not None:
             left_out[1](error_message(CommandError(f"{left_out[0].name} was left out: too many")))
-        command = COMMANDS.get(request.name)  # None for what the probe asks for
+        command = COMMANDS.get(request.name)  # None for requests of the probe
         if command is not None and command.restarts:
             self._loop.cancel(discard=command.certain)
 
     def watched(self, viewers: int) -> None:
-        """Note how many viewers there are; when the last one has left the render waits."""
+        """Note how many viewers there are; when the last has left the render waits."""
         with self._wake:
             if viewers or self._viewers > 0:
                 self._viewers = viewers
@@ -134,7 +134,7 @@ class Session(CameraWork):
         return self._loop.status
 
     def state(self) -> dict[str, Any]:
-        """Return what a viewer has to know of the scene, and how it is looked at."""
+        """Return the state of scene and look for a viewer."""
         scene, film = self.scene, self.scene.film
         return {
             "type": "state",
@@ -182,10 +182,10 @@ class Session(CameraWork):
             self._loop.close()
 
     def _try_to_advance(self) -> bool:
-        """Go on; a scene that cannot be rendered is given up for the last one that could.
+        """Go on; the last scene that could be rendered replaces a scene that cannot.
 
-        Raises what the loop raises where the first one cannot be rendered. If a later one cannot be
-        rendered any more, as with a device that is gone, the render rests.
+        Raises errors of the loop where the first scene cannot be rendered. If a former scene cannot
+        be rendered any more, as with a device that is gone, the render rests.
         """
         if self._rests:
             return False
@@ -285,7 +285,7 @@ class Session(CameraWork):
         self.outlet.message({"type": "note", "text": "the scene's file was read again"})
 
     def _show(self, scene: Scene, change: Change, look: Look | None = None) -> None:
-        """Render another scene, as it is looked at; look: another one too."""
+        """Render another scene with the present look, or another look."""
         look = self.look if look is None else look
         shown = look.apply(scene)
         self.scene, self.look = scene, look
@@ -520,7 +520,7 @@ def is_quick(request: Request) -> bool:
 
 
 def merged(requests: list[tuple[Request, Reply]]) -> list[tuple[Request, Reply]]:
-    """Return requests with moves of one kind that follow each other added up."""
+    """Return requests; consecutive moves of a kind are added up."""
     kept: list[tuple[Request, Reply]] = []
     for request, reply in requests:
         last = kept[-1][0] if kept else None
