@@ -43,8 +43,8 @@ _ALONE: device.Virtual = {
 }
 # The fewest registers of a work-item of a GPU, by program, as limits that are tried by
 # `native_programs.with_fewest_registers`. Left alone, compilers take more than some programs need,
-# and fewer work-items run at once. A program within a limit that does not spill has at most 4 % more
-# instructions: `python -m bench.gpu_compilers` uses them.
+# and fewer work-items run at once. A program within a limit that does not spill has at most 4 %
+# more instructions: `python -m bench.gpu_compilers` uses them.
 _REGISTERS: dict[str, tuple[int, ...]] = {
     "generate": (96, 112),
     "flight": (128, 144),
