@@ -21,7 +21,7 @@ from clpt.render.wavefront.wavefront import Wavefront
 
 log = logging.getLogger(__name__)
 
-GAP = 256  # a single write covers differences with at most so many equal words between
+GAP = 256  # most equal words between two differences that share a write
 MOST_WRITES = 64  # if more are needed, a single write covers the whole range
 OF_FILM = (
     "width", "height", "margin", "crop_x", "crop_y", "film_width", "film_height", "bands", "alpha",
@@ -185,7 +185,7 @@ def _replaced(
 
 
 def _write_tables(scene: DeviceScene, lowered: Lowered, new: dict[str, cl.Buffer]) -> None:
-    """Enqueue the words that differ between tables and a lowering, except in new buffers."""
+    """Enqueue the words of tables that differ from a lowering, except in new buffers."""
     for name in UPLOADED:
         if name in new or name in lowered.zero_copy:
             continue
