@@ -21,7 +21,7 @@ from clpt.scene.materials import LEAVES, Material, parts
 from clpt.scene.params import Kind, defaults, fields_of, params
 from clpt.scene.roles import INDEX, MEASUREMENT, MERL, SPECTRA, Param
 from clpt.scene.shapes import Shape
-from clpt.scene.texture_values import is_texture
+from clpt.scene.values import is_texture
 from clpt.spectra.sensors import OBSERVERS
 from clpt.view.messages import OF_VIEW, CommandError
 from clpt.view.solid import each

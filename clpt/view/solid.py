@@ -23,8 +23,8 @@ from clpt.scene.materials import Diffuse, Material
 from clpt.scene.params import fields_of, params
 from clpt.scene.roles import REFLECTANCE
 from clpt.scene.shapes import Group, Instance, Mesh, Shape
-from clpt.scene.texture_values import is_texture
 from clpt.scene.textures import Bitmap
+from clpt.scene.values import is_texture
 from clpt.spectra import Spectrum
 
 PLAIN: dict[str, Any] = {"emission": None, "interior": None, "exterior": None, "priority": 0}
