@@ -3,7 +3,7 @@
  * atomics. Where paths from lights are weighed against those from the camera, a film has two groups of words: first
  * that of the camera's paths, then that of light paths; a program adds to the group that begins at FILM_GROUP. */
 #include "film/pixel.cl"
-#include "film/sums.cl"
+#include "core/fixed.cl"
 #define FILM_SAMPLES 9 /* after the sums of three channels, three words each: the number of samples */
 #if FILM_WEIGHTS
 #define FILM_WEIGHT 10 /* then the sum of the filter's values, where samples serve several pixels */

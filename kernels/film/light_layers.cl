@@ -5,7 +5,7 @@
 #include "generated/light_layer_args.cl"
 
 /* Step. */
-#include "film/sums.cl"
+#include "core/fixed.cl"
 #include "generated/seen_wavelengths.cl"
 #define LIGHT_PICTURE_WORDS 9
 

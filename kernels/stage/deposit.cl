@@ -2,7 +2,6 @@
  * material is chosen there. Each vertex of each light path of a pass has a place of its own, so that nothing is dropped
  * and no order counts. */
 #include "core/base.cl"
-#include "core/octahedral.cl"
 #include "stage/stage.cl"
 #include "generated/deposit_args.cl"
 #include "generated/sampler.cl"

@@ -23,5 +23,5 @@ inline BsdfAnswer material_answer(Bsdf m, vec3 wo, vec3 wi, vec3 u, int adjoint)
     return a;
 }
 
-#include "stage/apart.cl"
+#define APART(type, name) __attribute__((noinline)) type name /* called by other parts, so it is compiled once */
 #include "generated/material_part.cl"

@@ -3,7 +3,7 @@
  * the least linear value of each, clpt.images.transfer.srgb8_steps, so they are those of a written .png to the bit.
  * With a table of a display's codes (`size` points on an axis, else 0) these take the place of curve and
  * transfer. */
-#include "film/table.cl"
+#include "film/tone.cl"
 #include "film/tone.cl"
 
 /* The colour of a pixel in linear Rec. 709; rows: of the matrix to it, used where `converted`. */

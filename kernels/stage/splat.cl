@@ -4,7 +4,7 @@
 #include "stage/stage.cl"
 #include "generated/join_args.cl"
 #include "generated/shadow_ray.cl"
-#include "film/spread.cl"
+#include "film/filter.cl#spread"
 #include "film/work_list.cl"
 #include "generated/light_layers.cl"
 

@@ -64,7 +64,7 @@ def is_chromatic(features: Features, cls: type[Scatterer]) -> bool:
     """Whether a material is asked at each wavelength: densities of its directions may differ.
 
     Without dispersion they do not. Then eta alone tells what carried light has instead of radiance
-    (kernels/integrator/steps/adjoint_weight.cl), unless lobes that refract and others share
+    (kernels/integrator/particle_tracer.cl), unless lobes that refract and others share
     directions.
     """
     if cls.is_phase:

@@ -31,15 +31,15 @@ from clpt.render.records import Features, custom_materials
 from clpt.render.textures import cases as textures
 from clpt.scene.scatterer import Scatterer
 
-BOTH = tuple(f"integrator/{name}.cl" for name in ("path", "particle_tracer", "both"))
+BOTH = ("integrator/particle_tracer.cl", "integrator/path.cl#both")
 
 Files = dict[str, str | device.Part | tuple[str, ...]]
 
 # Files of kernels that take the place of others where a work-item shades one path.
 _ALONE: device.Virtual = {
     **bvh.ALONE,
-    "core/spectrum_at_once.cl": ("core/spectrum_in_turn.cl",),
-    "core/texels_between.cl": ("core/texels_in_turn.cl",),
+    "core/spectrum.cl#at_once": ("core/spectrum.cl#in_turn",),
+    "core/grid.cl#texels_at_once": ("core/grid.cl#texels_in_turn",),
     "materials/film_stack.cl#at_once": ("materials/film_stack.cl#in_turn",),
 }
 _FEW: device.Virtual = {"bvh/hints.cl": ("bvh/hints.cl#few_registers",)}
