@@ -12,11 +12,11 @@
 #define FILM_ALPHA 10
 #endif
 #if USES_ALPHA
-#define FILM_GROUP_WORDS (FILM_ALPHA + 3) /* then the sum of what is covered */
+#define FILM_GROUP_WORDS (FILM_ALPHA + 3) /* then the sum of covered shares */
 #else
 #define FILM_GROUP_WORDS FILM_ALPHA
 #endif
-#ifndef FILM_GROUP /* there is one group */
+#ifndef FILM_GROUP /* a single group */
 #define FILM_GROUP 0
 #define FILM_WORDS FILM_GROUP_WORDS
 #define FILM_GROUPS 1

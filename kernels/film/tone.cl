@@ -1,5 +1,5 @@
-/* Tone curves: linear Rec. 709 of any brightness to what a screen shows, linear, white is 1. The host has the
- * same, clpt/images/colour.py, whose names of curves stand in the order of these numbers.
+/* Tone curves: from linear Rec. 709 of any brightness to the linear light of a screen, white is 1. The host has the
+ * same curves, clpt/images/colour.py, with names in the order of these numbers.
  *
  * Reinhard: Reinhard et al. 2002, "Photographic Tone Reproduction", eq. 3, of the luminance of Rec. 709.
  * Aces: the rational fit to the curve of ACES by Narkowicz 2015, "ACES Filmic Tone Mapping Curve".

@@ -62,7 +62,7 @@ inline float colour_square(float4 v) { return (v.x * v.x + v.y * v.y + v.z * v.z
 #else
 #define ROWS 8
 #endif
-#define SURE 0.02f     /* no error is thought to be smaller, relative to the noise */
+#define SURE 0.02f     /* lower limit of an error, relative to the noise */
 
 /* Two halves' transformed mean and its variance, by their difference alone. */
 kernel void denoise_guide(global const float4 *first, global const float4 *second, global float4 *guide,
@@ -74,7 +74,7 @@ kernel void denoise_guide(global const float4 *first, global const float4 *secon
     variance[i] = half_apart * half_apart;
 }
 
-/* The mean over 2 * radius + 1 pixels of a row or column, or those of them that are there; step: (1, 0) or (0, 1).
+/* The mean over 2 * radius + 1 pixels of a row or column, as far as they are in the picture; step: (1, 0) or (0, 1).
  * least: is added. */
 kernel void denoise_blur(global const float4 *from, global float4 *into, int2 size, int2 step, int radius, float least)
 {
@@ -90,8 +90,8 @@ kernel void denoise_blur(global const float4 *from, global float4 *into, int2 si
     into[(size_t)y * size.x + x] = sum / count + least;
 }
 
-/* Planes of one float a pixel from a picture of `count` vectors a pixel: lanes read neighbours in one load. `extent`
- * is the size of a plane, BORDER pixels more than the picture to each side; a pixel near the border stands for those
+/* Planes of a float a pixel from a picture of `count` vectors a pixel: lanes read neighbours in a single load. `extent`
+ * is the size of a plane, BORDER pixels more than the picture to each side; a pixel near the border stands for pixels
  * beyond it. */
 kernel void denoise_planes(global const float *from, global float *planes, int2 size, int2 extent, int count)
 {
@@ -123,8 +123,8 @@ inline int near_surfaces(global const float *albedo, global const float *normal,
 
 /* The weighted mean of values over the pixels around each. A work-item has LANES pixels in each of ROWS rows. All but
  * `averaged` are planes. values, averaged: `count` vectors a pixel. features: how albedo and normal count, the squares
- * of their differences. A pixel counts itself as much as the neighbour that is most alike: so one with an outlier, like
- * nothing around it, still loses it. */
+ * of their differences. A pixel counts itself as much as the neighbour that is most alike: so a pixel with an outlier,
+ * unlike all around it, still loses it. */
 kernel void denoise_average(global const float *guide, global const float *variance, global const float *albedo,
                             global const float *normal, global const float *values, global float *averaged, int2 size,
                             int2 extent, int count, float2 features, float limit, int sharpness)
@@ -173,9 +173,9 @@ kernel void denoise_average(global const float *guide, global const float *varia
         }
 }
 
-/* The mean squares of what is wrong, relative to light, of two averages of halves and of the noisy picture: by how far
- * an average of one half is from the other half, whose noise is its own. halves, once, twice: two vectors a pixel.
- * dark: the square of light added. errors: of `once`, of `twice`, of the noisy picture, 0. */
+/* The mean squares of the errors, relative to light, of two averages of halves and of the noisy picture: by the
+ * distance of an average of a half from the other half, whose noise is independent. halves, once, twice: two vectors a
+ * pixel. dark: the square of light added. errors: of `once`, of `twice`, of the noisy picture, 0. */
 kernel void denoise_errors(global const float4 *halves, global const float4 *once, global const float4 *twice,
                            global float4 *errors, float dark)
 {
@@ -189,8 +189,8 @@ kernel void denoise_errors(global const float4 *halves, global const float4 *onc
     errors[i] = (float4)(first - 2.0f * noise, second - 2.0f * noise, noise, 0.0f); /* a half has twice the noise */
 }
 
-/* How much of both averages and of the noisy picture makes the least error: inverse to what each has. errors: around
- * each pixel; shares: of these three, then 0. */
+/* The shares of both averages and of the noisy picture with the least error: inverse to the error of each. errors:
+ * around each pixel; shares: of these three, then 0. */
 kernel void denoise_shares(global const float4 *errors, global float4 *shares)
 {
     size_t i = get_global_id(0);

@@ -1,5 +1,5 @@
-/* Gathers photons along rays from the camera through media, for those whose phase function is of one kind: before
- * stage/flight.cl chooses where they collide. */
+/* Gathers photons along rays from the camera through media whose phase function is of a kind: before stage/flight.cl
+ * chooses where they collide. */
 #include "core/base.cl"
 #include "stage/stage.cl"
 #include "generated/merge_args.cl"

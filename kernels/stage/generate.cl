@@ -26,7 +26,7 @@
 #include "transport/path_state.cl"
 #include "generated/scouts_begin.cl"
 
-/* What a sample begins with. */
+/* The beginning of a sample. */
 typedef struct {
     CameraRay ray;
     Spectrum beta;

@@ -1,6 +1,6 @@
 /* Finds where every ray in flight ends. Triangles go through a layout of kernels/bvh, as many
- * rays a work-item as it likes; analytic shapes through a tree of their own, one ray at a time. The hit takes
- * along what shading needs first: the normal and the material of the side that was met. */
+ * rays a work-item as it likes; analytic shapes through a tree of their own, a ray at a time. The hit includes the
+ * normal and the material of its side, which shading needs first. */
 #include "core/base.cl"
 #include "shapes/shape.cl"
 #include "shapes/surface.cl#flags"

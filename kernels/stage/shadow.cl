@@ -1,4 +1,4 @@
-/* Tests the rays that wait to reach a light, and adds to their paths' radiance what arrives of what they carry. */
+/* Tests the rays that wait to reach a light, and adds the part of their light that arrives to their paths' radiance. */
 #include "core/base.cl"
 #include "stage/stage.cl"
 #include "generated/join_args.cl"

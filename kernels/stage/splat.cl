@@ -1,5 +1,5 @@
-/* Tests the rays that wait to reach the camera, and adds what arrives of what they carry to the pixels whose
- * filters hold the point where it is seen. No sample is counted here: stage/emit.cl counts paths. */
+/* Tests the rays that wait to reach the camera, and adds the part of their light that arrives to the pixels whose
+ * filters hold its point on the film. No sample is counted here: stage/emit.cl counts paths. */
 #include "core/base.cl"
 #include "stage/stage.cl"
 #include "generated/join_args.cl"

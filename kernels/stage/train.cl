@@ -1,4 +1,4 @@
-/* Adds what light paths carry to the guide where they meet a surface, or collide. In whole
+/* Adds the power of light paths to the guide where they meet a surface, or collide. In whole
  * numbers, whose sums do not depend on the order. */
 #include "core/base.cl"
 #include "stage/stage.cl"
@@ -9,7 +9,7 @@
 #include "transport/guiding/guide.cl"
 #include "generated/train_steps.cl"
 
-#define TRAIN_UNIT 256.0f /* of what a light path begins with */
+#define TRAIN_UNIT 256.0f /* relative to a light path's first power */
 
 STAGE(train)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
 {

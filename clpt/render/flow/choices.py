@@ -199,7 +199,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         or ("transport/shadow_ray.cl",)
     ),
     "generated/trace.cl": lambda _, layout: (
-        f"tracing/trace.cl#{'lanes' if layout == 'brute' else 'one'}",
+        f"tracing/trace.cl#{'lanes' if layout == 'brute' else 'single'}",
     ),
     "generated/curve_others.cl": lambda f, _: either(
         f.geometry.analytic != ("curves",), "tracing/curves.cl#others"
