@@ -1,7 +1,6 @@
 /* Ends paths that are finished and begins those that come next, for integrators that start at lights: the twin of
  * stage/generate.cl. The work list only counts paths here: stage/splat.cl adds the light of a path to
  * the pixel where the camera sees it. */
-#include "core/base.cl"
 #include "stage/stage.cl"
 #include "generated/begin_args.cl"
 #include "generated/sampler.cl"
@@ -89,9 +88,7 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
 
 STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     PathEnd end = path_end(path, hit, at);
     if (path_end_of_half(end)) {
         light_path_endless(path, at, end, counters);

@@ -5,7 +5,6 @@
  * where a scene has paths from lights (0) and from the camera (1). The host raises `leave` while the loop runs, if the
  * paths are of no use any more; a null pointer is never raised. The stages are those of the other files here, each
  * compiled by itself as a function (stage/stage.cl), in its own number of lanes, and linked. */
-#include "core/base.cl"
 #include "stage/stage.cl"
 #include "generated/loop_args.cl"
 #include "transport/queue.cl"

@@ -1,6 +1,6 @@
 /* The functions of a kind of material, as a part of the loop (stage/loop.cl) for a vertex that several kinds share:
  * materials/bsdf.cl. */
-#include "core/base.cl"
+#include "stage/stage.cl"
 #include "shapes/shape.cl"
 #include "lights/light.cl"
 #include "generated/textures.cl"
@@ -23,5 +23,4 @@ inline BsdfAnswer material_answer(Bsdf m, vec3 wo, vec3 wi, vec3 u, int adjoint)
     return a;
 }
 
-#define APART(type, name) __attribute__((noinline)) type name /* called by other parts, so it is compiled once */
 #include "generated/material_part.cl"

@@ -1,7 +1,6 @@
 /* Chooses a leaf for every hit on a mixture (a mask or a blend), at random by its weight, so that later
  * stages shade a single material. A row of `mixtures`: the weight (a number and 1 + its texture), and the
  * material words taken where a random number is above and below it; these may be mixtures again. */
-#include "core/base.cl"
 #include "stage/stage.cl"
 #include "generated/sampler.cl"
 #include "shapes/shape.cl"
@@ -13,9 +12,7 @@
 
 STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     integer state = load_path_state(path, at), word = load_hit_material(hit, at);
     mask active = ((state & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0);
     mask open = active & (MATERIAL_KIND(word) == MATERIAL_MIXTURE);

@@ -1,7 +1,6 @@
 /* Shades the paths that met a kind of material. Built once per kind, so it holds no switch: LANES neighbouring slots,
  * with other kinds masked out, or, where QUEUED, a slot of the kind's queue. Where a text is whole, read it
  * from its end: first the stage, then `integrator_vertex` above it, whose steps stand above that in their order. */
-#include "core/base.cl"
 #include "stage/stage.cl"
 #include "generated/merge_args.cl"
 #include "generated/shade_args.cl"

@@ -1,6 +1,5 @@
 /* Tests the rays that wait to reach the camera, and adds the part of their light that arrives to the pixels whose
  * filters hold its point on the film. No sample is counted here: stage/emit.cl counts paths. */
-#include "core/base.cl"
 #include "stage/stage.cl"
 #include "generated/join_args.cl"
 #include "generated/shadow_ray.cl"
@@ -10,9 +9,7 @@
 
 STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     real t = load_shadow_t(shadow, at);
     mask active = t > 0.0f;
     if (any(active)) {
