@@ -1,32 +1,72 @@
-"""`clpt convert`: an image or film in another format, or for a screen."""
+"""`clpt convert`: an image or film in another format or for a screen; a scene as scene.json."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
 import click
 
-from ..formats import locate
+from ..choices import Missing
+from ..errors import SceneError
+from ..formats import FORMATS, locate, save
+from .info import read_scene
 from .options.grading import GradingOptions, grading_options
+from .options.loading import loading_options
 from .options.records import with_records
+from .options.scene_options import Loading
+from .options.values import Choice
 from .process import terminal
 
 
 @click.command()
 @click.argument("source", type=click.Path(path_type=Path))
-@click.argument("target", type=click.Path(path_type=Path))
+@click.argument("target", type=click.Path(path_type=Path), required=False)
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="The same as TARGET.")
 @click.option("--layer", metavar="NAME", help="Take this layer of an .exr in place of the picture.")
 @grading_options
-@with_records(graded=GradingOptions)
-def convert(source: Path, target: Path, layer: str | None, graded: GradingOptions) -> None:
+@loading_options
+@click.option(
+    "--missing-textures", type=Choice(get_args(Missing)), default="error",
+    help="Of scenes: grey stands for an image that is not there, or an unknown material.",
+)  # fmt: skip
+@with_records(graded=GradingOptions, loading=Loading)
+def convert(
+    source: Path, target: Path | None, output: Path | None, layer: str | None,
+    graded: GradingOptions, loading: Loading,
+) -> None:  # fmt: skip
     """Write the image or film SOURCE as TARGET, in another format or for a screen.
 
     SOURCE is any image that clpt reads, a film or a checkpoint; the suffix of TARGET is .exr, .png,
     .jpg, .webp, .hdr, .pfm or .npy. A spectral .exr becomes its colours.
+
+    A SOURCE that is a scene or a folder with a scene, such as old.xml of Mitsuba 0.6, becomes a
+    scene of today: TARGET is a .json, or a folder for a scene.json.
     """
-    grading = graded.grading
-    locate(source)
+    if (target is None) == (output is None):
+        raise click.UsageError("give TARGET once: as an argument, or by -o")
+    target = target or output
+    assert target is not None
+    file = locate(source)
+    if file.name.lower().endswith(tuple(FORMATS)):
+        _convert_scene(file, target, loading)
+        return
     from .files.image_tools import write_converted
 
-    for line in write_converted(source, target, layer, grading):
+    for line in write_converted(source, target, layer, graded.grading):
         terminal.say(line)
+
+
+def _convert_scene(file: Path, target: Path, loading: Loading) -> None:
+    """Write a scene as .json, in a folder that is made if it is missing. Raises SceneError."""
+    scene = read_scene(file, loading)
+    for warning in scene.warnings:
+        terminal.say(f"clpt: warning: {warning}")
+    if not target.suffix:
+        target /= "scene.json"
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error}", file=target) from error
+    save(scene, target)
+    terminal.say(str(target))

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import SceneError
-from ..formats import errors_of, load, locate
+from ..formats import errors_of, locate
 from .options.loading import loading_options
+from .options.scene_options import Loading
 from .options.values import ScenePath
 from .process import terminal
 
@@ -18,12 +19,12 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 
-def read(scene: Path, variables: dict[str, Any]) -> Scene:
+def read_scene(scene: Path, loading: Loading) -> Scene:
     """Return the scene of a file. Raises SceneError behind the list of all its errors."""
     try:
-        return load(scene, **variables)
+        return loading.read(scene)
     except SceneError as error:
-        raise all_of(error, errors_of(locate(scene), **variables)) from None
+        raise all_of(error, errors_of(locate(scene), **loading.variables)) from None
 
 
 def all_of(first: SceneError, errors: list[SceneError]) -> SceneError:
@@ -60,7 +61,7 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
 
         contents = dict(read_contents(scene).facts)
     else:
-        loaded = read(scene, variables)
+        loaded = read_scene(scene, Loading(variables))
         from .files.scene_contents import summary, tidy
 
         contents = summary(loaded)

@@ -21,6 +21,7 @@ REACH = {
     "mitsuba": ANYWHERE,
     "pbrt": ANYWHERE,
     "gltf": BELOW,
+    "materialx": ANYWHERE,
     "usd": ANYWHERE,
     "mesh": ANYWHERE,  # .obj, with its .mtl, and .ply
 }

@@ -29,6 +29,7 @@ FORMATS = {  # what reads files of a suffix: a module, imported on use, or a par
     ".pbrt.gz": "pbrt",
     ".glb": "gltf",
     ".gltf": "gltf",
+    ".mtlx": "materialx",
     ".usd": "usd",
     ".usda": "usd",
     ".usdc": "usd",

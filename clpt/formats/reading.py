@@ -1,6 +1,7 @@
-"""Readers of all formats share these: errors with a location, collected errors, stand-ins.
+"""Readers of all formats share these: errors with a location, collected errors, packed files.
 
-While errors are collected, a reader goes on after each of them."""
+While errors are collected, a reader goes on after each of them.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +9,14 @@ import gzip
 import os
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
-
 from clpt.errors import SceneError
 from clpt.files import budget, input_files
-from clpt.scene.roles import REFLECTANCE, Spectral
 
 
 class Located(ABC):
@@ -81,23 +79,6 @@ def collecting() -> Iterator[list[SceneError]]:
         yield errors
     finally:
         _found.reset(token)
-
-
-GREY = np.full((1, 1, 3), 0.5, np.float32)
-EVEN = np.array([[[0.5, 0.5, 1.0]]], np.float32)  # a normal map that bends nothing
-GREY.flags.writeable = EVEN.flags.writeable = False
-
-
-def grey_for(name: object) -> str:
-    """Return the warning of an image that GREY or EVEN replaces."""
-    return f"there is no file {str(name)!r}; grey stands for it"
-
-
-def colour(role: Spectral, rgb: Sequence[float]) -> Any:
-    """Return linear Rec.709 as the spectrum of a role; its kind checks the limits."""
-    if role is REFLECTANCE or role.colour is None:
-        return tuple(rgb)
-    return role.colour(*rgb)
 
 
 CHUNK = 1 << 22

@@ -308,7 +308,7 @@ def leaves_of(material: mt.Material) -> Iterator[type[mt.Material]]:
     for part in mt.parts(material):
         if isinstance(part, mt.Mask) or part.no_back:
             yield mt.Null
-        if not isinstance(part, mt.COMPOSITES):
+        if not part.is_composite:
             yield type(part)
-    if any_of(material, mt.TwoSided) and not isinstance(material, mt.TwoSided):
+    if not material.two_sided and any(part.two_sided for part in mt.parts(material)):
         yield mt.Diffuse  # the black back of a part that is not two-sided

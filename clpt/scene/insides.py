@@ -37,7 +37,7 @@ def dispersed(ior: float, abbe: float) -> Spectrum:
     return Cauchy(ior - b * d, b)
 
 
-def spelled(transmission_color: Any = 1.0, transmission_depth: float = 0.0) -> dict[str, Any]:
+def spelled(transmission_color: object = 1.0, transmission_depth: float = 0.0) -> dict[str, Any]:
     """Return the parameters of `openpbr` for its colour of transmission at a depth [m].
 
     A depth of 0 makes it a factor at the surface. Raises SceneError, see `absorbed`.

@@ -46,6 +46,10 @@ class Integrator(Kind):
     guide_paths = 0
     light_tracing = True
     merging = False
+    has_photons: ClassVar[bool] = False  # a pass may leave photons: no variance tells their blur
+    from_lights_alone: ClassVar[bool] = False  # all paths start at lights
+    asks_photons: ClassVar[bool] = False  # the scene may decide for photons too
+    has_escape_rays: ClassVar[bool] = False  # out of sealed media, see kernels/media/escape.cl
 
     @property
     def light_paths(self) -> float | str:
@@ -98,6 +102,8 @@ class Path(Integrator):
     has a light path. "auto" starts light paths where a surface is specular and a light is small.
     """
 
+    has_escape_rays = True
+
     max_depth: int = host(8, "longest path; -1: no limit")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
@@ -144,6 +150,8 @@ class Vcm(Integrator):
     or beyond 65 counts as 65.
     """
 
+    has_photons = True
+
     max_depth: int = host(8, "longest path, as of `path`; -1: 65")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
     hide_lights: bool = flag(False, "the camera sees through lights, also those on shapes")
@@ -174,6 +182,8 @@ class Auto(Integrator):
     Light paths where something is specular and a light is small; photons too where the camera sees
     mirrors or clear glass, and the scene asks for no limit of noise and no denoiser.
     """
+
+    asks_photons = True
 
     max_depth: int = host(8, "longest path, as of `path`; -1: no limit")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")
@@ -223,6 +233,8 @@ class ParticleTracer(Integrator):
     sample per pixel is a light path for every pixel of the film.
     The camera must be `perspective` or `thin_lens`.
     """
+
+    from_lights_alone = True
 
     max_depth: int = host(8, "longest path, as of `path`; -1: no limit")
     rr_depth: int = host(3, "depth from which Russian roulette may end a path")

@@ -136,11 +136,34 @@ class Material(Scatterer):
     """
 
     bounds_body: ClassVar[bool] = False  # its shapes enclose bodies, which may have a priority
+    is_composite: ClassVar[bool] = False  # it consists of other materials, and has no kernel file
 
     name: str = host("", "for messages and for references in scene files")
 
     # of a kind without such parameters
     absorption = cast(SpectrumLike, CLEAR)
+
+    @property
+    def is_sheet(self) -> bool:
+        """Whether its surface has no inside."""
+        return False
+
+    @property
+    def absorbs_inside(self) -> bool:
+        return self.absorption != CLEAR
+
+    @property
+    def least_alpha(self) -> float:
+        """The least roughness alpha of its specular lobes; 1 without such lobes, or by a texture.
+
+        A coat over a diffuse base does not count.
+        """
+        return 1.0
+
+    @property
+    def shared_parts(self) -> dict[str, Material]:
+        """The materials that it consists of, by their parameters."""
+        return {name: v for name, v in fields_of(self).items() if isinstance(v, Material)}
 
     @property
     def inside_index(self) -> IndexLike:
@@ -153,6 +176,18 @@ class Material(Scatterer):
 def _factor(of: str, *, linear: bool = False) -> Any:
     """Declare a factor on light that a material sends out, which is 1 in physics."""
     return reflectance(1.0, f"factor on {of}; 1 is physical", linear=linear)
+
+
+def _least(*alphas: object) -> float:
+    """Return the least number among alphas, 1 without numbers."""
+    return min((a for a in alphas if isinstance(a, (int, float))), default=1.0)
+
+
+def _alpha_of(roughness: object, *shares: object) -> float:
+    """Return the alpha of a roughness; 1 for a texture, and where all specular shares are 0."""
+    if not isinstance(roughness, (int, float)) or all(share == 0.0 for share in shares):
+        return 1.0
+    return roughness**2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -308,6 +343,10 @@ class RoughDielectric(Material):
     def transmits(self) -> bool:
         return True
 
+    @property
+    def least_alpha(self) -> float:
+        return _least(self.alpha_u, self.alpha_v)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Conductor(Material):
@@ -344,6 +383,10 @@ class RoughConductor(Material):
     alpha_v: TexturedNumber = real(0.1, "roughness across it", low=1e-4, high=1.0, textured=True)
     specular_reflectance: Textured = _factor("reflection", linear=True)
     layers: tuple[Layer, ...] = layers(FILMS)
+
+    @property
+    def least_alpha(self) -> float:
+        return _least(self.alpha_u, self.alpha_v)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -416,6 +459,10 @@ class CoatedConductor(Material):
     )
     specular_reflectance: Textured = _factor("the metal's reflection")
 
+    @property
+    def least_alpha(self) -> float:
+        return _least(self.alpha_u, self.alpha_v)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Principled(Material):
@@ -463,6 +510,10 @@ class Principled(Material):
     def uses_tangents(self) -> bool:
         return self.anisotropic != 0.0
 
+    @property
+    def least_alpha(self) -> float:
+        return _alpha_of(self.roughness, self.metallic, self.spec_trans)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PrincipledThin(Material):
@@ -509,6 +560,10 @@ class PrincipledThin(Material):
     @property
     def uses_tangents(self) -> bool:
         return self.anisotropic != 0.0
+
+    @property
+    def least_alpha(self) -> float:
+        return _alpha_of(self.roughness, self.spec_trans)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -615,6 +670,14 @@ class GltfSurface(Material):
     def uses_tangents(self) -> bool:
         return self.anisotropy != 0.0 or self.clearcoat_apart != 0.0
 
+    @property
+    def least_alpha(self) -> float:
+        return _alpha_of(self.roughness, self.metallic, self.transmission)
+
+    @property
+    def is_sheet(self) -> bool:
+        return self.thin
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Openpbr(Material):
@@ -698,6 +761,14 @@ class Openpbr(Material):
     def uses_tangents(self) -> bool:
         stretched = self.coat_weight != 0.0 and self.coat_roughness_anisotropy != 0.0
         return self.specular_roughness_anisotropy != 0.0 or stretched
+
+    @property
+    def least_alpha(self) -> float:
+        return _alpha_of(self.specular_roughness, self.base_metalness, self.transmission_weight)
+
+    @property
+    def is_sheet(self) -> bool:
+        return self.thin_walled
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -845,48 +916,79 @@ class Null(Material):
     is_null = True
 
 
+NO_SURFACE = Null()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TwoSided(Material):
     """Gives materials with only a front to both sides of a surface."""
+
+    is_composite = True
+    two_sided = True
 
     front: Material = host(Diffuse(), "material of the front", form="material")
     back: Material | None = host(
         None, "material of the back; the front's when None", form="material"
     )
 
+    def shading(self, front: bool) -> Material:
+        return self.front if front or self.back is None else self.back
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mask(Material):
     """Lets light through where `opacity` is below 1."""
+
+    is_composite = True
 
     material: Material = host(Diffuse(), "what is there where it is opaque", form="material")
     opacity: TexturedNumber = real(
         0.5, "share of light that meets the material", "", 0.0, 1.0, textured=True
     )
 
+    @property
+    def mixture(self) -> tuple[Any, Scatterer, Scatterer]:
+        return self.opacity, NO_SURFACE, self.material
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Blend(Material):
     """A linear mixture of two materials."""
 
+    is_composite = True
+
     first: Material = host(Diffuse(), "material where the weight is 0", form="material")
     second: Material = host(Diffuse(), "material where the weight is 1", form="material")
     weight: TexturedNumber = real(0.5, "share of the second", "", 0.0, 1.0, textured=True)
+
+    @property
+    def mixture(self) -> tuple[Any, Scatterer, Scatterer]:
+        return self.weight, self.first, self.second
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NormalMapped(Material):
     """Base of the maps that bend the shading normal. Their flags and defaults are Mitsuba 3's."""
 
+    is_composite = True
+    perturbs_normals = True
+    reversible = False
+    slot: ClassVar[str] = ""  # a map of each slot may be around a leaf
+
     material: Material = host(Diffuse(), "what is shaded with the bent normal", form="material")
     scale: float = real(1.0, "factor on what the map bends")
     flip_invalid: bool = flag(True, "turn a normal round that faces away from the viewer")
     shadowing: bool = flag(True, "soften the edge where the bent surface turns dark")
 
+    def shading(self, front: bool) -> Material:
+        return self.material
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NormalMap(NormalMapped):
     """Takes the shading normal from an image, relative to that of the surface."""
+
+    slot = "normal"
 
     map: Bitmap | None = host(
         None,
@@ -907,6 +1009,8 @@ class NormalMap(NormalMapped):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BumpMap(NormalMapped):
     """Bends the shading normal as if the surface were raised by a height."""
+
+    slot = "bump"
 
     height: TexturedNumber = real(0.0, "what it is raised by", "m", textured=True)
 
@@ -937,20 +1041,12 @@ LEAVES = (
     Merl,
     Null,
 )
-COMPOSITES = (TwoSided, Mask, Blend, NormalMap, BumpMap)
-KINDS = LEAVES + COMPOSITES
-
-
-def inner(material: Material) -> Iterator[tuple[str, Material]]:
-    """Yield the materials in a material's parameters, each with the parameter's name."""
-    for name, part in fields_of(material).items():
-        if isinstance(part, Material):
-            yield name, part
+KINDS = (*LEAVES, TwoSided, Mask, Blend, NormalMap, BumpMap)
 
 
 def parts(material: Material) -> Iterator[Material]:
     """Yield a material and all materials inside it; nothing for another object."""
     if isinstance(material, Material):
         yield material
-        for _, part in inner(material):
+        for part in material.shared_parts.values():
             yield from parts(part)

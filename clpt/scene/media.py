@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,6 +56,9 @@ class Medium(Kind):
 
     name: str = host("", "for messages and for references in scene files")
     phase: Phase = host(Isotropic(), "what a point of it sends where", form="phase")
+
+    # of a kind without such a parameter
+    dye = cast("Reradiation | None", None)
 
     @property
     def parts(self) -> tuple[Medium, ...]:

@@ -294,9 +294,10 @@ class Kind(metaclass=KindType):
         for name, param in params(type(self)).items():
             value = _checked(getattr(self, name), param, f"{self.kind}.{name}")
             object.__setattr__(self, name, value)
-            textured |= param.role.place != "host" and isinstance(value, Kind) and value.is_texture
             for inner in value if isinstance(value, tuple) else (value,):
                 if isinstance(inner, Kind):
+                    seen = param.role.place != "host"  # by kernels
+                    textured |= seen and (inner.is_texture or inner.has_textures)
                     parts, depth = parts + inner._size[0], max(depth, inner._size[1])
         object.__setattr__(self, "_size", (parts, depth + 1))
         object.__setattr__(self, "has_textures", textured)

@@ -7,7 +7,7 @@ scatters at a surface: its local frame has z along the ray back to the previous 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,8 @@ class Phase(Scatterer):
 
     folder: ClassVar[str] = "media/kinds"
     is_phase = True
+    # of a kind without such a parameter
+    reradiation = cast("Reradiation | None", None)
 
     @property
     def leaves(self) -> tuple[Phase, ...]:
@@ -167,6 +169,10 @@ class Blend(Phase):
     @property
     def leaves(self) -> tuple[Phase, ...]:
         return (*self.first.leaves, *self.second.leaves)
+
+    @property
+    def mixture(self) -> tuple[Any, Scatterer, Scatterer]:
+        return self.weight, self.first, self.second
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from clpt.scene.params import Kind, fields_of
 
@@ -32,11 +32,30 @@ class Scatterer(Kind):
     no_back: ClassVar[bool] = False  # its back is not there
     absorbs: ClassVar[bool] = False  # all light, where its albedo is 0: none is sought there
     reversible: ClassVar[bool] = True  # light that comes the other way takes the same paths
+    two_sided: ClassVar[bool] = False  # it shades the back of a surface like a front
+    perturbs_normals: ClassVar[bool] = False  # `shading` has other normals
 
     @property
     def transmits(self) -> bool:
         """Whether light goes through it."""
         return False
+
+    @property
+    def absorbs_inside(self) -> bool:
+        """Whether the body behind its surface absorbs light."""
+        return False
+
+    def shading(self, front: bool) -> Scatterer:
+        """Return the scatterer inside it that shades a side of a surface; else itself."""
+        return self
+
+    @property
+    def mixture(self) -> tuple[Any, Scatterer, Scatterer] | None:
+        """The share of the second scatterer, and both scatterers that it mixes; None: no mixture.
+
+        The share is a number or a texture.
+        """
+        return None
 
     @property
     def directing(self) -> tuple[object, ...]:

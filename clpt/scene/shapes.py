@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.errors import SceneError
 from clpt.scene import trimeshes
-from clpt.scene.lights import ON_SHAPES, Light
+from clpt.scene.lights import ON_SHAPES, PoweredLamp
 from clpt.scene.materials import Diffuse, Material
 from clpt.scene.media import Medium
 from clpt.scene.motion import Deformation, Keys
@@ -38,14 +38,23 @@ class Shape(Kind):
     # of a kind without such parameters
     group = cast("Group | None", None)
     attributes = NO_ATTRIBUTES
+    vertices = cast(Any, None)
+    faces = cast(Any, None)
+    radii = cast(Any, None)
     normals = cast(Any, None)
     tangents = cast(Any, None)
     deformation = cast("Deformation | None", None)
+    displacement = cast("Bitmap | None", None)
 
     @property
     def members(self) -> tuple[Shape, ...]:
-        """The shape, or those that an instance places."""
+        """The shape, or the shapes that an instance places."""
         return (self,)
+
+    @property
+    def shared_parts(self) -> dict[str, Any]:
+        """The parts that other shapes may share, by their parameters."""
+        return {"material": self.material}
 
     def at_time(self: ShapeKind, time: float) -> ShapeKind:
         """Return the shape with the points of its deformation at a time [s], without deformation.
@@ -57,7 +66,7 @@ class Shape(Kind):
         return dataclasses.replace(self, **changes)
 
     material: Material = host(Diffuse(), "of the surface", form="material")
-    emission: Light | None = host(None, "an `area` light, or None", form="area_light")
+    emission: PoweredLamp | None = host(None, "an `area` light, or None", form="area_light")
     interior: Medium | None = host(None, "medium behind its front, or None", form="medium")
     exterior: Medium | None = host(None, "medium before its front, or None", form="medium")
     priority: int = host(0, "where bodies overlap, that of the highest fills the place")
@@ -300,6 +309,10 @@ class Group:
     shapes: tuple[Shape, ...] = ()
     name: str = ""
 
+    @property
+    def shared_parts(self) -> dict[str, Any]:
+        return {"shapes": self.shapes}
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "shapes", tuple(self.shapes))
         for i, shape in enumerate(self.shapes):
@@ -316,12 +329,16 @@ class Instance(Shape):
     group: Group = host(None, "what is placed: a name in the scene's `groups`", form="group")
     # The surfaces are those of the group's shapes.
     material: Material = field(default=cast(Material, None), init=False, repr=False)
-    emission: Light | None = field(default=None, init=False, repr=False)
+    emission: PoweredLamp | None = field(default=None, init=False, repr=False)
     flip_normals: bool = field(default=False, init=False, repr=False)
 
     @property
     def members(self) -> tuple[Shape, ...]:
         return self.group.shapes
+
+    @property
+    def shared_parts(self) -> dict[str, Any]:
+        return {"group": self.group}
 
     def check(self) -> None:
         """Raise SceneError unless `group` is a group."""

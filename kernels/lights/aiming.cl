@@ -10,6 +10,8 @@
  *     p' = (1 - sum s_k) p + sum s_k p_k
  *
  * (balance heuristic of a single sample, Veach 1997, 9.2.4). MIS weights of both sides use gain = p' / p. */
+
+/* Step. */
 #define AIM_WORDS 5
 
 typedef struct {
@@ -97,6 +99,14 @@ inline LightRay aim_power(LightRay r, mask turned, Spectrum intensity, real p)
     return r;
 }
 
+/* What aiming changes in the density of a ray along d: at a light the direction's [1/sr], n the normal on a shape;
+ * from infinity the density of the origin across it [1/m^2]; 0 where nothing aims. start_case is generated. */
+inline real light_start_pdf(Scene scene, integer row, LightRow l, vec3 n, vec3 d)
+{
+    LightView view = light_view(scene, row, l, v3(0.0f, 0.0f, 0.0f), v3(0.0f, 0.0f, 0.0f));
+    return start_case(scene, l, view, n, d, light_view_direction(view, d));
+}
+
 /* The density of light paths along d with aiming over the density without it; 1 where p is 0, as nothing aims there.
  * chosen: the sphere of the ray, -1: none or unknown; o: origin, from infinity any point of the ray; n: normal of a
  * light on a shape, toward d. */
@@ -129,3 +139,26 @@ inline real light_path_pdf(Scene scene, integer row, vec3 p, vec3 wi, real t, ve
     real gain = light_gain(scene, row, light_at(scene, row), (integer)(-1), o, front, neg3(wi), away);
     return light_emit_pdf(scene, row, wi, t) * gain;
 }
+
+/* Twin, where no light path aims. */
+#define light_path_pdf(scene, row, p, wi, t, n) light_emit_pdf(scene, row, wi, t)
+inline integer aim_choose(Scene scene, real *x) { return (integer)(-1); }
+
+/* Step ray: a ray `r` of light_emit aims at the sphere `chosen`, and carries light over the density of all techniques.
+ * lamp_aimed is generated: aim_power of the kinds at a point. */
+inline LightRay aim_ray(Scene scene, integer row, LightRow l, LightView view, integer chosen, vec2 v,
+                        Wavelengths lambdas, LightRay r)
+{
+    mask turned;
+    vec3 n = sel3(l.shape >= 0, r.n, v3(0.0f, 0.0f, 0.0f));
+    chosen = sel_i(light_mode(l, EMISSION_ALONG), (integer)(-1), chosen);
+    r = aim_turn(scene, chosen, r, n, v, &turned);
+    r = lamp_aimed(scene, l, light_view_direction(view, r.d), turned, lambdas, r);
+    r.gain = light_gain(scene, row, l, chosen, r.o, n, r.d, r.away);
+    r.power = spectrum_scale(r.power, 1.0f / r.gain);
+    return r;
+}
+
+/* Twin, where no light path aims. */
+inline LightRay aim_ray(Scene scene, integer row, LightRow l, LightView view, integer chosen, vec2 v,
+                        Wavelengths lambdas, LightRay r) { return r; }

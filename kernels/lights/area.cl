@@ -1,17 +1,4 @@
-/* LightRow.emission_mode: 0 diffuse from the front, 1 along the normal alone (particle_tracer), 2 from both sides; plus
- * 4 for a light that no ray sees. */
-inline ShapeSample area_turned(ShapeSample q, mask both)
-{
-    q.n = sel3(both & (dot3(q.n, q.wi) > 0.0f), neg3(q.n), q.n);
-    return q;
-}
-
-/* A sample of a light that no ray sees has weight 1, like a sample of a delta light: its density is negated. */
-inline LightSample area_unseen(LightSample s, mask unseen)
-{
-    s.pdf = sel(unseen, -s.pdf, s.pdf);
-    return s;
-}
+/* Lights on shapes. */
 
 /* The sample ends before the surface by more than rounding, else the surface would occlude it. p: the point [m]. */
 inline LightSample area_sample(ShapeSample q, vec3 p, Spectrum radiance)
@@ -23,6 +10,7 @@ inline LightSample area_sample(ShapeSample q, vec3 p, Spectrum radiance)
     s.t = max_r(q.t - rounding_step(p, q.size + q.t) / max_r(cosine, (real)(1e-6f)), 0.5f * q.t);
     s.radiance = spectrum_sel(front, radiance, spectrum_of(0.0f));
     s.pdf = sel(front, q.pdf, (real)(0.0f));
+    s.n = q.n;
     return s;
 }
 
@@ -60,3 +48,36 @@ inline TexturePoint area_triangle_point(Scene scene, ShapeRow shape, integer row
 #endif
     return t;
 }
+
+/* Step two_sided: the normal of a light that emits from both sides faces p. */
+inline ShapeSample area_turned(ShapeSample q, LightRow l)
+{
+    q.n = sel3(light_mode(l, EMISSION_BOTH) & (dot3(q.n, q.wi) > 0.0f), neg3(q.n), q.n);
+    return q;
+}
+
+/* Twin, where all lights on shapes have a single side. */
+inline ShapeSample area_turned(ShapeSample q, LightRow l) { return q; }
+
+/* Step unseen: a sample of a light that no ray sees has weight 1, like a sample of a delta light: its density is
+ * negated. */
+inline LightSample area_unseen(LightSample s, LightRow l)
+{
+    mask unseen = light_mode(l, EMISSION_UNSEEN);
+    s.chance = sel(unseen, fabs(s.pdf), s.chance);
+    s.pdf = sel(unseen, -s.pdf, s.pdf);
+    return s;
+}
+
+/* Twin, where rays see all lights on shapes. */
+inline LightSample area_unseen(LightSample s, LightRow l) { return s; }
+
+/* Step shows: whether the side of a shape that a ray met emits; front: it met the front. */
+inline mask light_shows(Scene scene, integer row, mask front)
+{
+    LightRow l = light_at(scene, max_i(row, (integer)(0)));
+    return (front | light_mode(l, EMISSION_BOTH)) & !light_mode(l, EMISSION_UNSEEN);
+}
+
+/* Twin, where rays see the fronts of all lights on shapes, and nothing else. */
+#define light_shows(scene, row, front) (front)

@@ -16,16 +16,6 @@
 #include "generated/light_ray.cl"
 #include "generated/surface_point.cl"
 
-/* Chooses the side of a light that emits from both sides, by *v, which is rescaled to a new random number. */
-inline SurfacePoint surface_point_turned(SurfacePoint q, mask both, vec2 *v)
-{
-    mask back = both & (v->x >= 0.5f);
-    q.n = sel3(back, neg3(q.n), q.n);
-    q.area *= sel(both, (real)(2.0f), (real)(1.0f));
-    v->x = sel(both, 2.0f * v->x - sel(back, (real)(1.0f), (real)(0.0f)), v->x);
-    return q;
-}
-
 /* A ray from a surface: diffuse from the front (a cosine density, so power = pi A L), or, where `along`, along the
  * normal alone, with `value` as radiant exitance (power = A E). */
 inline LightRay surface_emit(SurfacePoint q, mask along, Spectrum value, vec2 v)
@@ -73,6 +63,96 @@ inline LightRay distant_emit(Scene scene, LightSample s, vec2 v)
     r.power = spectrum_scale(spectrum_sel(s.pdf > 0.0f, r.seen, s.radiance), PI * radius * radius);
     r.away = mask_of(1);
     return r;
+}
+
+/* Step emit: a ray from a light that `pick` chooses by its power. clpt/render/lights/emission_cases.py generates
+ * `lamp_emit`, for lights off all shapes, and `area_surface_point`, a point of a light on a shape with its texture
+ * point. */
+inline LightRay light_emit(Scene scene, real pick, vec2 u, vec2 v, Wavelengths lambdas)
+{
+    integer row = light_pick(scene, &pick, u.y);
+    LightRow l = light_at(scene, row);
+    LightView view = light_view(scene, row, l, v3(0.0f, 0.0f, 0.0f), v3(0.0f, 0.0f, 0.0f));
+    integer chosen = aim_choose(scene, &v.x);
+    LightRay r = lamp_emit(scene, l, view, u, v, lambdas);
+    r = area_emit(scene, row, l, view, u, &v, lambdas, r);
+    r = aim_ray(scene, row, l, view, chosen, v, lambdas, r);
+    r.row = row;
+    real share = 1.0f / max_r(l.pmf, (real)(1e-30f));
+    r.power = spectrum_scale(r.power, share);
+    r.seen = spectrum_scale(r.seen, share);
+    return r;
+}
+
+/* Twin, in a scene without lights. */
+inline LightRay light_emit(Scene scene, real pick, vec2 u, vec2 v, Wavelengths lambdas) { return light_ray_nothing(); }
+
+/* Step areas: a ray from a light on a shape; `r`: the ray from any other light. */
+inline LightRay area_emit(Scene scene, integer row, LightRow l, LightView view, vec2 u, vec2 *v, Wavelengths lambdas,
+                          LightRay r)
+{
+    TexturePoint point = texture_point_nowhere();
+    SurfacePoint q = surface_point_moved(view, area_surface_point(scene, row, l, u, &point));
+    q = surface_point_turned(q, l, v);
+    point.p = q.p;
+    Spectrum value = emission_load(scene, l.radiance, point, lambdas);
+    LightRay s = area_ray_unseen(surface_emit(q, light_mode(l, EMISSION_ALONG), value, *v), l);
+    return light_ray_sel(l.shape >= 0, s, r);
+}
+
+/* Twin, where no shape emits. */
+inline LightRay area_emit(Scene scene, integer row, LightRow l, LightView view, vec2 u, vec2 *v, Wavelengths lambdas,
+                          LightRay r) { return r; }
+
+/* Step two_sided: chooses the side of a light that emits from both, by *v, which is rescaled to a new random number. */
+inline SurfacePoint surface_point_turned(SurfacePoint q, LightRow l, vec2 *v)
+{
+    mask both = light_mode(l, EMISSION_BOTH), back = both & (v->x >= 0.5f);
+    q.n = sel3(back, neg3(q.n), q.n);
+    q.area *= sel(both, (real)(2.0f), (real)(1.0f));
+    v->x = sel(both, 2.0f * v->x - sel(back, (real)(1.0f), (real)(0.0f)), v->x);
+    return q;
+}
+inline real area_sides_pdf(LightRow l) { return sel(light_mode(l, EMISSION_BOTH), (real)(0.5f), (real)(1.0f)); }
+
+/* Twin, where all lights on shapes have a single side. */
+inline SurfacePoint surface_point_turned(SurfacePoint q, LightRow l, vec2 *v) { return q; }
+#define area_sides_pdf(l) ((real)(1.0f))
+
+/* Step unseen: the camera does not see the origin of a light path on a light that no ray sees. */
+inline LightRay area_ray_unseen(LightRay r, LightRow l)
+{
+    r.seen = spectrum_sel(light_mode(l, EMISSION_UNSEEN), spectrum_of(0.0f), r.seen);
+    return r;
+}
+
+/* Twin, where rays see all lights on shapes. */
+inline LightRay area_ray_unseen(LightRay r, LightRow l) { return r; }
+
+/* Step densities: densities of the light in a row for transport/mis_ratio.cl. The generated `emit_case` and `nee_case`
+ * are the densities of a light's kind. */
+
+/* The density of light_emit for rays against wi to a surface across them at distance t; over the cosine at a light on a
+ * shape. Squared distances cancel: [1/(m^2 sr)], and for a light at a point per t^2 [1/m^2], in units of
+ * Settings.mis_area_unit. */
+inline real light_emit_pdf(Scene scene, integer row, vec3 wi, real t)
+{
+    LightRow l = light_at(scene, row);
+    LightView view = light_view(scene, row, l, v3(0.0f, 0.0f, 0.0f), v3(0.0f, 0.0f, 0.0f));
+    float disk = PI * emission_radius(scene.settings) * emission_radius(scene.settings);
+    real pdf = emit_case(scene, l, view, light_view_direction(view, wi), t, disk);
+    return pdf * l.pmf * scene.settings->mis_area_unit;
+}
+
+/* The density of next-event estimation at p for that point of the light [1/sr]; n: the normal there. For a delta light
+ * it is the probability of the row. Where the tree asks for gloss, the probability of the row is left out: the step
+ * `chosen` of transport/mis_ratio.cl knows it later. */
+inline real light_nee_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 wi, real t, vec3 n)
+{
+    LightRow l = light_at(scene, row);
+    LightView view = light_view_along(light_view(scene, row, l, p, receiver.hemisphere), wi, t, n);
+    real pdf = nee_case(scene, l, view);
+    return GLOSS_BEFORE ? pdf : pdf * light_pmf(scene, row, l, p, receiver);
 }
 
 /* Step kept: the light of a path that is weighed, for its first vertex, see transport/mis_ratio.cl. */

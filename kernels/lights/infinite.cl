@@ -1,6 +1,16 @@
 /* Light of infinite lights, for paths that leave the scene. */
 #include "generated/infinite_weight.cl"
 
+/* Radiance along d of the infinite light in `row`, the same in all lanes, and the density of next-event estimation. */
+inline void infinite_light(Scene scene, int row, vec3 p, Receiver receiver, vec3 d, Wavelengths lambdas,
+                           Spectrum *radiance, real *pdf)
+{
+    LightRow l = light_at(scene, (integer)(row));
+    LightView view = light_view(scene, (integer)(row), l, p, receiver.hemisphere);
+    infinite_case(scene, l, view.hemisphere, light_view_direction(view, d), lambdas, radiance, pdf);
+    *pdf *= light_pmf(scene, (integer)(row), l, p, receiver);
+}
+
 /* Radiance of a single infinite light for a path that leaves the scene along d [W m^-2 sr^-1 nm^-1], and its MIS weight
  * `w`. The direction was sampled with density `pdf` [1/sr] (below 0: delta) at a point p of a surface with `receiver`,
  * see lights/receiver.cl. The power heuristic weighs it against next-event estimation (Veach 1997, 9.2.4) and, by the

@@ -17,6 +17,10 @@
 /* Whether only light from a single hemisphere matters. */
 inline mask hemisphere_given(vec3 hemisphere) { return dot3(hemisphere, hemisphere) > 0.5f; }
 
+/* LightRow.emission_mode of a light on a shape: 0 diffuse from the front, or bits: EMISSION_ALONG the normal alone
+ * (particle_tracer), EMISSION_BOTH sides, EMISSION_UNSEEN by rays. */
+#define light_mode(l, bit) (((l).emission_mode & (bit)) != 0)
+
 /* The direction from p to a light at a point, and its distance; *t2: the square of that [m^2]. */
 inline LightSample light_toward(vec3 position, vec3 p, real *t2)
 {
@@ -68,22 +72,34 @@ inline integer light_pick(Scene scene, real *u, real other)
     return sel_i(stay, row, l.alias);
 }
 
-/* A sample with the probability of its row in the pdf; a delta light has it in the radiance. */
-inline LightSample light_chosen(LightSample s, real pmf)
+/* A sample with its row, and the probability of that in the pdf; a delta light has it in the radiance. */
+inline LightSample light_chosen(LightSample s, integer row, real pmf)
 {
+    s.row = row;
+    s.chance = pmf;
     mask delta = s.pdf < 0.0f;
     s.radiance = spectrum_scale(s.radiance, sel(delta, 1.0f / max_r(pmf, (real)(1e-30f)), (real)(1.0f)));
     s.pdf = sel(delta & (pmf > 0.0f), s.pdf, max_r(s.pdf, (real)(0.0f)) * pmf);
     return s;
 }
 
+/* Step by_power: lights are chosen by their power. */
+#define light_pmf(scene, row, l, p, receiver) ((l).pmf)
+
+inline integer light_choose(Scene scene, vec3 p, Receiver receiver, real *u, real other, real *pmf)
+{
+    integer row = light_pick(scene, u, other);
+    *pmf = light_at(scene, row).pmf;
+    return row;
+}
+
 /* Step begins: the density of emission toward p of a light that the ray from p along wi meets at distance t:
  * light_emit_pdf. n: the normal at the light; *nee_pdf: the density of next-event estimation at p for that point,
- * light_found_pdf. */
+ * light_nee_pdf. */
 inline real light_begins_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 wi, real t, vec3 n,
                              real *nee_pdf)
 {
-    *nee_pdf = light_found_pdf(scene, row, p, receiver, wi, t, n);
+    *nee_pdf = light_nee_pdf(scene, row, p, receiver, wi, t, n);
     return light_emit_pdf(scene, row, wi, t);
 }
 

@@ -135,3 +135,6 @@ inline real light_tree_pmf(Scene scene, integer row, vec3 p, Receiver receiver)
     }
     return pmf;
 }
+
+#define light_choose light_tree_pick
+#define light_pmf(scene, row, l, p, receiver) light_tree_pmf(scene, row, p, receiver)

@@ -28,16 +28,44 @@ inline vec3 motion_back_unit(Motion m, vec3 v)
 /* A normal: by the transpose, the inverse of `motion_normal` where angles are kept. */
 inline vec3 motion_front_back(Motion m, vec3 n) { return motion_back_unit(m, n); }
 
-inline LightSample light_moved(Motion m, LightSample s)
+/* A point that a light shines on, in the space where the light was lowered: p, the hemisphere, and direction,
+ * distance and normal of a point of the light. */
+typedef struct {
+    vec3 p, wi, n, hemisphere;
+    real t;
+    Motion motion;
+} LightView;
+
+inline LightView light_view(Scene scene, integer row, LightRow l, vec3 p, vec3 hemisphere)
 {
-    s.wi = motion_vector(m, s.wi); /* lamps are not scaled */
+    LightView v;
+    v.motion = motion_of_light(scene, row, l);
+    v.p = motion_point_back(v.motion, p);
+    v.hemisphere = motion_back_unit(v.motion, hemisphere);
+    return v;
+}
+
+inline LightView light_view_along(LightView v, vec3 wi, real t, vec3 n)
+{
+    v.t = t * motion_length_back(v.motion, wi);
+    v.n = motion_front_back(v.motion, n);
+    v.wi = motion_back_unit(v.motion, wi);
+    return v;
+}
+
+inline vec3 light_view_direction(LightView v, vec3 d) { return motion_back_unit(v.motion, d); }
+
+/* Samples of the light as it was lowered, at the time. */
+inline LightSample light_moved(LightView v, LightSample s)
+{
+    s.wi = motion_vector(v.motion, s.wi); /* lamps are not scaled */
     return s;
 }
 
-inline ShapeSample area_moved(Motion m, ShapeSample q)
+inline ShapeSample area_moved(LightView v, ShapeSample q)
 {
-    q.wi = motion_vector(m, q.wi);
-    q.n = motion_normal(m, q.n);
+    q.wi = motion_vector(v.motion, q.wi);
+    q.n = motion_normal(v.motion, q.n);
 #if MOTION_SCALES
     real longer = sqrt(max_r(dot3(q.wi, q.wi), (real)(1e-35f)));
     q.wi = scale3(q.wi, 1.0f / longer);
@@ -47,6 +75,24 @@ inline ShapeSample area_moved(Motion m, ShapeSample q)
 #endif
     return q;
 }
+
+/* Twin, where no light moves. */
+typedef struct { vec3 p, wi, n, hemisphere; real t; } LightView;
+
+inline LightView light_view(Scene scene, integer row, LightRow l, vec3 p, vec3 hemisphere)
+{
+    LightView v = {p};
+    v.hemisphere = hemisphere;
+    return v;
+}
+inline LightView light_view_along(LightView v, vec3 wi, real t, vec3 n)
+{
+    LightView along = {v.p, wi, n, v.hemisphere, t};
+    return along;
+}
+inline vec3 light_view_direction(LightView v, vec3 d) { return d; }
+inline LightSample light_moved(LightView v, LightSample s) { return s; }
+inline ShapeSample area_moved(LightView v, ShapeSample q) { return q; }
 
 /* Step deforming: lights whose triangles deform. `geometry` has a row of such a triangle for each key, side by side.
  * Between keys rows are linear, as vertices are (motion/motion.cl). */
@@ -76,8 +122,9 @@ inline Triangle triangle_then(Scene scene, LightRow l, mask active)
 /* Step emission: rays from lights that move: rays from the light as it was lowered are transformed to the time. */
 #include "motion/motion.cl"
 
-inline LightRay light_ray_moved(Motion m, LightRay r)
+inline LightRay light_ray_moved(LightView v, LightRay r)
 {
+    Motion m = v.motion;
     r.o = motion_point(m, r.o);
     r.d = motion_vector(m, r.d); /* lamps are not scaled */
     r.n = motion_vector(m, r.n);
@@ -94,8 +141,9 @@ inline real motion_area(Motion m, vec3 n)
 #endif
 }
 
-inline SurfacePoint surface_point_moved(Motion m, SurfacePoint q)
+inline SurfacePoint surface_point_moved(LightView v, SurfacePoint q)
 {
+    Motion m = v.motion;
     q.p = motion_point(m, q.p);
     q.n = motion_normal(m, q.n);
 #if MOTION_SCALES
@@ -104,3 +152,7 @@ inline SurfacePoint surface_point_moved(Motion m, SurfacePoint q)
     q.area *= motion_area(m, q.n);
     return q;
 }
+
+/* Twin, where no light moves. */
+inline LightRay light_ray_moved(LightView v, LightRay r) { return r; }
+inline SurfacePoint surface_point_moved(LightView v, SurfacePoint q) { return q; }

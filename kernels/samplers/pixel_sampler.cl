@@ -11,9 +11,9 @@ inline natural pixel_key(global const Settings *settings, integer pixel_index)
     return as_natural((y + (settings->crop_y + margin)) * width + x + (settings->crop_x + margin));
 }
 
-inline Sampler pixel_sampler(global const Settings *settings, natural pixel_key, integer sample)
+inline Sampler pixel_sampler(global const Settings *settings, natural key, integer sample)
 {
-    return sampler_start(settings->seed, pixel_key, as_natural(sample));
+    return sampler_start(settings->seed, key, as_natural(sample));
 }
 
 /* Step z: a pixel is known by its place on the Z curve over the whole film: bits of x and y alternate (Morton 1966). */
@@ -34,7 +34,7 @@ inline natural pixel_key(global const Settings *settings, integer pixel_index)
     return spread_bits(column) | (spread_bits(row) << 1u);
 }
 
-inline Sampler pixel_sampler(global const Settings *settings, natural pixel_key, integer sample)
+inline Sampler pixel_sampler(global const Settings *settings, natural key, integer sample)
 {
-    return zsobol_start(settings->seed, (uint)settings->sample_bits, pixel_key, as_natural(sample));
+    return zsobol_start(settings->seed, (uint)settings->sample_bits, key, as_natural(sample));
 }

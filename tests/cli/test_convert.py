@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import clpt
 from clpt import images
 from clpt.__main__ import run
 from clpt.images import spectral_exr
@@ -90,10 +91,60 @@ def test_a_film(capsys):
         (["a.exr", "a.doc"], "unknown image suffix '.doc'"),
         (["none.exr", "a.png"], "there is no such file"),
         (["a.exr", "no/a.png"], "its folder does not exist"),
-        (["a.exr"], "Missing argument 'TARGET'"),
+        (["a.exr"], "give TARGET once"),
     ],
 )
 def test_what_cannot_be_is_told(capsys, words, told):
     images.write("a.exr", COLOURS)
     assert run(["convert", *words]) == 2
     assert told in capsys.readouterr().err
+
+
+OLD_SCENES = {
+    "old.xml": """<scene version="0.6.0">
+        <sensor type="perspective"><float name="fov" value="40"/>
+            <film type="ldrfilm"><integer name="width" value="8"/>
+                <integer name="height" value="6"/></film></sensor>
+        <shape type="sphere"><bsdf type="coating"><bsdf type="diffuse"/></bsdf></shape>
+        <emitter type="point"><spectrum name="intensity" value="2"/></emitter>
+    </scene>""",
+    "old.pbrt": """Film "image" "integer xresolution" 8 "integer yresolution" 6
+        Camera "perspective" "float fov" 40
+        WorldBegin LightSource "point" "rgb I" [2 2 2]
+        Material "plastic" "rgb Kd" [.5 .5 .5] Shape "sphere" WorldEnd""",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OLD_SCENES)
+@pytest.mark.parametrize("target", [["-o", "new/scene.json"], ["new"]])
+def test_scenes_of_old_formats_become_json(here, name, target, capsys):
+    """The new scene has the content of the old scene, without its format."""
+    Path(name).write_text(OLD_SCENES[name])
+    assert run(["convert", name, *target]) == 0
+    assert capsys.readouterr().err.splitlines()[-1] == str(Path("new/scene.json"))
+    old, new = clpt.load(name), clpt.load("new/scene.json")
+    assert (new.film.width, new.film.height) == (8, 6)
+    for category in ("camera", "film", "integrator"):
+        assert type(getattr(new, category)) is type(getattr(old, category))
+    assert [vars(light) for light in new.lights] == [vars(light) for light in old.lights]
+    (before,), (after,) = old.shapes, new.shapes
+    assert type(after) is type(before) and after.material.kind == before.material.kind
+    Path("again").mkdir()
+    clpt.save(new, "again/scene.json")
+    assert Path("again/scene.json").read_text() == Path("new/scene.json").read_text()
+
+
+def test_scenes_that_cannot_be_converted(capsys):
+    """All blockers are listed; a picture is no target; the target is named once."""
+    Path("a.xml").write_text(
+        '<scene version="0.6.0"><shape type="sphere"><bsdf type="tree"/></shape>\n'
+        '<shape type="sphere"><bsdf type="bush"/></shape></scene>'
+    )
+    assert run(["convert", "a.xml", "b.json"]) == 2
+    told = capsys.readouterr().err
+    assert "'tree'" in told and "'bush'" in told and not Path("b.json").exists()
+    assert run(["convert", "a.xml", "b.json", "--missing-textures", "grey"]) == 0
+    assert clpt.load("b.json").shapes[0].material.kind in ("twosided", "diffuse")
+    assert run(["convert", "b.json", "c.png"]) == 2
+    assert "a scene is saved as .json" in capsys.readouterr().err
+    assert run(["convert", "b.json"]) == 2 and run(["convert", "b.json", "c", "-o", "d"]) == 2

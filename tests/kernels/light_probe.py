@@ -12,7 +12,6 @@ import pyopencl as cl
 from clpt import device
 from clpt.geometry import analytic, shape_records, triangles
 from clpt.records import SETTINGS, SHAPE
-from clpt.render.flow.features import of_lights, of_textures
 from clpt.render.flow.signatures import scene_text
 from clpt.render.geometry import cases as shape_text
 from clpt.render.lights import cases as light_dispatch
@@ -78,12 +77,12 @@ class Lit:
         found = found or frozenset({"constant"})
         text = ""
         if encoder.textures.roles:
-            text += texture_text.dispatch_text(of_textures(encoder))
+            text += texture_text.dispatch_text(encoder.textures.features())
         text += parameters.emission_text(found)
         if factors:
             text += parameters.factor_text(factors)
         features = Features(
-            lights=of_lights(self.rows, int(self.gloss)),
+            lights=self.rows.features(int(self.gloss)),
             materials=MaterialFeatures(sources=encoder.sources),
         )
         return text + light_dispatch.dispatch_text(features)

@@ -58,7 +58,7 @@ inline Lamp lamp(integer row)
 #define light_shows(scene, row, front) (front)
 #define light_path_pdf(scene, row, p, wi, t, n) (scene).emission
 #define light_emit_pdf(scene, row, wi, t) (scene).emission
-#define light_found_pdf(scene, row, p, receiver, wi, t, n) (scene).found
+#define light_nee_pdf(scene, row, p, receiver, wi, t, n) (scene).found
 #define common_light_begins_pdf(scene, row, p, receiver, wi, t, n, there) \
     (*(there) = (scene).found, (scene).emission)
 #define load_path_mis_ratio(path, at) (path).mis_ratio

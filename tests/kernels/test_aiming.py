@@ -120,7 +120,7 @@ def probe(lowered: Lowered, aimed: bool) -> SceneProbe:
     virtual = {
         **shapes.virtual_files(features),
         **lights.virtual_files(),
-        "generated/lights.cl": stages.lights_text(features),
+        "generated/lights.cl": stages.lights_text(sent),
         "generated/emission.cl": emission.dispatch_text(sent),
         "generated/textures.cl": textures.dispatch_text(features.textures),
     }

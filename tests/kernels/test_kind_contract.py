@@ -1,4 +1,4 @@
-"""Lights know their bounds and power, cameras their extent, textures their brightness."""
+"""Lights know their bounds and power, cameras their extent, textures and materials their parts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from clpt.render.spectra.look import Look
 from clpt.scene import Film, Scene, lights, materials, shapes, textures
 from clpt.scene.cameras import KINDS, Perspective
 from clpt.scene.integrators import Path as PathIntegrator
-from clpt.scene.params import factor, real
+from clpt.scene.params import factor, host, real
 from clpt.scene.roles import Role
 from clpt.scene.texture_values import Attributes, Operation, Texture, Use, brightness_at
 from clpt.spectra import Constant
@@ -222,3 +222,36 @@ def test_a_mean_is_that_of_all_points(name: str) -> None:
     uv = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
     expected = look_up([texture], "emission", uv).mean(dtype=np.float64)
     assert texture.mean(LOOK) == pytest.approx(expected, rel=ROUGH)
+
+
+# ---- materials
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Dusted(materials.Material):
+    """A composite of the tests' own: dust, a dull grey, on a share of another material."""
+
+    is_composite = True
+
+    material: materials.Material = host(materials.Diffuse(), "below the dust", form="material")
+    dust: materials.Material = host(materials.Diffuse(reflectance=0.4), "dust", form="material")
+    share: float = real(0.5, "of the surface that has dust", "", 0.0, 1.0)
+
+    @property
+    def mixture(self) -> tuple[object, materials.Material, materials.Material]:
+        return self.share, self.material, self.dust
+
+
+def test_a_composite_of_the_tests_own() -> None:
+    """It shades as a blend of the same materials, to the bit."""
+    below, dust = materials.Diffuse(reflectance=(0.9, 0.3, 0.1)), materials.Diffuse(reflectance=0.4)
+    blended = materials.Blend(first=below, second=dust, weight=0.25)
+    pictures = []
+    for material in (Dusted(material=below, dust=dust, share=0.25), blended):
+        wall_ = dataclasses.replace(WALL, material=material)
+        camera = Perspective(to_world=transforms.look_at([0, 0, AWAY], [0, 0, 0], [0, 1, 0]))
+        film = Film(width=8, height=8, mode="rgb")
+        scene = Scene(camera=camera, film=film, shapes=[wall_], lights=[lights.Constant()])
+        pictures.append(np.asarray(clpt.render(scene, spp=4)))
+    np.testing.assert_array_equal(*pictures)
+    assert 0.1 < pictures[0][..., 2].mean() < 0.4

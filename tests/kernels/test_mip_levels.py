@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from clpt.images import linear_to_srgb, srgb_to_linear
-from clpt.render.flow.features import of_textures
 from clpt.render.materials.encoder import Encoder
 from clpt.render.textures.bitmaps import _level_sizes, _levels
 from clpt.render.textures.cases import dispatch_text
@@ -45,7 +44,7 @@ class LookUp:
         encoder.textures.finish()
         self.probe = SceneProbe(
             LOOK_UP, 7, 7, files=(FILE,),
-            virtual={FILE: dispatch_text(of_textures(encoder), stochastic=True)},
+            virtual={FILE: dispatch_text(encoder.textures.features(), stochastic=True)},
             defines={"USES_MIPS": 1, "STOCHASTIC_FILTERING": 1},
             tables=encoder.store.arrays(),
         )  # fmt: skip

@@ -7,7 +7,6 @@ import pytest
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.render.flow.features import of_textures
 from clpt.render.materials.encoder import Encoder
 from clpt.render.textures.cases import dispatch_text
 from clpt.render.textures.encode import MARBLE, PERMUTATION
@@ -40,7 +39,7 @@ def look_up(made, role, places=PLACES, mode="rgb", lanes=8):
     body += f"{kind} s = texture_{role}(scene, to_integer(x[0]), point, lambdas);"
     parts = ["s"] if role == "real" else [f"s.{c}" for c in components]
     body += "".join(f"r[{i}] = {part};" for i, part in enumerate(parts))
-    text = dispatch_text(of_textures(encoder))
+    text = dispatch_text(encoder.textures.features())
     probe = SceneProbe(
         body,
         4,

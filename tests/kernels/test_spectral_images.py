@@ -7,7 +7,6 @@ import pytest
 
 from clpt.errors import SceneError
 from clpt.images.spectral_exr import SpectralImage
-from clpt.render.flow.features import of_textures
 from clpt.render.materials.encoder import Encoder
 from clpt.render.textures.cases import dispatch_text
 from clpt.render.textures.texels import FAR, bands
@@ -115,7 +114,7 @@ def test_scenes_without_spectral_images_do_not_hold_their_text():
     encoder = Encoder("spectral")
     encoder.textures.row(scene.Bitmap(image=np.zeros((2, 2, 3))), roles.REFLECTANCE)
     encoder.textures.finish()
-    text = dispatch_text(of_textures(encoder))
+    text = dispatch_text(encoder.textures.features())
     assert "pectral" not in text.replace("spectrum", "")
     assert "bands" not in text
 

@@ -19,8 +19,8 @@ from clpt import images, spectra
 from clpt.choices import Missing
 from clpt.errors import SceneError
 from clpt.files import input_files, text
+from clpt.formats.colours import EVEN, GREY, grey_for
 from clpt.formats.meshes.named_files import find
-from clpt.formats.reading import EVEN, GREY, grey_for
 from clpt.scene.lights import Area
 from clpt.scene.materials import (
     Blend,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from clpt import measured, spectra
+from clpt.formats.colours import EVEN, GREY
 from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.principled import (
     at_yellow,
@@ -31,7 +32,7 @@ from clpt.formats.mitsuba.spectra import (
 from clpt.formats.mitsuba.xml import Element
 from clpt.formats.pbrt import scattering
 from clpt.formats.pbrt.textures import map_values
-from clpt.formats.reading import EVEN, GREY, attempt
+from clpt.formats.reading import attempt
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.params import defaults, fields_of, params

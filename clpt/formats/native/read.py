@@ -13,11 +13,11 @@ from clpt import measured
 from clpt.choices import Missing
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.files import budget
-from clpt.formats import volumes
+from clpt.formats import materialx, volumes
+from clpt.formats.colours import EVEN, GREY, grey_for
 from clpt.formats.native import forms, shape_files
 from clpt.formats.native.cursor import Cursor, parse
 from clpt.formats.native.spectra import find_file, kind_name
-from clpt.formats.reading import EVEN, GREY, grey_for
 from clpt.scene import Scene, checked_noise, integrators, kinds, lights, materials, media, shapes
 from clpt.scene.params import Kind, params, shorthands
 from clpt.scene.volumes import Volume
@@ -51,6 +51,9 @@ def load(
     return _Reader(parse(path, confined), outside, missing).scene()
 
 
+MATERIALX = "materialx"  # the type of a material that stands in a document
+
+
 class _Reader:
     """Reads a file; keeps materials and groups by name, so that shapes share them."""
 
@@ -66,6 +69,7 @@ class _Reader:
         self.media: dict[str, media.Medium | None] = {}
         self.volumes: dict[str, Volume] = {}
         self.measurements: dict[str, Any] = {}
+        self.surfaces: dict[int, Any] = {}  # of MaterialX, by the ids of their materials' parts
         self.groups: dict[str, shapes.Group | None] = {}
         self.version = _version(root)
         self.warnings: list[str] = []
@@ -108,6 +112,8 @@ class _Reader:
         table = kinds(category)
         if category == "material":
             table |= self.outside
+            if isinstance(cursor.value, dict) and cursor.value.get("type") == MATERIALX:
+                return self.materialx(cursor)
         return self.object_of(cursor, table[kind_name(cursor, category, table)], ("type",))
 
     def object_of(self, cursor: Cursor, cls: type[Kind], other_keys: tuple[str, ...] = ()) -> Any:
@@ -206,6 +212,29 @@ class _Reader:
             return self.named_material(str(cursor.path[1]), cursor)
         return self.kind(cursor, "material")
 
+    def materialx(self, cursor: Cursor) -> Any:
+        """Read a material of a document of MaterialX; null chooses the only one."""
+        cursor.check_keys(MATERIALX, ("type", "file", "material"))
+        if "file" not in cursor.value:
+            raise cursor.error("needs a 'file'")
+        path = find_file(cursor.at("file"))
+        name = cursor.at("material").expect(str) if "material" in cursor.value else None
+        with cursor.locating():
+            surface, warnings = materialx.load_material(path, name)
+        self.warnings += [text for text in warnings if text not in self.warnings]
+        self.surfaces |= {id(part): surface for part in materials.parts(surface.material)}
+        return surface.material
+
+    def _with_surface(self, shape: shapes.Shape) -> Any:
+        """Return a shape with the light and the inside that a material of MaterialX has."""
+        parts = materials.parts(shape.material)
+        surface = next((self.surfaces[id(p)] for p in parts if id(p) in self.surfaces), None)
+        if surface is None:
+            return shape
+        emission = shape.emission or surface.emission
+        interior = surface.interior if shape.interior is None else shape.interior
+        return dataclasses.replace(shape, emission=emission, interior=interior)
+
     def named_material(self, name: str, referrer: Cursor) -> Any:
         """Read the material of that name, once."""
         return self._named(self.materials, "materials", "material", name, referrer)
@@ -231,6 +260,8 @@ class _Reader:
             known[name] = None
             kind = self.kind(cursor, family)
             known[name] = kind if "name" in cursor.value else dataclasses.replace(kind, name=name)
+            if id(kind) in self.surfaces:
+                self.surfaces[id(known[name])] = self.surfaces[id(kind)]
         if known[name] is None:
             raise referrer.error(f"the {family} {name!r} refers to itself")
         return known[name]
@@ -272,12 +303,13 @@ class _Reader:
         shape = self.object_of(cursor, cls, ("type",))
         if cls is shapes.Mesh:
             shape = shape_files.checked_arrays(cursor, shape, self.warnings)
-        return [shape]
+        return [self._with_surface(shape) if self.surfaces else shape]
 
     def _from_file(self, cursor: Cursor, cls: type[Kind]) -> list[shapes.Shape]:
         """Read a shape whose file holds its arrays, several meshes, or transforms of instances."""
         shape_files.check_only_in_file(cursor, cls)
         shape = self.object_of(cursor, cls, ("type", "file"))
+        shape = self._with_surface(shape) if self.surfaces else shape
         file = cursor.at("file")
         if cls is shapes.Instance:
             return [

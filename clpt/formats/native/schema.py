@@ -60,6 +60,20 @@ def schema() -> Schema:
     }
 
 
+MATERIALX: Schema = {
+    "title": "materialx",
+    "description": "A material of a document of MaterialX, with its light and its inside.",
+    "type": "object",
+    "additionalProperties": False,
+    "required": ["type", "file"],
+    "properties": {
+        "type": {"const": "materialx"},
+        "file": {**STRING, "description": "a .mtlx"},
+        "material": {**STRING, "description": "its name, if there are several"},
+    },
+}
+
+
 def _properties() -> Schema:
     """The entries of a scene."""
     return {
@@ -95,7 +109,8 @@ def _properties() -> Schema:
 
 
 def _category(category: str) -> Schema:
-    return {"oneOf": [_kind(cls) for cls in KINDS[category]]}
+    others = [MATERIALX] if category == "material" else []
+    return {"oneOf": [*(_kind(cls) for cls in KINDS[category]), *others]}
 
 
 def _kind(cls: type[Kind]) -> Schema:

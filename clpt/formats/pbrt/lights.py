@@ -15,11 +15,11 @@ import numpy as np
 from clpt import images, transforms
 from clpt.arrays import Floats32
 from clpt.errors import SceneError, UnknownKindError
+from clpt.formats.colours import GREY
 from clpt.formats.pbrt import octahedral
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import spectrum
 from clpt.formats.pbrt.state import Maker, State
-from clpt.formats.reading import GREY
 from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.roles import EMISSION

@@ -16,10 +16,11 @@ from clpt import transforms
 from clpt.choices import Missing
 from clpt.errors import SceneError, did_you_mean
 from clpt.files import budget, input_files, text
+from clpt.formats.colours import grey_for
 from clpt.formats.pbrt import old_words
 from clpt.formats.pbrt.lexer import Lexer
 from clpt.formats.pbrt.params import Parameter, Parameters
-from clpt.formats.reading import Located, grey_for
+from clpt.formats.reading import Located
 from clpt.scene.materials import Material
 from clpt.scene.motion import Keys
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, UsdShade
 
 from clpt import transforms
@@ -39,6 +40,7 @@ class Content:
     shapes: list[tuple[Usd.Prim, Shape, Matrix]] = field(default_factory=list)
     lights: list[tuple[Usd.Prim, Matrix]] = field(default_factory=list)
     cameras: list[Usd.Prim] = field(default_factory=list)
+    volumes: list[Usd.Prim] = field(default_factory=list)
     copies: list[tuple[Content, Floats]] = field(default_factory=list)
 
     def flat(self) -> Content:
@@ -75,7 +77,9 @@ def content(
     if depth > DEEPEST:
         raise document.error("instances are nested too deeply", root.GetPath())
     prims = walk.shown(document, root, defined=base is None)
-    whole = Content(cameras=prims["cameras"])
+    whole = Content(cameras=prims["cameras"], volumes=prims["volumes"])
+    for prim in prims["volumes"] if base is not None else ():
+        document.warn("volumes of prototypes are left out", prim.GetPath())
 
     def placement(prim: Usd.Prim) -> Matrix:
         matrix = document.placement(prim)
@@ -84,18 +88,16 @@ def content(
     for prim, shapes in _shapes(document, prims["gprims"], inherited):
         whole.shapes += [(prim, shape, placement(prim)) for shape in shapes]
     whole.lights = [(prim, placement(prim)) for prim in prims["lights"]]
-    instances: dict[tuple[str, str], list[Usd.Prim]] = {}
-    bound = _bound(prims["instances"])
-    for prim, material in zip(prims["instances"], bound, strict=True):
+    alike: dict[tuple[str, str], list[tuple[Usd.Prim, UsdShade.Material | None]]] = {}
+    for prim, bound in zip(prims["instances"], _bound(prims["instances"]), strict=True):
+        material = bound or inherited
         key = str(prim.GetPrototype().GetPath()), str(material.GetPath()) if material else ""
-        instances.setdefault(key, []).append(prim)
-        document.memory["bound", key[1]] = material or inherited
-    for key, several in instances.items():
-        material = document.memory["bound", key[1]]
-        prototype = several[0].GetPrototype()
+        alike.setdefault(key, []).append((prim, material))
+    for key, several in alike.items():
+        prototype, material = several[0][0].GetPrototype(), several[0][1]
         make = partial(content, document, prototype, np.eye(4), material, depth + 1)
-        inner = document.once(("content", *key), make)
-        whole.copies.append((inner, np.stack([placement(prim) for prim in several])))
+        inner = document.once(("content", document.code, *key), make)
+        whole.copies.append((inner, np.stack([placement(prim) for prim, _ in several])))
     for prim in prims["instancers"]:
         whole.copies += _instancer(document, prim, placement(prim), inherited, depth)
     return whole
@@ -132,27 +134,40 @@ def _instancer(
         return []
     budget.take_parts(len(indices), "instances", document.file)
     budget.take(BYTES * len(indices), "instances", document.file)
-    whole = instancer.ComputeInstanceTransformsAtTime(
-        document.time, document.time, UsdGeom.PointInstancer.ExcludeProtoXform,
-        UsdGeom.PointInstancer.IgnoreMask,
-    )  # fmt: skip
-    matrices = placement @ np.array(whole, np.float64).reshape(-1, 4, 4).swapaxes(1, 2)
+    matrices, there = _transforms(document, instancer, len(indices))
     if len(matrices) != len(indices):
         document.warn("left out: its arrays are not of one length", prim.GetPath())
         return []
-    mask = instancer.ComputeMaskAtTime(document.time)
-    there = np.array(list(mask), bool) if len(mask) else np.ones(len(indices), bool)
+    matrices = placement @ matrices
     copies = []
     for number, root in enumerate(roots):
         own = matrices[there & (indices == number)]
         if not root or not len(own):
             continue
         above = transforms.inverse(document.placement(root.GetParent()))
-        key = "content", str(root.GetPath()), str(inherited.GetPath()) if inherited else ""
+        key = (
+            "content",
+            document.code,
+            str(root.GetPath()),
+            str(inherited.GetPath()) if inherited else "",
+        )
         make = partial(content, document, root, above, inherited, depth + 1)
         inner = document.once(key, make)
         copies.append((inner, own))
     return copies
+
+
+def _transforms(
+    document: Document, instancer: UsdGeom.PointInstancer, count: int
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return the transforms of instances (n, 4, 4), and which are shown, (count,)."""
+    whole = instancer.ComputeInstanceTransformsAtTime(
+        document.time, document.time, UsdGeom.PointInstancer.ExcludeProtoXform,
+        UsdGeom.PointInstancer.IgnoreMask,
+    )  # fmt: skip
+    mask = instancer.ComputeMaskAtTime(document.time)
+    there = np.array(list(mask), bool) if len(mask) else np.ones(count, bool)
+    return np.array(whole, np.float64).reshape(-1, 4, 4).swapaxes(1, 2), there
 
 
 def placed(document: Document, whole: Content) -> list[Shape]:

@@ -12,11 +12,9 @@ from clpt.arrays import on_host
 from clpt.errors import SceneError
 from clpt.geometry import shapes
 from clpt.scene import Scene
-from clpt.scene.motion import Deformation, Shutter, placement, through
+from clpt.scene.motion import Deformation, placement, through
 from clpt.scene.params import fields_of
-from clpt.scene.shapes import Curves, Group, Instance, Mesh, Shape, Spheres
-
-POINTS = ((Mesh, "vertices"), (Curves, "points"), (Spheres, "centers"))
+from clpt.scene.shapes import Group, Shape
 
 
 def between(former: Scene, scene: Scene) -> tuple[Scene, list[str]]:
@@ -28,7 +26,7 @@ def between(former: Scene, scene: Scene) -> tuple[Scene, list[str]]:
     Raises SceneError if there is no shutter, and for another number of shapes or lights.
     """
     shutter = scene.camera.shutter
-    if not isinstance(shutter, Shutter) or not shutter.close > shutter.open:
+    if shutter is None or not shutter.close > shutter.open:
         message = "motion needs a time for which the shutter is open: camera.shutter"
         raise SceneError(message, where="camera.shutter")
     for name, *counts in (
@@ -59,7 +57,7 @@ class _Way:
         if old is new:
             return new
         keyed = self.moved(old, new, shapes.where(new))
-        if isinstance(new, Instance) and isinstance(old, Instance):
+        if new.group is not None and old.group is not None:
             group = self.group(old.group, new.group)
             return keyed if group is new.group else replace(keyed, group=group)
         return self.deformed(old, keyed)
@@ -77,8 +75,8 @@ class _Way:
 
     def deformed(self, old: Shape, new: Shape) -> Shape:
         """Return a shape with keys of its points, if they differ from the former points."""
-        kind, name = next((x for x in POINTS if isinstance(new, x[0])), (None, ""))
-        if kind is None or not isinstance(old, kind) or new.deformation is not None:
+        name = new.deformed_field
+        if not name or name != old.deformed_field or new.deformation is not None:
             return new
         was, now = fields_of(old), fields_of(new)
         if was[name] is now[name] and was.get("radii") is now.get("radii"):
@@ -86,7 +84,7 @@ class _Way:
         first, last = (_points(shape, name) for shape in (old, new))
         if np.array_equal(first, last):
             return new
-        shines = new.emission is not None and isinstance(new, Spheres)
+        shines = new.emission is not None and new.radii is not None
         if first.shape != last.shape or shines:
             why = "emits light" if shines else f"had {len(first)} of them"
             self.warnings.append(f"{shapes.where(new)}: its {name} do not move, as it {why}")
@@ -114,7 +112,7 @@ class _Way:
 def _points(shape: Shape, name: str) -> NDArray[np.float32]:
     """Return the points of a shape on the host; for spheres with the radii (n, 4)."""
     points = np.asarray(on_host(fields_of(shape)[name]), np.float32)
-    if not isinstance(shape, Spheres) or points.ndim != 2 or points.shape[1] != 3:
+    if shape.radii is None or points.ndim != 2 or points.shape[1] != 3:
         return points
     radii = np.asarray(on_host(shape.radii), np.float32)
     return np.column_stack([points, np.broadcast_to(radii, len(points))])

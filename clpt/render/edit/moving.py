@@ -32,7 +32,7 @@ from clpt.render.edit.scene_edit import Replacements
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.params import fields_of
-from clpt.scene.shapes import Curves, Instance, Mesh, Shape, Spheres
+from clpt.scene.shapes import Curves, Shape, Spheres
 
 _ROOT = "stage/place.cl#vertices"
 _NORMALS = SHAPE_BITS["normals"]
@@ -89,7 +89,7 @@ class Moving:
             if ranges.row["kind"] == 0 and ranges.faces[0] >= world:
                 continue  # a shape of a group: only its instances move
             shape = scene.shapes[number]
-            if isinstance(shape, Instance):
+            if shape.group is not None:
                 outer = shapes.placement(shape)
                 ranges.in_group = transforms.inverse(outer) @ shapes.placement(ranges.shape)
             self.ranges.setdefault(number, []).append(ranges)
@@ -157,7 +157,7 @@ class Moving:
                 continue
             vertices, faces = (vertex, ends[0] - vertex), (face, ends[1] - face)
             mirrored = transforms.flips_handedness(shapes.placement(shape))
-            whole = not isinstance(shape, Mesh) or len(shape.faces) == faces[1]
+            whole = shape.faces is None or len(shape.faces) == faces[1]
             backwards.append(_Ranges(row, shape, vertices, faces, mirrored, whole))
             ends = vertex, face
         return backwards[::-1]
@@ -186,7 +186,7 @@ class Moving:
             matrix = shapes.placement(new) @ ranges.in_group
             if transforms.flips_handedness(matrix) != ranges.mirrored:
                 raise CannotMove(f"the transform of {name} mirrors it")
-        elif isinstance(new, Instance):
+        elif new.group is not None:
             raise CannotMove(f"{name} is copied, not shared, and its transform is on the device")
         if fields.get("vertices") is not before.get("vertices"):
             if not ranges.whole:
@@ -199,7 +199,7 @@ class Moving:
 
     def _plan_analytic(self, ranges: _Ranges, new: Shape) -> list[Action]:
         """Return the actions that move an analytic shape. Raises CannotMove if its kind changes."""
-        shape = ranges.shape if isinstance(new, Instance) else new
+        shape = new if new.group is None else ranges.shape
         matrix = shapes.placement(new) @ ranges.in_group
         in_world = dataclasses.replace(shape, to_world=matrix)
         if not keeps_its_kind(in_world):
@@ -275,7 +275,7 @@ class Moving:
         on the device.
         """
         target = self.target
-        if not isinstance(new, Instance):
+        if new.group is None:
             ranges.shape = new
         table, (first, count) = target.tables["vertices"], ranges.vertices
         still = device_matrix is None and np.array_equal(matrix, transforms.IDENTITY)
@@ -401,9 +401,9 @@ class Move(Plan):
         self.moving.fit_trees()
 
 
-def _check_fields(old: Shape, new: object) -> None:
+def _check_fields(old: Shape, new: Shape) -> None:
     """Raise CannotMove if fields differ between two shapes that no move can change."""
-    if not isinstance(new, Shape) or type(old) is not type(new):
+    if type(old) is not type(new):
         raise CannotMove(f"{_name(old)} becomes something else")
     before = fields_of(old)
     changed = {name for name, value in fields_of(new).items() if value is not before[name]}

@@ -20,7 +20,7 @@ from clpt.render.materials.encode import gloss_word
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
-from clpt.scene.materials import CLEAR, COMPOSITES, Material
+from clpt.scene.materials import Material
 from clpt.scene.params import fields_of
 
 
@@ -53,7 +53,7 @@ class Patch(Plan):
 
 
 def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Patch | str:
-    """Return the words by which a scene differs from a former scene.
+    """Return the words that change from a former scene to a scene.
 
     The scenes may differ in the camera, of the same kind, and in values of materials. Else the
     function returns the difference as a text. Raises SceneError as `lower` does.
@@ -103,7 +103,7 @@ def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
         if not _pair(old.material, new.material, pairs):
             return None
     changed = [(old, new) for old, new in pairs.values() if old is not new]
-    return [(old, new) for old, new in changed if not isinstance(old, COMPOSITES)]
+    return [(old, new) for old, new in changed if not old.is_composite]
 
 
 def _pair(old: Material, new: Material, pairs: Replacements) -> bool:
@@ -111,20 +111,16 @@ def _pair(old: Material, new: Material, pairs: Replacements) -> bool:
     if id(old) in pairs:
         return pairs[id(old)][1] is new
     pairs[id(old)] = old, new
-    if old is new and not isinstance(old, COMPOSITES):
+    if old is new and not old.is_composite:
         return True
     if type(old) is not type(new):
         return False
-    if not isinstance(old, COMPOSITES):
-        absorb = [material.absorption != CLEAR for material in (old, new)]
-        traits = [(material.transmits, material.uses_tangents) for material in (old, new)]
-        return absorb[0] == absorb[1] and traits[0] == traits[1]
-    others = fields_of(new)
-    for name, a in fields_of(old).items():
-        b = others[name]
-        if isinstance(a, Material) and isinstance(b, Material):
-            if not _pair(a, b, pairs):
-                return False
-        elif a is not b and name != "name":
-            return False
-    return True
+    if not old.is_composite:
+        traits = [(m.absorbs_inside, m.transmits, m.uses_tangents) for m in (old, new)]
+        return traits[0] == traits[1]
+    parts, others = old.shared_parts, fields_of(new)
+    if parts.keys() != new.shared_parts.keys():
+        return False
+    free = parts.keys() | {"name"}
+    same = all(a is others[name] for name, a in fields_of(old).items() if name not in free)
+    return same and all(_pair(part, others[name], pairs) for name, part in parts.items())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import operator
 from collections.abc import Mapping
 from typing import Any, TypeAlias
 from weakref import WeakKeyDictionary
@@ -17,8 +18,8 @@ from clpt.geometry.instancing import distinct
 from clpt.render.records.device_arrays import fresh_view, readable
 from clpt.scalars import is_whole
 from clpt.scene import Scene
-from clpt.scene.materials import Material, inner, parts
-from clpt.scene.shapes import SMOOTH, Group, Instance, Shape
+from clpt.scene.materials import Material, parts
+from clpt.scene.shapes import SMOOTH, Shape
 
 ShapeKey: TypeAlias = Shape | str | int
 MaterialKey: TypeAlias = Material | ShapeKey
@@ -73,8 +74,8 @@ def edit_scene(
         edit.change(edit.shape(key, "transforms"), "to_world", new)
     for key, points in (vertices or {}).items():
         shape = edit.shape(key, "vertices")
-        field = next((name for name in ("vertices", "centers") if hasattr(shape, name)), None)
-        if field is None:
+        field = shape.deformed_field
+        if field not in ("vertices", "centers"):
             raise SceneError(f"a {shape.kind} has none", where=f"vertices[{key!r}]")
         new = fresh_view(points) if on_device(points) else np.asarray(points).view()
         edit.change(shape, field, new)
@@ -97,12 +98,12 @@ def match_replacements(former: Scene, scene: Scene) -> Replacements:
 
 
 def resolve_device_arrays(scene: Scene, queue: cl.CommandQueue) -> Scene:
-    """Return a scene for lowering, in which arrays of the queue replace buffers on the device.
+    """Return a scene for lowering: arrays of the queue replace buffers on the device.
 
     Raises SceneError for memory of another context, or a buffer of the wrong size.
     """
     edit = _Edit(scene, Successors())
-    for shape in (s for s in edit.shapes.values() if isinstance(s, Shape)):
+    for shape in edit.shapes.values():
         for name, values in readable(shape, queue, shapes.where(shape)).items():
             edit.change(shape, name, values)
     return edit.edited_scene() if edit.changes else scene
@@ -167,24 +168,14 @@ class _Edit:
         return {key: (old, new) for key, (old, new) in self.edited.items() if old is not new}
 
     def _edited(self, part: Any) -> Any:
-        """Return an edited shape, group or material; itself if nothing changes."""
+        """Return an edited shape, group or material, or a tuple of them; itself if none changes."""
+        if isinstance(part, tuple):
+            members = tuple(map(self._edited, part))
+            return part if all(map(operator.is_, members, part)) else members
         if id(part) not in self.edited:
-            fields = self._fields(part)
+            changes = self.changes.get(id(part), {})
+            parts = {n: value for n, value in part.shared_parts.items() if n not in changes}
+            fields = {**changes, **{name: self._edited(value) for name, value in parts.items()}}
             fields = {n: value for n, value in fields.items() if value is not getattr(part, n)}
             self.replace(part, dataclasses.replace(part, **fields) if fields else part)
         return self.edited[id(part)][1]
-
-    def _fields(self, part: Any) -> dict[str, Any]:
-        """Return the fields of a shape, group or material that the edit may change."""
-        if isinstance(part, Material):
-            return {name: self._edited(value) for name, value in inner(part)}
-        if isinstance(part, Group):
-            members = tuple(self._edited(shape) for shape in part.shapes)
-            same = all(a is b for a, b in zip(members, part.shapes, strict=True))
-            return {"shapes": part.shapes if same else members}
-        fields = self.changes.get(id(part), {})
-        if isinstance(part, Instance):
-            return {**fields, "group": self._edited(part.group)}
-        if isinstance(part.material, Material) and "material" not in fields:
-            return {**fields, "material": self._edited(part.material)}
-        return fields

@@ -5,7 +5,7 @@ from __future__ import annotations
 from clpt.errors import SceneError
 from clpt.render.film import colour, filters
 from clpt.scene import Scene
-from clpt.scene.integrators import HAVE_LAYERS, Vcm
+from clpt.scene.integrators import HAVE_LAYERS
 from clpt.scene.layers import LAYERS
 
 LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/film/film.cl
@@ -40,7 +40,7 @@ def _check_layers(scene: Scene) -> None:
                 message = f"the camera {scene.camera.kind} has no axis for {name}{instead}"
                 raise SceneError(message, where="film.layers")
     lights = [name for name in film.layers if LAYERS[name].form == "light"]
-    if isinstance(how, Vcm) and how.merging and "light_groups" in lights:
+    if how.merging and "light_groups" in lights:
         message = "photons do not know their group: leave light_groups out, or vcm.merging"
         raise SceneError(message, where="film.layers")
     if lights and film.filtering == "splatting":

@@ -1,4 +1,7 @@
-"""Lowering: a scene as plain data becomes tables of words, features and settings."""
+"""Lowering: a scene as plain data becomes tables of words, features and settings.
+
+`_Tables` asks each subject in turn to append its words, and then for its features.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import spectra, transforms
+from clpt import transforms
 from clpt.files import budget
 from clpt.geometry import shape_records, shapes
 from clpt.geometry.instancing import Instances
@@ -17,22 +20,35 @@ from clpt.records import SHAPE_BITS
 from clpt.render.camera.encode import encode_camera
 from clpt.render.film import filters
 from clpt.render.film.colour import sensor
-from clpt.render.flow import features as needs
 from clpt.render.flow.find import Analysis, Before, analyse
 from clpt.render.flow.layer_names import lower_names
-from clpt.render.flow.settings import Found, settings_of
-from clpt.render.geometry.encode import encode_attributes, encode_geometry, shape_words
+from clpt.render.flow.remarks import warnings_of
+from clpt.render.flow.settings import settings_of
+from clpt.render.geometry.encode import (
+    encode_attributes,
+    encode_geometry,
+    geometry_features,
+    motion_features,
+    shape_words,
+)
 from clpt.render.geometry.find import Geometry, Owner, spheres_move
 from clpt.render.lights.encode import LightRows, has_tree, light_rows
-from clpt.render.lights.find import Sources
 from clpt.render.materials.encode import MaterialWords, gloss_word
 from clpt.render.materials.encoder import Encoder
 from clpt.render.media.bodies import BodyWords
-from clpt.render.media.encode import MediumWords, medium_aims
+from clpt.render.media.encode import MediumWords, media_features, medium_aims
 from clpt.render.media.grids import DeviceGrid
 from clpt.render.media.light_media import light_media_words
 from clpt.render.motion.encode import lower_motion
-from clpt.render.records import Features, GeometryFeatures, LayerFeatures, SpectraFeatures
+from clpt.render.records import (
+    CameraFeatures,
+    Features,
+    FilmFeatures,
+    FilterFeatures,
+    LayerFeatures,
+    SpectraFeatures,
+    TransportFeatures,
+)
 from clpt.render.records.device_arrays import is_table
 from clpt.render.records.film import LayerNames
 from clpt.render.records.lowering_cache import LoweringCache
@@ -40,20 +56,15 @@ from clpt.render.records.materials import row_words
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.find import Density, density, emissions
 from clpt.render.textures.image_files import ImageFiles
-from clpt.render.transport import photons
 from clpt.scene import Scene
 from clpt.scene import materials as mt
-from clpt.scene.cameras import CONNECTED
 from clpt.scene.fingerprint import named_files
-from clpt.scene.integrators import DEEPEST, Film, Integrator
-from clpt.scene.params import Kind, params
-from clpt.scene.roles import INDEX
-from clpt.scene.shapes import Mesh, Shape
+from clpt.scene.integrators import Integrator
+from clpt.scene.params import Kind
+from clpt.scene.shapes import Mesh
 
-TREE_FROM = 16  # lights from which a tree chooses among them, see bench/lights.py
-
-
-TANGENT_WORDS = 4
+TREE_FROM = 16  # the least number of lights for a light tree, see bench/lights.py
+INTEGRATORS = {"direct": "path", "vcm": "path"}  # kinds that use the kernels of another kind
 
 
 @dataclass(frozen=True)
@@ -61,15 +72,14 @@ class Lowered:
     """A scene ready for the device: data that nobody writes to, which several devices may share.
 
     vertices (n, 3) float32, faces (m, 3) uint32, tags (m,) uint32, boxes (k, 2, 3) float32 and
-    instances: what trees are built of, see `Geometry`. tables: every other read-only array by name;
-    where an instance's tree begins is filled in when trees are built. zero_copy: tables that are
-    the caller's buffers. owners: of each row of `shapes`. layer_names: what layers tell of.
-    glass_rows: of the camera, see `encode_camera`. integrator: of the scene, or what was chosen;
-    reason: why, "" where there was no choice; candidates: see `SceneIndex`; samples: of the
-    whole film, as the scene asks for. encoder: what made the tables, for values that are edited.
-    cache: what the next lowering need not make again. around: media at the camera, or the matter of
-    bodies. device_grids: densities whose bricks kernels put into `images`. files: what stands for
-    the files that images were read from.
+    instances: the input of trees, see `Geometry`. tables: every other read-only array by name; the
+    roots of instances' trees are filled in when trees are built. zero_copy: tables that are the
+    caller's buffers. owners: of each row of `shapes`. layer_names: names in the film's layers.
+    glass_rows: of the camera, see `encode_camera`. integrator: of the scene, or the choice; reason:
+    of the choice, "" without a choice; candidates: see `SceneIndex`; samples: of the whole film, as
+    the scene demands. encoder: of the tables, for edited values. cache: for the next lowering.
+    around: media at the camera, or the matter of bodies. device_grids: densities whose bricks
+    kernels put into `images`. files: identities of the files of images.
     """
 
     features: Features
@@ -96,14 +106,15 @@ class Lowered:
     files: ImageFiles = field(default_factory=ImageFiles)
 
     def __post_init__(self) -> None:
-        own = (self.vertices, self.faces, self.tags, self.boxes, self.settings)
-        for array in (*own, *self.tables.values(), self.instances.rows, self.instances.boxes):
+        geometry = (self.vertices, self.faces, self.tags, self.boxes)
+        instances = (self.instances.rows, self.instances.boxes)
+        for array in (*geometry, *instances, self.settings, *self.tables.values()):
             array.flags.writeable = False
 
     def table(self, name: str) -> np.ndarray:
         """A table by its name in clpt.records.TABLES."""
-        own = {"vertices": self.vertices, "faces": self.faces}
-        return own[name] if name in own else self.tables[name]
+        geometry = {"vertices": self.vertices, "faces": self.faces}
+        return geometry[name] if name in geometry else self.tables[name]
 
     @property
     def bytes(self) -> int:
@@ -120,9 +131,9 @@ def lower(
 ) -> Lowered:
     """Lower a scene.
 
-    texture_budget: [bytes] for images, None for any number. former: of a scene that has much in
-    common with this one: it saves time, and what is "auto" stays as chosen, unless it is chosen
-    anew. Arrays, lights and images that are the same objects as then are taken to hold the same.
+    texture_budget: [bytes] for images, None for no limit. former: of a similar scene, which saves
+    time; choices for "auto" stay, unless `anew`. Arrays, lights and images that are the same
+    objects as in the former scene are taken to hold the same values.
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material; and
     for an image whose file changes meanwhile, and where it takes more than the budget of its load
@@ -134,40 +145,33 @@ def lower(
         before = Before(former.integrator, former.features.transport.lit_ghosts)
     with budget.resumed(scene.account):
         files = ImageFiles.of(named_files(scene), former.files if former else ImageFiles())
-        made = encode(analyse(scene, cache, before), cache, texture_budget)
+        lowered = encode(analyse(scene, cache, before), cache, texture_budget)
         files.check()
-    return replace(made, files=files)
+    return replace(lowered, files=files)
 
 
-def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = None) -> Lowered:
-    """Return a scene's tables, features and settings; cache: what the analysis was made with.
+def encode(analysis: Analysis, cache: LoweringCache, texture_budget: int | None = None) -> Lowered:
+    """Return a scene's tables, features and settings; cache: of the analysis.
 
     texture_budget: as of `lower`. Raises SceneError for parameters that cannot be encoded.
     """
-    index, film = found.index, found.index.film
-    ends = film.lambda_min, film.lambda_max
-    wavelengths = density(index) if index.spectral else Density(*ends)
-    encoder = Encoder(index.mode, *ends, sensor(film), wavelengths, texture_budget, cache)
-    surfaces = _encode_surfaces(found, encoder)
-    rows = _encode_views(found, encoder, wavelengths, surfaces.geometry)
-    geometry, lights = surfaces.geometry, surfaces.lights
+    tables = _Tables(analysis, cache, texture_budget)
+    index, geometry, encoder = analysis.index, tables.geometry, tables.encoder
     warnings = (
-        *_warnings(index), *found.warnings, *sorted(encoder.warnings), *geometry.warnings,
+        *warnings_of(index), *analysis.warnings, *sorted(encoder.warnings), *geometry.warnings,
         *encoder.textures.finish(),
     )  # fmt: skip
-    motion_row = _lower_motion(found, lights, encoder)
-    names, layers = lower_names(index, geometry, lights, encoder.store, cache)
-    features = _features(found, encoder, surfaces, rows, motion_row, layers)
-    aims, around, disperses = (rows.aims, len(found.aims)), surfaces.around, features.dispersion
-    own = Found(rows.density, rows.ambient, aims, around, disperses, layers, encoder.second_uv)
-    settings = settings_of(index, geometry, lights, wavelengths, found.sphere, own)
+    motion_row = tables.append_motion()
+    names, layers = lower_names(index, geometry, tables.lights, encoder.store, cache)
+    features = tables.features(motion_row, layers)
+    settings = tables.settings(layers, features.dispersion)
     cache.settle()
-    tables = encoder.store.arrays()
-    encoder.textures.images.joined(tables["images"])
+    arrays = encoder.store.arrays()
+    encoder.textures.images.joined(arrays["images"])
     return Lowered(
         features=features,
         settings=settings,
-        tables=tables,
+        tables=arrays,
         vertices=geometry.vertices,
         faces=geometry.faces,
         tags=geometry.tags,
@@ -176,334 +180,211 @@ def encode(found: Analysis, cache: LoweringCache, texture_budget: int | None = N
         zero_copy=_zero_copy_tables(index, geometry),
         owners=geometry.owners,
         layer_names=names,
-        glass_rows=rows.glasses,
+        glass_rows=tables.glass_rows,
         warnings=warnings,
         integrator=index.integrator,
-        reason=found.reason,
+        reason=analysis.reason,
         candidates=index.candidates,
         samples=index.samples,
-        around=found.around,
+        around=analysis.around,
         encoder=encoder,
         cache=cache,
         device_grids=tuple(encoder.store.device_grids),
     )
 
 
-@dataclass(frozen=True)
-class _Surfaces:
-    """Shapes, their materials and media, and lights, whose words are in the tables.
+class _Tables:
+    """The tables of an analysed scene: each subject appends its words, in a fixed order.
 
-    near: how many lamps flights through media end at; around: what is at the camera, see `Found`.
+    near: number of lamps that flights through media aim at; around: words of the bodies and of the
+    medium at the camera. The others are indices of first words: profile: of the pixel filter for
+    light paths, 0 without; density: of the density of wavelengths; aims: of spheres that light
+    paths aim at; glass_rows: of the camera's glasses in `spectra`; ambient: 0 without.
     """
 
-    geometry: Geometry
-    materials: MaterialWords
-    lights: LightRows
-    near: int
-    around: tuple[int, int]
-
-
-def _encode_surfaces(found: Analysis, encoder: Encoder) -> _Surfaces:
-    """Append shapes, materials, media and lights."""
-    index = found.index
-    filters.encode_filter(index.film.filter, encoder.store, index.splatting)
-    materials = _begin_materials(found, encoder)
-    moves = spheres_move(index)
-    geometry = encode_geometry(found.geometry, encoder, materials, spheres_move=moves)
-    media = MediumWords(index, encoder, materials, found.sealed, found.sources.volumes)
-    lights = _lower_lights(index, encoder, geometry, found.sources, media)
-    near = _lower_medium_aims(index, encoder, lights)
-    around = _lower_bodies(found, geometry, encoder, materials, media)
-    return _Surfaces(geometry, materials, lights, near, around)
-
-
-@dataclass(frozen=True)
-class _Views:
-    """Where the words begin of what paths and pixels look up.
-
-    profile: of the filter, 0 for none; density: of wavelengths, if it is tabulated; aims: of light
-    paths; glasses: rows in `spectra` of the camera's; ambient: 0 for none.
-    """
-
-    profile: int
-    density: int
-    tabulated: bool
-    aims: int
-    glasses: tuple[int, ...]
-    ambient: int
-
-
-def _encode_views(
-    found: Analysis, encoder: Encoder, wavelengths: Density, geometry: Geometry
-) -> _Views:
-    """Append what the film, the camera and the integrator ask for, and the rows of shapes."""
-    index, store = found.index, encoder.store
-    profile = _lower_profile(index, encoder)
-    density_row, tabulated = _lower_density(index, encoder, wavelengths)
-    aims = store.append_floats("distributions", found.aims)
-    counts = geometry.single_count, geometry.keys
-    encode_attributes(geometry.owners, encoder.textures, encoder.cache, *counts)
-    store.append("shapes", shape_words(geometry.rows))
-    glasses = _encode_camera(index, encoder)
-    ambient = _lower_ambient(index, encoder)
-    return _Views(profile, density_row, tabulated, aims, glasses, ambient)
-
-
-def _features(
-    found: Analysis, encoder: Encoder, surfaces: _Surfaces, rows: _Views, motion: int,
-    layers: LayerFeatures,
-) -> Features:  # fmt: skip
-    """Return what the scene uses; motion: as of `_lower_motion`; layers: of the film."""
-    index = found.index
-    aims = len(found.aims) > 0
-    own = index.mode, encoder.spectra.samples, encoder.spectra.step, rows.tabulated
-    return Features(
-        camera=needs.of_camera(index),
-        film=needs.of_film(index, layers),
-        transport=needs.of_transport(index, rows.profile, aimed=bool(index.balanced) and aims),
-        lights=needs.of_lights(surfaces.lights, surfaces.materials.gloss_before),
-        media=needs.of_media(index, surfaces.materials, surfaces.near, found.sealed, escapes=aims),
-        motion=needs.of_motion(index, surfaces.geometry, motion),
-        geometry=_geometry_features(index, encoder, surfaces),
-        textures=needs.of_textures(encoder),
-        spectra=SpectraFeatures(*own),
-        materials=needs.of_materials(index, encoder, surfaces.materials),
-    )
-
-
-def _geometry_features(
-    index: SceneIndex, encoder: Encoder, surfaces: _Surfaces
-) -> GeometryFeatures:
-    """Return what the scene has of geometry; append its tangents, if materials ask for them."""
-    textures = needs.of_textures(encoder)
-    made = needs.of_geometry(index, surfaces.geometry, surfaces.materials, textures)
-    if made.tangents and surfaces.geometry.tangents:
-        made = replace(made, vertex_tangents=_lower_tangents(surfaces.geometry, encoder))
-    return made
-
-
-def _lower_motion(found: Analysis, lights: LightRows, encoder: Encoder) -> int:
-    """Append the table of what moves, if anything does; return where in `distributions` it is."""
-    index, rows = found.index, list(found.sources.order)
-    if not index.motions:
-        return 0
-    rows += [-1] * ((*lights.first, len(lights.rows))[0] - len(rows))  # bricks of media
-    return lower_motion(index.motions, len(index.listed), rows, encoder.store)
-
-
-def _lower_tangents(geometry: Geometry, encoder: Encoder) -> int:
-    """Append four words for each vertex; return where in `distributions` they are.
-
-    They are the tangents that shapes say, else zero. A row of zeros is before them, so that the
-    place is never 0.
-    """
-    words = np.zeros((1 + len(geometry.vertices), TANGENT_WORDS), np.float32)
-    for first, own in geometry.tangents:
-        words[1 + first : 1 + first + len(own)] = own
-    return encoder.store.append_floats("distributions", words) + TANGENT_WORDS
-
-
-def _lower_profile(index: SceneIndex, encoder: Encoder) -> int:
-    """Append the filter's values for light paths, if any; return their place in `distributions`."""
-    if not index.weighed:
-        return 0
-    return filters.encode_profile(index.film.filter, encoder.store, index.splatting)
-
-
-def _lower_density(index: SceneIndex, encoder: Encoder, wavelengths: Density) -> tuple[int, bool]:
-    """Append wavelengths' density if it is tabulated.
-
-    Return where in `distributions` it would begin, and whether it is there.
-    """
-    density_row = encoder.store.size("distributions")
-    tabulated = index.spectral and wavelengths.values is not None
-    if tabulated:
-        encoder.store.append_floats("distributions", wavelengths.words())
-    return density_row, tabulated
-
-
-def _begin_materials(found: Analysis, encoder: Encoder) -> MaterialWords:
-    """Append what idle lanes read as a material, and make the maker of material words."""
-    index = found.index
-    if index.shifts:
-        encoder.spectra.expect_light(emissions(index))
-    leaves: tuple[type[Kind], ...] = (*mt.LEAVES, *index.leaves)
-    longest = max(map(row_words, leaves))
-    encoder.store.append("materials", np.zeros(longest, np.uint32))
-    tells = index.normal_mapped, _asks_gloss(found)
-    return MaterialWords(encoder, index.leaves, *tells)
-
-
-def _asks_gloss(found: Analysis) -> bool:
-    """Whether the tree over lights asks for the gloss of materials."""
-    index = found.index
-    tree = not index.light_paths and has_tree(found.sources.every, TREE_FROM)
-    leaves = (leaf for shape in index.shapes for leaf in mt.parts(shape.material))
-    return tree and any(gloss_word(leaf) for leaf in leaves)
-
-
-def _lower_medium_aims(index: SceneIndex, encoder: Encoder, lights: LightRows) -> int:
-    """Append the lamps near which flights through media end; return how many."""
-    homogeneous = (medium for medium in index.media if medium.lattice is None)
-    near = medium_aims(lights) if any(medium.scatters for medium in homogeneous) else ()
-    encoder.store.append("media", np.array(near, np.float32).view(np.uint32))
-    return len(near)
-
-
-def _lower_bodies(
-    found: Analysis,
-    geometry: Geometry,
-    encoder: Encoder,
-    materials: MaterialWords,
-    media: MediumWords,
-) -> tuple[int, int]:
-    """Append what is around lights, and on both sides of shapes; return that at the camera.
-
-    Kernels find the sides of shapes behind the media of lights: all are parts of one table.
-    """
-    index, bounding = found.index, [shape for _, shape, _, _ in geometry.owners]
-    bodies = BodyWords(index.shapes) if index.nested else None
-    if bodies is not None:
-        sides = bodies.rows(bounding, encoder, materials, media)
-    else:
-        sides = media.of_shapes(bounding)
-    if index.has_media and (index.balanced or index.light_paths or index.guided):
-        words = light_media_words(found.light_media, media, bodies)
-        encoder.store.append("media", words)
-    encoder.store.append("media", sides)
-    if bodies is not None:
-        return bodies.around(found.around, media)
-    return 0, media.word(next(iter(found.around), None))
-
-
-def _lower_lights(
-    index: SceneIndex,
-    encoder: Encoder,
-    geometry: Geometry,
-    sources: Sources,
-    media: MediumWords,
-) -> LightRows:
-    """Append the rows of `lights`, and note in the rows of shapes which lights they are."""
-    tree_from = None if index.light_paths else TREE_FROM
-    for medium in index.emitting:
-        media.word(medium)
-    emitters = geometry.emitters
-    lights = light_rows(index.lights, emitters, encoder, sources, tree_from, media.lights)
-    encoder.store.append("lights", lights.rows.view(np.uint32))
-    if lights.tree is not None:
-        encoder.store.append("lights", lights.tree)
-    for emitter, first, whole in zip(geometry.emitters, lights.first, lights.whole, strict=True):
-        row = geometry.rows[emitter.shape_row]
-        row["light"] = first
-        row["flags"] |= SHAPE_BITS["one_light"] if whole else 0
-    return lights
-
-
-def _encode_camera(index: SceneIndex, encoder: Encoder) -> tuple[int, ...]:
-    """Append the camera; return the rows in `spectra` of its glasses that disperse."""
-    camera, film = index.camera, index.film
-    glasses = camera.dispersive_glasses
-    rows = tuple(encoder.spectra.row(glass) for glass in glasses) if index.spectral else ()
-    words = encode_camera(camera, film.width, film.height, rows)
-    encoder.store.append_floats("camera", words)
-    return rows
-
-
-def _lower_ambient(index: SceneIndex, encoder: Encoder) -> int:
-    """Append the ambient light of an integrator; return its first word, 0 if there is none."""
-    ambient = index.integrator.ambient
-    if ambient is None:
-        return 0
-    return encoder.store.append("light_params", encoder.emission_words(ambient))
-
-
-def _warnings(index: SceneIndex) -> list[str]:
-    """Return warnings of parts of the scene that are not rendered as it says."""
-    film, integrator = index.film, index.integrator
-    warnings = list(index.warnings)
-    if index.mode == "rgb" and index.camera.dispersive_glasses:
-        warnings.append(f"{index.camera.kind}.glass: in RGB mode all wavelengths have one focus")
-    if index.mode == "rgb" and any(map(_disperses, index.shapes)):
-        warnings.append("in rgb mode glass does not disperse: ask for the spectral mode")
-    if index.motions:
-        warnings += _of_motion(index)
-    if integrator.light_paths:
-        warnings += _left_to_the_camera(index)
-    if integrator.guiding and not index.lights_reach:
-        warnings.append(f"{integrator.kind}.guiding: left aside, as {index.lit_media}")
-    depth, most = integrator.max_depth, photons.DEEPEST if index.merged else DEEPEST
-    if depth > most:
-        warnings.append(f"integrator.max_depth: {depth} counts as {most}, the longest path")
-    if index.spectral and not film.bands and not _sees(film):
-        warnings.append(
-            f"film.sensor sees nothing from {film.lambda_min:g} to {film.lambda_max:g} nm, so the"
-            " picture is black; ask for film.bands"
+    def __init__(self, analysis: Analysis, cache: LoweringCache, texture_budget: int | None):
+        self.analysis, self.index = analysis, analysis.index
+        film = self.index.film
+        ends = film.lambda_min, film.lambda_max
+        self.wavelengths = density(self.index) if self.index.spectral else Density(*ends)
+        self.encoder = Encoder(
+            self.index.mode, *ends, sensor(film), self.wavelengths, texture_budget, cache
         )
-    if not index.lights and next(emissions(index), None) is None:
-        warnings.append("no light in the scene, so the picture is black: add one to `lights`")
-    if film.mode == "rgb" and mt.Fluorescent in index.leaves:
-        warnings.append("in rgb mode fluorescent paint has its colour under D65, at most white")
-    if film.mode == "rgb" and any(medium.glows for medium in index.media):
-        warnings.append("in rgb mode dyes in media only absorb: ask for the spectral mode")
-    return warnings
+        self.store = self.encoder.store
+        filters.encode_filter(film.filter, self.store, self.index.splatting)
+        self.materials = self._begin_materials()
+        self.geometry = encode_geometry(
+            analysis.geometry, self.encoder, self.materials, spheres_move=spheres_move(self.index)
+        )
+        media = MediumWords(
+            self.index, self.encoder, self.materials, analysis.sealed, analysis.sources.volumes
+        )
+        self.lights = self._append_lights(media)
+        self.near = self._append_medium_aims()
+        self.around = self._append_bodies(media)
+        self.profile = self._append_profile()
+        self.density = self.store.size("distributions")
+        self.tabulated = self._append_density()
+        self.aims = self.store.append_floats("distributions", analysis.aims)
+        counts = self.geometry.single_count, self.geometry.keys
+        encode_attributes(self.geometry.owners, self.encoder.textures, cache, *counts)
+        self.store.append("shapes", shape_words(self.geometry.rows))
+        self.glass_rows = self._append_camera()
+        self.ambient = self._append_ambient()
 
+    def features(self, motion_row: int, layers: LayerFeatures) -> Features:
+        """Return the features of the scene; append tangents of meshes."""
+        index, analysis, camera = self.index, self.analysis, self.index.camera
+        aimed, spectra = len(analysis.aims) > 0, self.encoder.spectra
+        textures = self.encoder.textures.features()
+        return Features(
+            camera=CameraFeatures(
+                kind=camera.kind,
+                disperses=index.spectral and bool(camera.dispersive_glasses),
+                losses=camera.reflects,
+                ghosts=index.lit_ghosts or camera.has_ghosts,
+            ),
+            film=FilmFeatures(
+                filter=FilterFeatures(
+                    index.film.filter.kind, index.filter_taps, index.filter_reach
+                ),
+                layers=layers,
+                bands=bool(index.film.bands),
+                alpha=index.film.alpha,
+            ),
+            transport=self._transport_features(aimed=bool(index.balanced) and aimed),
+            lights=self.lights.features(self.materials.gloss_before),
+            media=media_features(index, self.materials, self.near, analysis.sealed, escapes=aimed),
+            motion=motion_features(index, self.geometry, motion_row),
+            geometry=geometry_features(index, self.geometry, self.materials, textures, self.store),
+            textures=textures,
+            spectra=SpectraFeatures(index.mode, spectra.samples, spectra.step, self.tabulated),
+            materials=self.materials.features(index),
+        )
 
-def _disperses(shape: Shape) -> bool:
-    """Whether a shape refracts wavelengths differently, in the spectral mode."""
-    return any(
-        param.role is INDEX and not isinstance(spectra.index(vars(part)[name]), spectra.Constant)
-        for part in mt.parts(shape.material)
-        if part.refracts
-        for name, param in params(type(part)).items()
-    )
+    def _transport_features(self, *, aimed: bool) -> TransportFeatures:
+        index = self.index
+        kind, weighed = index.integrator.kind, index.weighed > 0
+        return TransportFeatures(
+            integrator=INTEGRATORS.get(kind, kind),
+            sampler=index.sampler.kind,
+            light_paths=index.light_paths,
+            weighed=weighed,
+            joined=index.joined and (index.light_paths or weighed),
+            merged=index.merged,
+            guided=index.guided,
+            aimed=aimed,
+            lit_ghosts=index.lit_ghosts,
+            light_filter=(*index.spread, self.profile) if weighed else (0, 0, 0),
+        )
 
+    def settings(self, layers: LayerFeatures, disperses: bool) -> NDArray[np.void]:
+        """Return the record SETTINGS of the scene; disperses: whether wavelengths part."""
+        settings = settings_of(
+            self.index, self.geometry, self.lights, self.wavelengths, self.analysis.sphere,
+            layers, disperses,
+        )  # fmt: skip
+        settings["aims"], settings["aim_count"] = self.aims, len(self.analysis.aims)
+        settings["camera_bodies"], settings["camera_medium"] = self.around
+        settings["second_u"], settings["second_v"] = self.encoder.textures.second_uv
+        settings["ambient"], settings["density"] = self.ambient, self.density
+        return settings
 
-def _of_motion(index: SceneIndex) -> list[str]:
-    """Return warnings of grids of media that stay where a shape moves."""
-    warnings: list[str] = []
-    for i in index.motions.shapes:
-        shape = index.listed[i]
-        media = (medium for s in shape.members for medium in (s.interior, s.exterior))
-        if any(medium is not None and medium.lattice is not None for medium in media):
-            warnings.append(
-                f"{shapes.where(shape)}.motion: its boundary moves, the grid of its medium stays"
-            )
-    return warnings
+    def append_motion(self) -> int:
+        """Append the table of motions; return its index in `distributions`, 0 without motion."""
+        index, lights = self.index, self.lights
+        if not index.motions:
+            return 0
+        rows = list(self.analysis.sources.order)
+        rows += [-1] * ((*lights.first, len(lights.rows))[0] - len(rows))  # bricks of media
+        return lower_motion(index.motions, len(index.listed), rows, self.store)
 
-
-def _left_to_the_camera(index: SceneIndex) -> list[str]:
-    """Return warnings of light that only paths from the camera find, not light paths or photons."""
-    camera, integrator = index.camera, index.integrator
-    kind, warnings = integrator.kind, []
-    if integrator.light_tracing and not index.joined:
-        names = " and ".join(CONNECTED)
-        reason = f"a {camera.kind} camera cannot be joined to a point"
-        if camera.kind in CONNECTED:
-            reason = "its glass disperses"
-        name = "light_tracing" if kind == "vcm" else "light_paths"
-        warnings.append(f"{kind}.{name}: left aside, as {reason}; {names} can, without such glass")
-    if integrator.merging and not index.merged:
-        reason = f"a path needs {photons.FIRST + 1} surfaces"
-        if not index.lights_reach:
-            reason = index.lit_media
+    def _begin_materials(self) -> MaterialWords:
+        """Append a row of zeros, which idle lanes read as a material."""
+        index = self.index
         if index.shifts:
-            reason = "what fluoresces gives light other wavelengths"
-        warnings.append(f"{kind}.merging: left aside, as {reason}")
-    if not index.lights_reach:
-        warnings.append(f"{kind}.light_paths: left aside, as {index.lit_media}")
-    if index.balanced:
-        warnings += [
-            f"{kind}.light_paths: none start at lights[{i}], whose light does not fall with "
-            "distance"
-            for i, light in enumerate(index.lights)
-            if light.reach == "placed" and not light.falloff
-        ]
-    return warnings
+            self.encoder.spectra.expect_light(emissions(index))
+        leaves: tuple[type[Kind], ...] = (*mt.LEAVES, *index.leaves)
+        longest = max(map(row_words, leaves))
+        self.store.append("materials", np.zeros(longest, np.uint32))
+        return MaterialWords(self.encoder, index.leaves, index.normal_mapped, self._asks_gloss())
 
+    def _asks_gloss(self) -> bool:
+        """Whether the tree over lights asks for the gloss of materials."""
+        index = self.index
+        tree = not index.light_paths and has_tree(self.analysis.sources.every, TREE_FROM)
+        leaves = (leaf for shape in index.shapes for leaf in mt.parts(shape.material))
+        return tree and any(gloss_word(leaf) for leaf in leaves)
 
-def _sees(film: Film) -> bool:
-    """Whether a film's sensor responds to any of its wavelengths."""
-    return bool(sensor(film).sample(np.linspace(film.lambda_min, film.lambda_max, 2001)).any())
+    def _append_lights(self, media: MediumWords) -> LightRows:
+        """Append the rows of `lights`, and note in the rows of shapes which lights they are."""
+        index, emitters = self.index, self.geometry.emitters
+        tree_from = None if index.light_paths else TREE_FROM
+        for medium in index.emitting:
+            media.word(medium)
+        lights = light_rows(
+            index.lights, emitters, self.encoder, self.analysis.sources, tree_from, media.lights
+        )
+        self.store.append("lights", lights.rows.view(np.uint32))
+        if lights.tree is not None:
+            self.store.append("lights", lights.tree)
+        for emitter, first, whole in zip(emitters, lights.first, lights.whole, strict=True):
+            row = self.geometry.rows[emitter.shape_row]
+            row["light"] = first
+            row["flags"] |= SHAPE_BITS["one_light"] if whole else 0
+        return lights
+
+    def _append_medium_aims(self) -> int:
+        """Append the lamps that flights through media aim at; return how many."""
+        homogeneous = (medium for medium in self.index.media if medium.lattice is None)
+        near = medium_aims(self.lights) if any(medium.scatters for medium in homogeneous) else ()
+        self.store.append("media", np.array(near, np.float32).view(np.uint32))
+        return len(near)
+
+    def _append_bodies(self, media: MediumWords) -> tuple[int, int]:
+        """Append the media of lights and both sides of shapes; return `around`.
+
+        Kernels find the sides of shapes behind the media of lights, in the same table.
+        """
+        index, bounding = self.index, [shape for _, shape, _, _ in self.geometry.owners]
+        bodies = BodyWords(index.shapes) if index.nested else None
+        if bodies is not None:
+            sides = bodies.rows(bounding, self.encoder, self.materials, media)
+        else:
+            sides = media.of_shapes(bounding)
+        if index.has_media and (index.balanced or index.light_paths or index.guided):
+            words = light_media_words(self.analysis.light_media, media, bodies)
+            self.store.append("media", words)
+        self.store.append("media", sides)
+        if bodies is not None:
+            return bodies.around(self.analysis.around, media)
+        return 0, media.word(next(iter(self.analysis.around), None))
+
+    def _append_profile(self) -> int:
+        if not self.index.weighed:
+            return 0
+        return filters.encode_profile(self.index.film.filter, self.store, self.index.splatting)
+
+    def _append_density(self) -> bool:
+        """Append the density of wavelengths if it is tabulated; return whether it is."""
+        if not self.index.spectral or self.wavelengths.values is None:
+            return False
+        self.store.append_floats("distributions", self.wavelengths.words())
+        return True
+
+    def _append_camera(self) -> tuple[int, ...]:
+        """Append the camera; return the rows in `spectra` of its glasses that disperse."""
+        camera, film = self.index.camera, self.index.film
+        glasses = camera.dispersive_glasses if self.index.spectral else ()
+        rows = tuple(self.encoder.spectra.row(glass) for glass in glasses)
+        self.store.append_floats("camera", encode_camera(camera, film.width, film.height, rows))
+        return rows
+
+    def _append_ambient(self) -> int:
+        ambient = self.index.integrator.ambient
+        if ambient is None:
+            return 0
+        return self.store.append("light_params", self.encoder.emission_words(ambient))
 
 
 def _zero_copy_tables(index: SceneIndex, geometry: Geometry) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,49 +23,31 @@ ORDINARY_SIZE = 10  # exponent of 2 of the radius of a scene [m], up and down
 MOST_SAMPLE_BITS = 16  # of a zsobol pixel's part of its sequence
 
 
-@dataclass(frozen=True)
-class Found:
-    """Findings of earlier steps of lowering that the settings need.
-
-    density_row: where the table of the density of wavelengths begins in `distributions`;
-    ambient_row: where the ambient light is in `light_params`; aims: the first of the spheres at
-    which light paths aim, and their number; around: words of the bodies and of the medium at the
-    camera; disperses: whether directions depend on wavelengths; layers: beside the picture;
-    second_uv: numbers of the attributes that a mesh's second set of uv are, -1 for none.
-    """
-
-    density_row: int
-    ambient_row: int
-    aims: tuple[int, int]
-    around: tuple[int, int]
-    disperses: bool
-    layers: LayerFeatures
-    second_uv: tuple[int, int]
-
-
 def settings_of(
     index: SceneIndex,
     geometry: Geometry,
     lights: LightRows,
     density: Density,
     sphere: tuple[NDArray[np.float64], float],
-    found: Found,
+    layers: LayerFeatures,
+    disperses: bool,
 ) -> NDArray[np.void]:
-    """Return the record SETTINGS of a scene; the wavefront adds what depends on the device.
+    """Return the record SETTINGS of a scene, without indices of tables.
 
-    density: of wavelengths; sphere: centre and radius of one around the scene [m].
+    The wavefront adds settings of the device. density: of wavelengths; sphere: centre and radius of
+    a sphere around the scene [m]; layers: of the film; disperses: whether directions depend on
+    wavelengths.
     """
     settings = np.zeros((), SETTINGS.dtype)
     _set_film(settings, index)
     _set_paths(settings, index)
     if index.merged:
-        _set_photons(settings, index, geometry, sphere[1], found.disperses)
+        _set_photons(settings, index, geometry, sphere[1], disperses)
     if index.guided:
         paths = settings["guide_paths"] = index.integrator.guide_paths or guides.PATHS
         settings["photon_cells"], side = guides.cells_for(paths)
         settings["guide_side"] = side * sphere[1]
     settings["mis_area_unit"] = mis_area_unit(sphere[1])
-    _set_places(settings, found)
     settings["light_count"] = len(lights.rows)
     settings["infinite_count"] = lights.infinite
     settings["first_analytic"] = geometry.first_analytic
@@ -79,16 +60,8 @@ def settings_of(
     scale = settings["film_scale"] = film_scale(film, light_level(index, lights, sphere))
     settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
     settings["center"], settings["scene_radius"] = sphere
-    _set_layers(settings, found.layers)
+    _set_layers(settings, layers)
     return settings
-
-
-def _set_places(settings: NDArray[np.void], found: Found) -> None:
-    """Write where tables have what earlier steps found."""
-    settings["aims"], settings["aim_count"] = found.aims
-    settings["camera_bodies"], settings["camera_medium"] = found.around
-    settings["second_u"], settings["second_v"] = found.second_uv
-    settings["ambient"], settings["density"] = found.ambient_row, found.density_row
 
 
 def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
@@ -107,7 +80,7 @@ def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
 
 
 def _set_paths(settings: NDArray[np.void], index: SceneIndex) -> None:
-    """Write what the sampler and the integrator say of paths."""
+    """Write the settings of the sampler and the integrator."""
     integrator = index.integrator
     settings["seed"] = index.seed
     settings["sample_bits"] = min((max(index.spp, 1) - 1).bit_length(), MOST_SAMPLE_BITS)
@@ -119,7 +92,7 @@ def _set_paths(settings: NDArray[np.void], index: SceneIndex) -> None:
 
 
 def _set_layers(settings: NDArray[np.void], layers: LayerFeatures) -> None:
-    """Set where the layers beside the picture stand."""
+    """Write the words and indices of the film's layers."""
     for name, place in layers.places.items():
         settings[f"layer_{name}"] = place
     settings["layer_denoising"], settings["layer_words"] = layers.first_for_denoisers, layers.words
@@ -134,7 +107,7 @@ def _set_layers(settings: NDArray[np.void], layers: LayerFeatures) -> None:
 def mis_area_unit(scene_radius: float) -> float:
     """Return the unit of areas in MIS ratios of light paths [m^2], a power of two.
 
-    1 for scenes of ordinary size; of larger and smaller ones, what brings their size to these.
+    It is 1 for scenes of ordinary size, and scales larger and smaller scenes to ordinary size.
     """
     exponent = math.frexp(scene_radius)[1]
     beyond = exponent - min(max(exponent, -ORDINARY_SIZE), ORDINARY_SIZE)
@@ -148,7 +121,7 @@ def _set_photons(
     scene_radius: float,
     disperses: bool,
 ) -> None:
-    """Write what merging needs; the wavefront adds how many light paths leave photons."""
+    """Write the settings of photons; the wavefront adds the number of their light paths."""
     integrator, film = index.integrator, index.film
     assert isinstance(integrator, Vcm)
     settings["max_depth"] = min(int(settings["max_depth"]), photons.DEEPEST)

@@ -3,7 +3,7 @@
 The table `attributes` begins with a directory of zeros, which shapes without attributes use. A mesh
 has its own directory: for each (name, role, channel) that textures read, the word where its values
 would begin for vertex or face 0 of the scene, and the number of words of a value. A colour takes
-four words, as a texel does, a number one word.
+four words, as a texel does, a number a single word.
 """
 
 from __future__ import annotations
@@ -20,11 +20,14 @@ from clpt.arrays import Floats32
 from clpt.geometry import analytic, shape_records, shapes, strands, triangles
 from clpt.geometry.triangles import per_face
 from clpt.records import SHAPE, SHAPE_BITS
-from clpt.render.geometry.find import Geometry, Owner, Stored
+from clpt.render.geometry.find import Geometry, Owner, Stored, spheres_move
 from clpt.render.materials.encode import MaterialWords
 from clpt.render.materials.encoder import Encoder
+from clpt.render.records import GeometryFeatures, MotionFeatures
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.records.tables import TableStore
+from clpt.render.records.textures import TextureFeatures
+from clpt.render.scene_index import SceneIndex
 from clpt.render.textures.encode import TextureTable
 from clpt.render.textures.texels import texels
 from clpt.scene.roles import REAL, Role
@@ -32,6 +35,8 @@ from clpt.scene.shapes import Shape
 from clpt.scene.textures import attributes_in
 
 COLOUR_WORDS = 4
+TANGENT_WORDS = 4
+FEW_INSTANCES = 2  # with deforming instances rays visit at most so many without a tree
 
 
 def encode_geometry(
@@ -146,3 +151,61 @@ def _attribute_words(
             values[:, "rgb".index(channel), None] if channel else spectra.luminance(values)[:, None]
         )
     return texels(values[:, None].astype(np.float32), role, spectral).view(np.uint32)
+
+
+def motion_features(index: SceneIndex, geometry: Geometry, row: int) -> MotionFeatures:
+    """Return the features of motion while the shutter is open.
+
+    row: the first number of the table of motions in `distributions`.
+    """
+    motions = index.motions
+    analytic = {p.number for p in index.placed if p.shape.kind in shape_records.ANALYTIC}
+    placed = {int(number) for prototype in index.prototypes for number in prototype.numbers}
+    lit = {int(geometry.rows[emitter.shape_row]["number"]) for emitter in geometry.emitters}
+    numbers = motions.shapes.keys()
+    features = MotionFeatures(
+        camera=motions.camera is not None,
+        instances=bool(placed & numbers),
+        shapes=bool(analytic & numbers),
+        lights=bool(motions.lamps) or bool(lit & numbers),
+        vertices=geometry.keyed,
+        spheres=spheres_move(index),
+        emitters=any(emitter.keys > 1 for emitter in geometry.emitters),
+        scales=motions.scales,
+    )
+    return replace(features, row=row) if features.present else features
+
+
+def geometry_features(
+    index: SceneIndex,
+    geometry: Geometry,
+    materials: MaterialWords,
+    textures: TextureFeatures,
+    store: TableStore,
+) -> GeometryFeatures:
+    """Return the features of a scene's shapes; append their own tangents if materials use them."""
+    tangents = materials.tangents or index.normal_mapped or textures.mips
+    instances = bool(index.prototypes)
+    count = len(geometry.instances.rows)
+    return GeometryFeatures(
+        analytic=tuple(kind for kind in shape_records.ANALYTIC if kind in geometry.analytic),
+        instances=instances,
+        only_instances=instances and not geometry.world_vertices,
+        few_instances=count if geometry.keyed and count <= FEW_INSTANCES else 0,
+        normals=geometry.normals,
+        uvs=materials.uvs or geometry.uvs or tangents or "uv" in index.layers,
+        tangents=tangents,
+        vertex_tangents=_store_tangents(geometry, store) if tangents and geometry.tangents else 0,
+    )
+
+
+def _store_tangents(geometry: Geometry, store: TableStore) -> int:
+    """Append four words for each vertex; return the index of the first in `distributions`.
+
+    The words are tangents of meshes, else zeros. A row of zeros comes first, so that the index is
+    never 0.
+    """
+    words = np.zeros((1 + len(geometry.vertices), TANGENT_WORDS), np.float32)
+    for first, tangents in geometry.tangents:
+        words[1 + first : 1 + first + len(tangents)] = tangents
+    return store.append_floats("distributions", words) + TANGENT_WORDS

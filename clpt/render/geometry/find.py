@@ -103,8 +103,13 @@ class Geometry:
     warnings: tuple[str, ...]
     keys: Mapping[int, int] = field(default_factory=dict)
 
+    @property
+    def keyed(self) -> bool:
+        """Whether vertices have a row for each of several keys."""
+        return any(count > 1 for count in self.keys.values())
+
     def bounding_sphere(self) -> tuple[NDArray[np.float64], float]:
-        """Return centre and radius of a sphere around the scene; a unit one if it is empty.
+        """Return centre and radius of a sphere around the scene; the unit sphere if it is empty.
 
         Raises SceneError for a scene whose size is beyond float32.
         """

@@ -4,7 +4,7 @@ A ray knows its medium from the boundaries that it crosses. If it passes through
 is undefined: paths from the camera and paths from lights may assume different media, and their
 pictures differ.
 
-The edges of a hole have a triangle on only one side, or triangles of opposite winding. Its size is
+The edges of a hole have a triangle on a single side, or triangles of opposite winding. Its size is
 the area that its edges enclose, so a vertex on the edge of another triangle makes no hole.
 """
 
@@ -23,8 +23,7 @@ from clpt.render.geometry.surroundings import every
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import materials as mt
-from clpt.scene.materials import CLEAR
-from clpt.scene.shapes import Cylinder, Disk, Mesh, Shape
+from clpt.scene.shapes import Cylinder, Disk, Shape
 
 HOLE = 1e-4  # of a mesh's area: smaller holes are ignored
 ROUND = Disk, Cylinder
@@ -32,9 +31,9 @@ ROUND = Disk, Cylinder
 
 def warnings_of(index: SceneIndex, cached: LoweringCache | None = None) -> list[str]:
     """Return a warning if meshes with an inside are not closed, else an empty list."""
-    suspects: list[tuple[Any, Mesh]] = []
+    suspects: list[tuple[Any, Shape]] = []
     for shape in index.shapes:
-        if isinstance(shape, Mesh) and not on_device(shape.vertices):
+        if shape.vertices is not None and not on_device(shape.vertices):
             for inside in _insides(shape):
                 known = any(inside == other for other, _ in suspects)
                 if not known and _largest_hole(shape, cached) > HOLE:
@@ -59,9 +58,7 @@ def _insides(shape: Shape) -> Iterator[Any]:
         yield shape.interior
         return
     for part in mt.parts(shape.material):
-        thin = isinstance(part, mt.GltfSurface) and part.thin
-        thin |= isinstance(part, mt.Openpbr) and part.thin_walled
-        if part.absorption != CLEAR and not thin:
+        if part.absorbs_inside and not part.is_sheet:
             yield part.absorption
 
 
@@ -88,7 +85,7 @@ def hole_around(index: SceneIndex, inside: object, cached: LoweringCache | None)
     faces: list[NDArray[Any]] = []
     first = 0
     for sign, shape in around:
-        if isinstance(shape, Mesh) and on_device(shape.vertices):
+        if on_device(shape.vertices):
             return 0.0
         vertices, triangles = triangles_of(shape, cached)
         points.append(np.asarray(vertices, np.float64))

@@ -1,4 +1,4 @@
-"""Spheres around specular shapes, at which light paths aim: kernels/lights/aiming.cl."""
+"""Spheres around specular shapes, the targets of light paths: kernels/lights/aiming.cl."""
 
 from __future__ import annotations
 
@@ -14,14 +14,13 @@ from clpt.geometry import shape_records
 from clpt.render.geometry.find import Geometry
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import materials as mt
-from clpt.scene.params import fields_of
 
 AIMED = 0.7  # share of the light paths that aim
 MOST = 32  # spheres
 SHARP = 0.2  # roughness alpha of microfacets below which a surface counts as specular
 LARGE = 0.5  # of the scene's radius: a single sphere that is larger is no aim
 CLUSTERS = 256  # most clusters into which specular pieces are cut
-CELLS = 16  # along each side of a grid, in which many pieces are merged cell by cell
+CELLS = 16  # along each side of a grid that merges many pieces cell by cell
 GAP = 0.05  # of the span of pieces along an axis: wider gaps are cut first
 SEVERAL = 1 << 12  # most pieces among which gaps are searched
 PRICE = 1e-3  # of a sphere, over the area of all: a cut that gains less is not made
@@ -57,28 +56,15 @@ def is_sharp(material: mt.Material, below: float = SHARP) -> bool:
     """Whether a material, or a part of it, is specular or nearly so.
 
     A coat over a diffuse base does not count, nor does a material that ends light paths. below:
-    the roughness alpha up to which a rough material counts.
+    the upper limit of the roughness alpha.
     """
-    if isinstance(material, mt.NormalMapped) or not material.reversible:
+    if not material.reversible:
         return False
-    if isinstance(material, mt.COMPOSITES):
-        return any(is_sharp(part, below) for _, part in mt.inner(material))
+    if material.is_composite:
+        return any(is_sharp(part, below) for part in material.shared_parts.values())
     if material.delta:
         return not material.is_null
-    return _roughness(material) < below
-
-
-def _roughness(material: mt.Material) -> float:
-    """Return the least alpha of a metal or a transmissive material, 1 of others and of images."""
-    if isinstance(material, (mt.RoughDielectric, mt.RoughConductor, mt.CoatedConductor)):
-        alphas = material.alpha_u, material.alpha_v
-        return min((v for v in alphas if isinstance(v, (int, float))), default=1.0)
-    values = fields_of(material)
-    shares = [values.get(name, 0.0) for name in ("metallic", "spec_trans", "transmission")]
-    roughness = values.get("roughness", 1.0)
-    if not isinstance(roughness, (int, float)) or all(share == 0.0 for share in shares):
-        return 1.0
-    return roughness**2
+    return material.least_alpha < below
 
 
 def sharp_pieces(
@@ -184,7 +170,7 @@ def _cut(columns: Floats) -> tuple[tuple[Floats, ...], bool]:
 
 
 def _fewer(pieces: Floats) -> Floats:
-    """Merge many pieces: a piece around those of each cell of a grid."""
+    """Merge many pieces: the result has a piece for each cell of a grid."""
     if len(pieces) <= CELLS**3:
         return pieces
     columns = _columns(pieces)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from clpt.render.materials.encoder import Encoder
 from clpt.render.records.lights import BODY, RECORDS
 from clpt.render.scene_index import SceneIndex, leaves_of
 from clpt.render.spectra.look import Look
-from clpt.scene.media import Grid, Lattice, Medium
+from clpt.scene.media import Grid, Medium
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, SdfGrid, Shape, Sphere
 from clpt.spectra import Spectrum
 from clpt.spectra.spectrum import gridded
@@ -35,7 +35,7 @@ Cached = Callable[..., Any] | None
 
 @dataclass(frozen=True)
 class BodyLight:
-    """A homogeneous medium as one light, see kernels/lights/kinds/emissive_body.cl.
+    """A homogeneous medium as a single light, see kernels/lights/kinds/emissive_body.cl.
 
     matrix (3, 4): axes and middle of the ball or box around it [m]; ball: False for a box; power
     [W/nm].
@@ -85,10 +85,11 @@ def volume_lights(index: SceneIndex, look: Look) -> dict[Medium, BrickLights | B
     """
     lights: dict[Medium, BrickLights | BodyLight] = {}
     for medium in index.emitting:
-        if isinstance(medium, Grid):
-            lights[medium] = _bricks(medium, look)
-        elif not isinstance(medium, Lattice) and (body := _body(medium, index, look)):
-            lights[medium] = body
+        if medium.lattice is None:
+            body = _body(medium, index, look)
+            lights |= {medium: body} if body else {}
+        elif medium.lattice.noise is None:
+            lights[medium] = _bricks(cast(Grid, medium), look)
     return lights
 
 
@@ -145,7 +146,7 @@ def _encloses(shape: Shape) -> bool:
     """Whether a boundary is at rest, may be closed, and lets shadow rays through."""
     if shape.motion is not None or shape.deformation is not None:
         return False
-    if isinstance(shape, Mesh) and on_device(shape.vertices):
+    if on_device(shape.vertices):
         return False
     return isinstance(shape, SOLID | WALLS) and any(
         leaf.is_null for leaf in leaves_of(shape.material)

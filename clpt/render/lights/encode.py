@@ -24,16 +24,20 @@ from clpt.render.lights.bricks import BrickLights
 from clpt.render.lights.encode_lamps import blank_row, lower_lamp
 from clpt.render.lights.find import Source, Sources, is_whole
 from clpt.render.materials.encoder import Encoder
-from clpt.render.records.lights import ALONG, BOTH, FRONT, KINDS, UNSEEN
+from clpt.render.records.lights import ALONG, BOTH, FRONT, KINDS, UNSEEN, LightFeatures
 from clpt.render.records.lowering_cache import content
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
-from clpt.scene.lights import Light, PoweredLamp
+from clpt.scene.lights import Light
 from clpt.scene.params import fields_of
 from clpt.scene.texture_values import mean
 
 PLACED_LIGHT_WEIGHT = 6  # rows of a light at a separate place, to decide on a light tree
 INFINITE_SHARE = 0.5  # of the choices, beside other lights
+
+FEW_LIGHTS = 256  # up to this number a single random number chooses a light and a point on it
+
+
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,19 @@ class LightRows:
     unseen: bool
     bounds: tuple[light_bounds.Bounds, ...]
     tree: NDArray[np.uint32] | None
+
+    def features(self, gloss: int = 0) -> LightFeatures:
+        """Return the features of these rows; gloss: see `LightFeatures`."""
+        return LightFeatures(
+            kinds=self.kinds,
+            infinite=self.infinite > 0,
+            visible=self.visible,
+            two_sided=self.two_sided,
+            unseen=self.unseen,
+            tree=self.tree is not None,
+            few=len(self.rows) <= FEW_LIGHTS,
+            gloss=gloss,
+        )
 
 
 def light_rows(
@@ -147,7 +164,7 @@ def _volume_rows(word: int, part: BrickLights | BodyLight, encoder: Encoder) -> 
 def _emitter_rows(emitter: Emitter, encoder: Encoder) -> np.ndarray:
     shape = emitter.shape
     emission = shape.emission
-    assert isinstance(emission, PoweredLamp)
+    assert emission is not None
     value = fields_of(emission)[emission.emission_name]
     radiance = encoder.store.append("light_params", encoder.emission_words(value))
     kind = "triangle"

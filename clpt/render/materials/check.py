@@ -7,7 +7,7 @@ import dataclasses
 from clpt.errors import SceneError
 from clpt.scene.indices import check_indices
 from clpt.scene.integrators import Film
-from clpt.scene.materials import Blend, BumpMap, Layer, Mask, Material, NormalMap, TwoSided, parts
+from clpt.scene.materials import Layer, Material, parts
 from clpt.scene.params import fields_of
 from clpt.scene.texture_values import is_texture
 from clpt.scene.textures import check_textures
@@ -31,7 +31,7 @@ def check_material(material: Material, film: Film) -> None:
 
 
 def _check_held(material: Material) -> None:
-    """Raise SceneError for a composite without one of its materials."""
+    """Raise SceneError for a composite that lacks a material."""
     values = fields_of(material)
     for field in dataclasses.fields(material):
         if field.type == "Material" and values[field.name] is None:
@@ -41,21 +41,18 @@ def _check_held(material: Material) -> None:
 def _check_sides(listed: list[Material]) -> None:
     """Raise SceneError for a part that transmits light beside a two_sided material."""
     passing = next((part for part in listed if part.transmits), None)
-    if passing is not None and any(isinstance(part, TwoSided) for part in listed):
+    if passing is not None and any(part.two_sided for part in listed):
         message = f"{passing.kind} lets light through, so it cannot be a part of two_sided"
         raise SceneError(f"{message}, or be mixed with it")
 
 
-def _check_maps(material: Material | None, outer: Maps, inside: bool) -> None:
+def _check_maps(material: Material, outer: Maps, inside: bool) -> None:
     """Raise SceneError for nested maps of the same kind, or maps inside and around a two_sided.
 
     outer: the kinds of the maps around, and whether each is inside of a two_sided material;
     inside: whether this material is.
     """
-    if isinstance(material, TwoSided):
-        for side in (material.front, material.back):
-            _check_maps(side, outer, True)
-    elif isinstance(material, (NormalMap, BumpMap)):
+    if material.perturbs_normals:
         kind = type(material)
         if any(other is kind for other, _ in outer):
             message = f"a {kind.kind} inside of a {kind.kind} is not supported"
@@ -63,12 +60,9 @@ def _check_maps(material: Material | None, outer: Maps, inside: bool) -> None:
         if any(before != inside for _, before in outer):
             message = "of normal_map and bump_map, one cannot stand inside and one around a "
             raise SceneError(f"{message}two_sided")
-        _check_maps(material.material, (*outer, (kind, inside)), inside)
-    elif isinstance(material, Mask):
-        _check_maps(material.material, outer, inside)
-    elif isinstance(material, Blend):
-        for part in (material.first, material.second):
-            _check_maps(part, outer, inside)
+        outer = (*outer, (kind, inside))
+    for part in material.shared_parts.values():
+        _check_maps(part, outer, inside or material.two_sided)
 
 
 def _check_layers(material: Material, layers: tuple[Layer, ...]) -> None:

@@ -16,17 +16,17 @@ import numpy as np
 from clpt.errors import SceneError
 from clpt.render.materials.encoder import Encoder
 from clpt.render.materials.normal_maps import NormalPerturbation
-from clpt.render.records.materials import MIXTURE, NORMAL_MAP_WORDS
-from clpt.render.scene_index import any_of
+from clpt.render.records.materials import MIXTURE, NORMAL_MAP_WORDS, MaterialFeatures
+from clpt.render.scene_index import SceneIndex
 from clpt.scene import materials as mt
 from clpt.scene import roles
 from clpt.scene.params import fields_of
-from clpt.scene.phases import Blend, Phase
+from clpt.scene.phases import Phase
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
 from clpt.spectra import RGB, RGBUnbounded, Spectrum
 
-_NULL, _BLACK = mt.Null(), mt.Diffuse(reflectance=0.0)
+_BLACK = mt.Diffuse(reflectance=0.0)
 
 STRAIGHT = 0.04  # reflectance of a dielectric at normal incidence
 TEXTURED = 0.2  # a typical albedo, for textures
@@ -55,6 +55,14 @@ class _Side:
         """A key that is equal for sides with the same shading."""
         return self.front, self.two_sided, self.inside, self.perturbation.key
 
+    def within(self, outer: Scatterer) -> _Side:
+        """Return the side for the material inside a two-sided material, or inside a map."""
+        perturbation = self.perturbation
+        if outer.perturbs_normals:
+            perturbation = perturbation.within(outer, self.inside)
+        inside = self.inside or outer.two_sided
+        return dataclasses.replace(self, inside=inside, perturbation=perturbation)
+
 
 class MaterialWords:
     """The words of materials, and what these materials need of the kernels.
@@ -82,48 +90,54 @@ class MaterialWords:
     def mixture_depth(self) -> int:
         return max(self._depths.values(), default=0)
 
+    def features(self, index: SceneIndex) -> MaterialFeatures:
+        """Return the features of a scene's materials, with the sources of all loaded values."""
+        return MaterialFeatures(
+            leaves=index.leaves,
+            transmitting=tuple(sorted(self.transmitting)),
+            shining=index.shining,
+            mixtures=self.mixture_depth,
+            normal_mapped=index.normal_mapped,
+            free_panes=index.free_panes,
+            sources=self._encoder.sources,
+        )
+
     def sides(self, shape: Shape) -> tuple[int, int, bool]:
         """Return the words of a shape's front and back, and whether it is two-sided."""
-        two_sided = any_of(shape.material, mt.TwoSided)
+        two_sided = any(part.two_sided for part in mt.parts(shape.material))
         front = self._word(shape.material, _Side(front=True, two_sided=two_sided))
         back = self._word(shape.material, _Side(front=False, two_sided=two_sided))
         return front, back, two_sided
 
     def phase(self, phase: Phase) -> int:
         """Return the word of a phase function; kernels find it like a material."""
-        if isinstance(phase, Blend):
-            children = [self.phase(part) for part in (phase.first, phase.second)]
-            return self._mixture_of(phase.weight, children)
-        self.transmitting.add(phase.kind)
-        return self._leaf(phase, _Side(front=True, two_sided=False))
+        for leaf in phase.leaves:
+            self.transmitting.add(leaf.kind)
+        return self._word(phase, _Side(front=True, two_sided=False))
 
     def null(self) -> int:
         """Return the word of a null surface."""
-        return self._leaf(_NULL, _Side(front=True, two_sided=False))
+        return self._leaf(mt.NO_SURFACE, _Side(front=True, two_sided=False))
 
-    def _word(self, material: mt.Material, side: _Side) -> int:
+    def _word(self, material: Scatterer, side: _Side) -> int:
         key = (id(material), side.key)
         if key not in self._words:
             self._words[key] = self._new_word(material, side)
         return self._words[key]
 
-    def _new_word(self, material: mt.Material, side: _Side) -> int:
-        if isinstance(material, mt.TwoSided):
-            chosen = material.front if side.front or material.back is None else material.back
-            return self._word(chosen, dataclasses.replace(side, inside=True))
-        if isinstance(material, (mt.NormalMap, mt.BumpMap)):
-            within = side.perturbation.within(material, side.inside)
-            return self._word(material.material, dataclasses.replace(side, perturbation=within))
-        if isinstance(material, mt.Mask):
-            return self._mixture(material.opacity, _NULL, material.material, side)
-        if isinstance(material, mt.Blend):
-            return self._mixture(material.weight, material.first, material.second, side)
-        one_sided = not side.inside and not isinstance(material, mt.Null)
+    def _new_word(self, scatterer: Scatterer, side: _Side) -> int:
+        inner = scatterer.shading(side.front)
+        if inner is not scatterer:
+            return self._word(inner, side.within(scatterer))
+        if scatterer.mixture is not None:
+            weight, *parts = scatterer.mixture
+            return self._mixture(weight, [self._word(part, side) for part in parts])
+        one_sided = not side.inside and not scatterer.is_null
         if side.two_sided and not side.front and one_sided:
-            material = _BLACK  # a part that is not two-sided has a black back there
-        if material.no_back and not side.front:
-            material = _NULL
-        return self._leaf(material, side)
+            scatterer = _BLACK  # a part that is not two-sided has a black back there
+        if scatterer.no_back and not side.front:
+            scatterer = mt.NO_SURFACE
+        return self._leaf(scatterer, side)
 
     def _leaf(self, material: Scatterer, side: _Side) -> int:
         before = side.perturbation.words(self._encoder, material) if self._normal_mapped else None
@@ -135,17 +149,12 @@ class MaterialWords:
             raise SceneError("the scene has more than 16 million words of material parameters")
         self.uvs |= material.has_textures
         self.tangents |= material.uses_tangents
-        if isinstance(material, mt.Material):
-            self.uvs |= any(layer.has_textures for layer in material.layers)
-            self.absorption |= material.absorption != mt.CLEAR
+        self.absorption |= material.absorbs_inside
         if material.transmits:
             self.transmitting.add(material.kind)
         return self._leaves.index(type(material)) << 24 | row
 
-    def _mixture(self, weight: object, first: mt.Material, second: mt.Material, side: _Side) -> int:
-        return self._mixture_of(weight, [self._word(part, side) for part in (first, second)])
-
-    def _mixture_of(self, weight: object, children: list[int]) -> int:
+    def _mixture(self, weight: object, children: list[int]) -> int:
         words, source = self._encoder.named_words("mixture", "weight", weight, roles.REAL)
         self.uvs |= source == "texture"
         word = MIXTURE << 24 | self._encoder.store.append("mixtures", [*words, *children])

@@ -68,11 +68,6 @@ class Encoder:
         return Look(self.spectra.spectral, *self.spectra.range, self.cache)
 
     @property
-    def second_uv(self) -> tuple[int, int]:
-        """See `TextureTable.second_uv`."""
-        return self.textures.second_uv
-
-    @property
     def sources(self) -> Sources:
         """The sources of the values of parameters: (kind, parameter, source).
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -30,11 +30,9 @@ class NormalPerturbation:
     bump: BumpMap | None = None
     inside: bool = False
 
-    def within(self, outer: Map, inside: bool) -> NormalPerturbation:
+    def within(self, outer: Any, inside: bool) -> NormalPerturbation:
         """Return this with another map, of the kind that is missing."""
-        if isinstance(outer, NormalMap):
-            return dataclasses.replace(self, normal=outer, inside=inside)
-        return dataclasses.replace(self, bump=outer, inside=inside)
+        return dataclasses.replace(self, inside=inside, **{outer.slot: outer})
 
     @property
     def key(self) -> tuple[int, int, bool]:

@@ -1,6 +1,6 @@
 """Bodies that may overlap: rules, numbers and rows of `media`, see kernels/media/bodies.cl.
 
-A body's matter is its priority, material and interior medium. Bodies of the same matter have one
+A body's matter is its priority, material and interior medium. Bodies of the same matter share a
 number, and join where they overlap.
 """
 
@@ -20,7 +20,7 @@ from clpt.scalars import is_whole
 from clpt.scene import roles
 from clpt.scene.materials import CLEAR, Material
 from clpt.scene.media import Medium
-from clpt.scene.shapes import Instance, Shape
+from clpt.scene.shapes import Shape
 
 MOST_NUMBERS = 255  # a path's word holds a number in a byte
 DEPTH = 4  # bodies at a point: bytes of that word
@@ -64,7 +64,7 @@ def _check_priority(shape: Shape) -> None:
     where, priority, material = shapes.where(shape), shape.priority, shape.material
     if not is_whole(priority) or priority < 0:
         raise SceneError(f"priority must be an integer from 0, not {priority!r}", where=where)
-    if priority and isinstance(shape, Instance):
+    if priority and shape.group is not None:
         raise SceneError("priority is for the shapes of its group", where=where)
     if priority and not (material.bounds_body or material.is_null):
         raise SceneError(

@@ -1,4 +1,4 @@
-"""Media as words: the word by which a path knows its medium, see kernels/media/medium.cl."""
+"""Media as words: a path stores the word of its medium, see kernels/media/medium.cl."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from clpt.render.lights.encode import LightRows
 from clpt.render.materials.encode import MaterialWords
 from clpt.render.materials.encoder import Encoder
 from clpt.render.media import grids
-from clpt.render.records import MOST_AIMS
+from clpt.render.records import MOST_AIMS, MediaFeatures
 from clpt.render.records.materials import SPECTRUM_WORDS
 from clpt.render.records.tables import as_words
 from clpt.render.scene_index import SceneIndex
@@ -239,3 +239,30 @@ class MediumWords:
         self._light_row += len(glow.numbers)
         self.lights.append((word, glow))
         return words
+
+
+def media_features(
+    index: SceneIndex,
+    materials: MaterialWords,
+    aims: int,
+    sealed: frozenset[Medium],
+    *,
+    escapes: bool,
+) -> MediaFeatures:
+    """Return the features of a scene's media.
+
+    aims: rows of `medium_aims`; sealed: media that rays to lights cannot leave; escapes: whether
+    other rays leave sealed media toward lamps.
+    """
+    return MediaFeatures(
+        absorption=materials.absorption,
+        present=index.has_media,
+        chromatic=any(medium.is_chromatic for medium in index.media),
+        emissive=bool(index.emitting),
+        dyed=index.dyed,
+        sealed=bool(sealed) and not (index.balanced or index.guided),
+        escapes=escapes and not index.balanced,
+        bodies=index.nested,
+        aims=aims,
+        grids=index.grids,
+    )

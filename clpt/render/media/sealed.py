@@ -21,7 +21,6 @@ from clpt.render.geometry.surroundings import bounds_media, every
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex, any_of, leaves_of
 from clpt.scene import materials as mt
-from clpt.scene.integrators import Path
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Shape
 from clpt.spectra import Constant
@@ -95,7 +94,7 @@ def escape_lamps(
 
 def _can_escape(index: SceneIndex, sealed: frozenset[Medium]) -> bool:
     """Return whether the integrator and the media of a scene allow escape rays."""
-    plain = isinstance(index.integrator, Path) and not index.weighed and not index.guided
+    plain = index.integrator.has_escape_rays and not index.weighed and not index.guided
     all_sealed = bool(sealed) and all(medium in sealed for medium in index.media)
     homogeneous = all(medium.lattice is None for medium in index.media)
     simple = not index.motions and not index.dyed and not index.shifts
@@ -110,7 +109,7 @@ def _refract_alike(shapes: list[Shape], sealed: frozenset[Medium]) -> bool:
     surrounds = False
     for shape in shapes:
         material = shape.material
-        if any_of(material, mt.NormalMapped):
+        if any(part.perturbs_normals for part in mt.parts(material)):
             return False
         if not any_of(material, mt.Dielectric):
             continue

@@ -7,6 +7,7 @@ must still read valid memory: `active` gives it index 0.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -25,6 +26,11 @@ class Case:
     value: str
     before: tuple[str, ...] = ()
 
+    @property
+    def in_all_lanes(self) -> bool:
+        """Whether it needs no mask."""
+        return not self.test and not re.search(r"\bm\b", " ".join((self.value, *self.before)))
+
 
 @dataclass(frozen=True)
 class Function:
@@ -42,9 +48,13 @@ class Function:
 
     def text(self) -> str:
         """Return the definition."""
-        type_ = self.signature.split()[0]
+        type_, cases = self.signature.split()[0], [*self.cases]
         body = [*self.before, f"{type_} value = {self.otherwise};"]
-        body += choose("value", type_, *self.cases)
+        if all(case.in_all_lanes for case in cases) and len(cases) < 2:
+            before, value = (cases[0].before, cases[0].value) if cases else ((), self.otherwise)
+            value = re.sub(r"\bvalue\b", value, self.result)
+            return function(self.signature, *self.before, *before, f"return {value};")
+        body += choose("value", type_, *cases)
         return function(self.signature, *body, f"return {self.result};")
 
 

@@ -1,4 +1,4 @@
-"""The density of sampled wavelengths, over the range to which the film responds.
+"""The density of sampled wavelengths, over the range of the film's response.
 
 Visible importance, in closed form, suits smooth lights and the sensor of an eye. For line spectra,
 sensors beyond the visible range and films with bands a density is tabulated from the sensor and the
@@ -21,19 +21,17 @@ from clpt.records import DENSITY_SIZES
 from clpt.render.film.colour import sensor
 from clpt.render.scene_index import SceneIndex
 from clpt.scene.integrators import Film
-from clpt.scene.materials import Material
-from clpt.scene.media import Dyed
+from clpt.scene.materials import Material, parts
 from clpt.scene.params import fields_of, params
-from clpt.scene.phases import Reradiating
 from clpt.scene.roles import EMISSION
-from clpt.scene.textures import Texture
+from clpt.scene.texture_values import is_texture
 from clpt.spectra import RGB, RGBIlluminant, Spectrum
 from clpt.spectra.reradiation import Reradiation
 from clpt.spectra.spectrum import d65, gridded
 
 STEP = 1.0  # largest distance of the nodes of a table [nm]
 LIGHTS, SENSOR = 0.5, 0.45  # shares of a table; the remaining share is even over the range
-WORTH = 2.2  # factor by which a table, which costs time, must lower the second moment
+WORTH = 2.2  # least ratio of second moments, without and with a table, that is worth its time
 GUIDES = DENSITY_SIZES["guides"]
 
 
@@ -65,7 +63,7 @@ class Density:
         """Return the table for kernels/spectra/wavelengths.cl: n, lo, step, sums, values, guide.
 
         The sums (n + 1) are the cumulative distribution at the nodes. The guide (GUIDES + 1) has
-        the cells in which equal shares begin, at which a search begins.
+        the first cell of each equal share; a search begins there.
         """
         if self.values is None:
             raise ValueError("visible importance has no table")
@@ -108,7 +106,7 @@ def density(index: SceneIndex) -> Density:
 
 
 def _support(film: Film) -> tuple[float, float]:
-    """Return the part of the film's range [nm] to which it responds, between whole steps."""
+    """Return the range [nm] of the film's response, in whole steps."""
     if film.bands:
         return film.lambda_min, film.lambda_max
     nodes = np.append(np.arange(film.lambda_min, film.lambda_max, STEP), film.lambda_max)
@@ -121,7 +119,7 @@ def _support(film: Film) -> tuple[float, float]:
 
 
 def _second_moment(density: Density, nodes: Floats, light: Floats) -> float:
-    """Return the second moment of an estimate of the integral of `light` from one wavelength.
+    """Return the second moment of an estimate of the integral of `light` from a single wavelength.
 
     light: (n,) at nodes (n,) [nm].
     """
@@ -147,22 +145,18 @@ def _glow(index: SceneIndex, nodes: Floats) -> tuple[Floats, Floats]:
     absorbed = np.linspace(film.lambda_min, film.lambda_max, cells + 1)
     matrices = {id(m): m for shape in index.shapes for m in _fluorescent(shape.material)}
     for medium in (part for whole in index.media for part in whole.parts):
-        phases = [leaf.reradiation for leaf in medium.phase.leaves if isinstance(leaf, Reradiating)]
-        phases += [medium.dye] if isinstance(medium, Dyed) else []
-        matrices |= {id(m): m for m in phases if m is not None}
+        dyes = (medium.dye, *(leaf.reradiation for leaf in medium.phase.leaves))
+        matrices |= {id(m): m for m in dyes if m is not None}
     total = np.zeros((len(nodes), len(absorbed)))
     for matrix in matrices.values():
         total += (absorbed[1] - absorbed[0]) * matrix.sample(nodes[:, None], absorbed[None, :])
     return total, absorbed
 
 
-def _fluorescent(material: object) -> Iterator[Reradiation]:
-    """Yield the reradiation matrices of a material and of those inside it."""
-    for value in fields_of(material).values() if isinstance(material, Material) else ():
-        if isinstance(value, Reradiation):
-            yield value
-        elif isinstance(value, Material):
-            yield from _fluorescent(value)
+def _fluorescent(material: Material) -> Iterator[Reradiation]:
+    """Yield the reradiation matrices of a material and of the materials inside it."""
+    for part in parts(material):
+        yield from (v for v in fields_of(part).values() if isinstance(v, Reradiation))
 
 
 def emissions(index: SceneIndex) -> Iterator[Spectrum]:
@@ -186,7 +180,7 @@ def emissions(index: SceneIndex) -> Iterator[Spectrum]:
 
 def _emitted(value: Any) -> Spectrum:
     """Return an emission as a spectrum; a texture's mean."""
-    if isinstance(value, Texture):
+    if is_texture(value):
         return _mean(fields_of(value).get("image"), f"{value.kind}.image")
     return RGBIlluminant(value.r, value.g, value.b) if isinstance(value, RGB) else value
 

@@ -15,7 +15,7 @@ from clpt.errors import SceneError
 from clpt.geometry.triangles import per_face
 from clpt.render.records.materials import SPECTRUM_WORDS
 from clpt.render.records.tables import TableStore
-from clpt.render.records.textures import KINDS, PROGRAM, RECORDS
+from clpt.render.records.textures import KINDS, PROGRAM, RECORDS, TextureFeatures
 from clpt.render.spectra.encode import SpectraTable
 from clpt.render.textures.bitmaps import Images, has_levels
 from clpt.render.textures.programs import program
@@ -114,6 +114,15 @@ class TextureTable:
             self._rows[key] = self._append(texture, role)
             self._alive.append(texture)
         return self._rows[key]
+
+    def features(self) -> TextureFeatures:
+        """Return the features of the textures so far."""
+        return TextureFeatures(
+            roles=tuple(sorted(self.roles)),
+            mappings=self.mappings,
+            depth=self.depth,
+            attributes=bool(self.attributes),
+        )
 
     def finish(self) -> list[str]:
         """Append the images, when all of them are known; return warnings."""

@@ -12,8 +12,6 @@ from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import Scene
 from clpt.scene.cameras import CONNECTED
-from clpt.scene.integrators import ParticleTracer
-from clpt.scene.lights import DirectionalArea
 from clpt.scene.materials import parts
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Shape
@@ -21,9 +19,9 @@ from clpt.scene.shapes import Shape
 
 def check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
     """Raise SceneError for a directional_area light, or parts that particle_tracer refuses."""
-    if not isinstance(scene.integrator, ParticleTracer):
+    if not scene.integrator.from_lights_alone:
         for shape in shapes_:
-            if isinstance(shape.emission, DirectionalArea):
+            if shape.emission is not None and shape.emission.only_light_paths:
                 raise SceneError(
                     "only the integrator particle_tracer finds a directional_area light, "
                     f"not {scene.integrator.kind}",

@@ -19,17 +19,14 @@ from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
-from clpt.render.lights import images as image_lights
-from clpt.render.lights import sky as sky_light
 from clpt.render.lights.aims import is_sharp, sharp_pieces
-from clpt.render.lights.find import Sources
+from clpt.render.lights.find import Sources, environment_of
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
 from clpt.render.transport import guides
 from clpt.scene import materials as mt
-from clpt.scene.integrators import Auto, Integrator, Path, Vcm, shared
-from clpt.scene.lights import CubeMap, Envmap, Sky
+from clpt.scene.integrators import Integrator, Path, Vcm, shared
 from clpt.scene.shapes import Shape
 
 SMALL = 0.03  # share of the sphere of directions: a light that fills less is small
@@ -86,7 +83,7 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
     if former is None:
         chosen, reason = _choice(lit)
     else:
-        keeps = isinstance(former, Vcm) and isinstance(wanted, Auto)
+        keeps = former.has_photons and wanted.asks_photons
         guiding = former.guiding and not wanted.guiding
         guide_paths = former.guide_paths if guiding else 0
         plain = Path(light_paths=former.light_paths, guiding=guiding, guide_paths=guide_paths)
@@ -94,7 +91,7 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
         reason = "as before the scene was edited"
     if index.light_layers and index.adaptive:
         chosen, reason = Path(light_paths=0), "layers of light have no guides of noise"
-    elif "light_groups" in index.layers and isinstance(chosen, Vcm):
+    elif "light_groups" in index.layers and chosen.has_photons:
         chosen, reason = Path(light_paths=chosen.light_paths), "photons do not know their group"
     if wanted.guiding:
         chosen = Path(light_paths=0, guiding=True, guide_paths=wanted.guide_paths)
@@ -116,7 +113,7 @@ def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]
     if samples < TRIAL_SAMPLES or index.adaptive or index.lit_ghosts or chosen.guiding:
         return ()
     path = Path(light_paths=0, **shared(chosen, Path()))
-    finds = isinstance(chosen, Path) or (chosen.light_paths != MANY and _may_be_met(index))
+    finds = not chosen.has_photons or (chosen.light_paths != MANY and _may_be_met(index))
     plain = [path] if finds and chosen.light_paths else []
     several = chosen.max_depth < 0 or chosen.max_depth > 2
     can_guide = several and index.lights_reach
@@ -157,7 +154,7 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     number = SOME
     if sum(share for _, place, share in small if _is_enclosed(geometry, place)) >= MOSTLY:
         number, reason = MANY, f"{reason}, in a bulb"
-    if not isinstance(integrator, Auto):
+    if not integrator.asks_photons:
         return Path(light_paths=number), reason
     if index.adaptive:
         return Path(light_paths=number), f"{reason}; noise is not measured with photons"
@@ -271,10 +268,10 @@ def _first_with(all_: Iterable[Shape], wanted: Callable[[mt.Material], object]) 
 
 def _is_diffuse(material: mt.Material) -> bool:
     """Whether light paths can be connected to the camera on a material, or on a part of it."""
-    if isinstance(material, mt.NormalMapped) or not material.reversible:
+    if not material.reversible:
         return False
-    if isinstance(material, mt.COMPOSITES):
-        return any(_is_diffuse(part) for _, part in mt.inner(material))
+    if material.is_composite:
+        return any(map(_is_diffuse, material.shared_parts.values()))
     return not material.delta and not is_sharp(material)
 
 
@@ -291,10 +288,9 @@ def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, flo
     lamps, share = lit.index.lights, sources.power / max(sources.power.sum(), 1e-300)
     for row, i in enumerate(sources.order):
         lamp = lamps[i]
-        if isinstance(lamp, (Envmap, CubeMap)):
-            small = image_lights.extent(lamp, lit.look, SUN) < SMALL
-        elif isinstance(lamp, Sky):
-            small = sky_light.sun_share(lamp, lit.look) >= SUN
+        environment = environment_of(lamp, lit.look)
+        if environment is not None:
+            small = environment.extent(SUN) < SMALL
         else:
             small = lamp.reach in ("placed", "distant") and lamp.falloff
         bounds, place = lamp.bounds(), None

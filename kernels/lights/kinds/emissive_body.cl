@@ -112,3 +112,11 @@ LightSample emissive_body_sample(EmissiveBody l, Scene scene, vec3 p, vec2 u, Wa
     s.pdf = sel(known & (spectrum_max(emits) > 0.0f), emissive_body_way_pdf(l, way), (real)(0.0f));
     return s;
 }
+
+/* Step chosen: the density of next-event estimation from p for a direction d to a body [1/sr]. */
+inline real body_light_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 d)
+{
+    LightRow l = light_at(scene, row);
+    real pdf = emissive_body_pdf(emissive_body_row(scene.light_params, l.params), p, d);
+    return pdf * light_pmf(scene, row, l, p, receiver);
+}

@@ -25,3 +25,11 @@ LightSample emissive_brick_sample(EmissiveBrick l, Scene scene, vec3 p, vec2 u, 
     s.pdf = sel(known & (spectrum_max(emits) > 0.0f), emissive_brick_pdf(l, t), (real)(0.0f));
     return s;
 }
+
+/* Step chosen: the density of next-event estimation from p for a point of a brick at distance t [1/sr]. */
+inline real brick_light_pdf(Scene scene, integer row, vec3 p, Receiver receiver, real t)
+{
+    LightRow l = light_at(scene, row);
+    real pdf = emissive_brick_pdf(emissive_brick_row(scene.light_params, l.params), t);
+    return pdf * light_pmf(scene, row, l, p, receiver);
+}

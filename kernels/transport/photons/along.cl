@@ -7,7 +7,7 @@
  * probability that the window contains the photon. */
 #include "core/warp.cl"
 #include "transport/photons/cells.cl"
-#include "transport/photons/weight.cl"
+#include "transport/photons/weight.cl#light"
 #include "transport/photons/media.cl"
 
 #define MERGING_STEPS 64.0f  /* of a window at most */

@@ -6,7 +6,7 @@
  * orientation, or off the disk's plane, are left out. */
 #include "core/warp.cl"
 #include "transport/photons/cells.cl"
-#include "transport/photons/weight.cl"
+#include "transport/photons/weight.cl#light"
 
 #define MERGING_FLAT 0.5f    /* largest distance of photons off the plane, over the radius */
 #define MERGING_TURN 0.866f  /* least cosine between the normals */

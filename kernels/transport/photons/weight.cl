@@ -16,9 +16,8 @@ inline real photon_weight(real of_light, real of_camera, real number, real area,
     return 1.0f / (1.0f + sqr(light / area) + sqr(camera / area));
 }
 
-
-/* The light of a photon for a camera path in the lanes of `near`, without the path's throughput. scale: MIS weight over
- * the area of merging. */
+/* Step light: the light of a photon for a camera path in the lanes of `near`, without the path's throughput. scale: MIS
+ * weight over the area of merging. */
 inline Spectrum photon_light(Photon photon, mask near, BsdfPair pair, Spectrum ratio, real scale)
 {
 #if USES_DISPERSION /* the pdfs of both parts for each wavelength as the hero, over their mean */

@@ -155,6 +155,8 @@ SHARP = {
     "principled metal": (m.Principled(metallic=1.0, roughness=0.2), True),
     "principled paint": (m.Principled(roughness=0.2), False),
     "glTF glass": (m.GltfSurface(transmission=1.0, roughness=0.0), True),
+    "OpenPBR's glass": (m.Openpbr(transmission_weight=1.0, specular_roughness=0.0), True),
+    "OpenPBR's paint": (m.Openpbr(specular_roughness=0.0), False),
     "grating": (m.Grating(), False),
     "rippled": (m.BumpMap(material=m.Dielectric(), height=Checkerboard()), False),
 }
