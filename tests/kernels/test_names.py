@@ -45,6 +45,7 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("spectra/rgb.cl*", "spectra/spectral.cl*"),
     ("shapes/analytic.cl#*hit",),
     ("shapes/triangle.cl#*_rows",),
+    ("textures/cone.cl#first", "textures/cone.cl#unrelated"),
     ("tracing/instances.cl#*",),
     ("tracing/shape_rows.cl#*",),
     ("tracing/trace.cl#*", "tracing/curves.cl#interleaved"),
