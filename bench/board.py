@@ -18,8 +18,8 @@ from typing import Any
 
 import click
 
-from clpt.bench import comparing, pictures, records
-from clpt.bench.picture_scenes import PICTURES, SIZES
+from clpt.bench import pictures, records
+from clpt.bench.scenes import PICTURES, SIZES
 from clpt.errors import SceneError
 from clpt.files import output_files
 
@@ -123,7 +123,7 @@ def entries(rows: Iterable[Row]) -> list[Entry]:
             entry = found.setdefault(tuple(map(str, who.values())), Entry(who))
             entry.who |= {"date": row.get("date", ""), "load": row.get("load")}
             entry.who["cores"] = row.get("cores")
-            entry.figures[comparing.key(row)] = row
+            entry.figures[records.key(row)] = row
     return list(found.values())
 
 

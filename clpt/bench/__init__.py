@@ -11,8 +11,7 @@ from collections.abc import Iterator, Sequence
 from clpt import bvh, device
 from clpt.bench import agreement, bandwidth, building, pictures, rays, shading, stages, starting
 from clpt.bench.figures import Figure
-from clpt.bench.picture_scenes import PICTURES
-from clpt.bench.scenes import opened
+from clpt.bench.scenes import PICTURES, opened
 
 __all__ = ["DEFAULT_PARTS", "PARTS", "Figure", "measure", "opened"]
 

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from clpt.render.flow.scene_to_tables import Lowered
 
 LEAST = 0.9999  # share of rays that must agree
 PAIRS = 1 << 24  # pairs of ray and triangle that are tested by brute force
 AGREE = 2e-4  # largest relative difference of distances
 EDGE = 1e-4  # barycentric distance to an edge below which a hit may be missed
 MISS = -1
+MOST = 1 << 22  # triangles; further instances are left out
 
 
 class Truth:
@@ -105,3 +109,26 @@ def any_hit(met: NDArray, hits: Mapping[str, NDArray]) -> str:
         return f"{(met > 1).sum():,} of {len(met):,} rays were not traced"
     share = float(((met != 0) == (hits["primitive"] >= 0)).mean())
     return "" if share >= LEAST else f"only {share:.4%} agree with the closest hits"
+
+
+def world(lowered: Lowered) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """Return vertices (n, 3) and faces (m, 3), without analytic shapes."""
+    instances = lowered.instances
+    world_count = len(lowered.faces) - sum(instances.triangles)
+    ends = world_count + np.cumsum([0, *instances.triangles])
+    vertices, faces = [lowered.vertices], [lowered.faces[:world_count]]
+    count, total = len(lowered.vertices), world_count
+    groups = []
+    for begin, end in pairwise(ends.tolist()):
+        used, inside = np.unique(lowered.faces[begin:end], return_inverse=True)
+        groups.append((lowered.vertices[used].astype(np.float64), inside.reshape(-1, 3)))
+    for row, prototype in zip(instances.rows, instances.prototypes, strict=True):
+        points, inside = groups[prototype]
+        total += len(inside)
+        if total > MOST:
+            break
+        inverse = np.linalg.inv(np.stack([row["x"], row["y"], row["z"]]).astype(np.float64))
+        vertices.append((points @ inverse.T + row["origin"]).astype(np.float32))
+        faces.append((inside + count).astype(np.uint32))
+        count += len(points)
+    return np.concatenate(vertices), np.concatenate(faces)

@@ -14,7 +14,7 @@ from typing import Any
 
 from clpt.bench import agreement, apart, pictures, records
 from clpt.bench.figures import Figure
-from clpt.bench.picture_scenes import PICTURES
+from clpt.bench.scenes import PICTURES
 
 MOST_HANGS = 2  # no further check is tried after these
 TRACKERS = {  # by a word of the platform, the device or the version

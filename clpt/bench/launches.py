@@ -9,16 +9,22 @@ compared.
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import device
+from clpt import device, version
 from clpt.arrays import Words
 from clpt.bench.flight import Flight
+from clpt.device.building import OPTIONS
+from clpt.errors import SceneError
+from clpt.files import output_files
 from clpt.layout import SLAB_BLOCK, Record
 from clpt.records import SLABS
 from clpt.render.flow import programs
@@ -30,6 +36,28 @@ EXACT, FREE = -1.0, np.inf  # margins
 MOST_OFF = 0.01  # of a launch's changed words: a rounding may decide a path's choice
 FREE_MEMBERS = ("low", "high", "cone")  # low digits of sums; packed halves
 COUNTS = ("queue_starts", "queue_counts")  # other compared buffers; the order in queues is free
+DATA = Path(__file__).parent / "data"
+HOSTS = ("launch.c", "launch.py")  # stored as .txt: they are no part of clpt
+_ROW = re.compile(r"^#line \d+.*$", re.MULTILINE)
+README = Template("""A launch of an OpenCL kernel, written by clpt $version.
+
+    python launch.py [PLATFORM [DEVICE]]
+    cc -std=c99 launch.c -lOpenCL -lm -o launch && ./launch [PLATFORM [DEVICE]]
+
+Each builds kernel.cl, gives the kernel the words of *.before, runs it once, and compares what it
+wrote with *.expected. The exit status is 0 for words that are right, 1 for wrong ones, 2 where
+nothing ran. launch.txt has the numbers of work-items and the arguments in their order.
+
+scene       $scene
+stage       $stage
+expected    by $witness
+device      $result
+on          $label, $opencl, driver $driver
+
+All files hold words of 32 bits in the host's order. *.margins has a float for each word, by which
+it may differ. A margin m of 0 or more: the words are floats, and may differ by m. Below 0: they are
+whole numbers, and may differ by -1 - m. Infinite: the word is not compared.
+""")
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,3 +222,55 @@ def _member_margins(name: str, kind: str, words: NDArray[np.uint32]) -> NDArray:
     size = np.abs(words.view(np.float32).astype(np.float64))
     size[~np.isfinite(size)] = 0.0
     return ROUNDING * (size + np.sqrt((size**2).mean()))
+
+
+def write_program(
+    folder: Path, launch: Launch, scene: str, on: device.DeviceInfo, witness: str, result: str
+) -> None:
+    """Write a launch as a standalone program, which shows a driver's fault without clpt.
+
+    The folder gets the kernel's text, its input words, the expected output words, and a host
+    program in C and in Python.
+
+    scene, witness, result: for its README. Raises SceneError if it cannot be written.
+    """
+    rows, files = _described(launch)
+    readme = README.substitute(
+        version=version.described(), scene=scene, stage=launch.stage, witness=witness,
+        result=result, label=on.label, opencl=on.version, driver=on.driver,
+    )  # fmt: skip
+    texts = {"launch.txt": "\n".join([*rows, ""]), "README.txt": readme}
+    texts["kernel.cl"] = _ROW.sub("", launch.text.text)
+    texts |= {name: (DATA / f"{name}.txt").read_text(encoding="utf-8") for name in HOSTS}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in texts.items():
+            output_files.write_text(folder / name, text)
+        for name, content in files.items():
+            output_files.write(folder / name, content)
+    except OSError as error:
+        raise SceneError(f"cannot be written: {error}", file=folder) from error
+
+
+def _described(launch: Launch) -> tuple[list[str], dict[str, bytes]]:
+    """Return the rows of launch.txt, and the content of files of words."""
+    rows = [" ".join(["options", *OPTIONS]), f"kernel {launch.kernel}"]
+    rows.append(" ".join(["size", *map(str, launch.size)]))
+    if launch.group:
+        rows.append(" ".join(["group", *map(str, launch.group)]))
+    changed = sum(
+        int(((launch.before[name] != launch.after[name]) & np.isfinite(margins)).sum())
+        for name, margins in launch.margins.items()
+    )
+    rows += [f"allowed {int(MOST_OFF * changed)}", " ".join(["compare", *launch.margins])]
+    files: dict[str, bytes] = {}
+    for argument in launch.arguments:
+        name, kind = argument.name, "buffer" if argument.name in launch.before else "value"
+        data = launch.before[name].tobytes() if kind == "buffer" else launch.values[name]
+        rows.append(f"argument {kind if data is not None else 'null'} {name} {len(data or b'')}")
+        if data is not None:
+            files[f"{name}.before"] = data
+    for name, margins in launch.margins.items():
+        files[f"{name}.expected"] = launch.after[name].tobytes()
+        files[f"{name}.margins"] = margins.tobytes()
+    return rows, files

@@ -18,9 +18,8 @@ from typing import Any
 import numpy as np
 
 from clpt import device
-from clpt.bench.picture_scenes import BENCHMARK_VERSION, PICTURES, SIZES, Size, picture
-from clpt.bench.pictures import film_class, film_digest
-from clpt.bench.tiles import FILE, Reference, references, regions
+from clpt.bench.pictures import FILE, Reference, film_class, film_digest, references, regions
+from clpt.bench.scenes import BENCHMARK_VERSION, PICTURES, SIZES, Size, picture
 from clpt.render.renderer import Renderer
 
 RENDERS = 64  # an even number: the degrees of freedom are odd

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import bvh, device
-from clpt.bench import checks, triangles
+from clpt.bench import checks
 from clpt.bench.bandwidth import Copying
 from clpt.bench.figures import Figure, Taken, clock_complaint, rates, timed
 from clpt.bench.flight import Flight
@@ -59,7 +59,7 @@ def sets(on: device.Device, scene: Scene, count: int | None = None) -> Sets:
     """
     count = count or (CPU_RAYS if on.info.is_cpu else GPU_RAYS)
     flight = Flight(on, scene, count)
-    vertices, faces = triangles.world(flight.wavefront.scene.lowered)
+    vertices, faces = checks.world(flight.wavefront.scene.lowered)
     if not len(faces):
         raise SceneError("rays are measured on triangles, and the scene has none")
     rays_by_set: dict[str, Rays] = {}

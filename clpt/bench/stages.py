@@ -1,13 +1,16 @@
 """Speed of each stage of a render: items a second, and bytes a second beside a copy's.
 
 Each stage runs on the state that former stages have left; its items are the slots with work for it.
-clpt.bench.traffic counts the bytes: the moved state of paths, without the scene's tables, trees and
-textures.
+`traffic` counts the bytes: loads and stores of slabs (clpt/records.py) in the program's text. Reads
+of the scene's tables, trees and textures depend on rays and are not counted: a figure is a lower
+bound.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,19 +19,68 @@ from clpt import device
 from clpt.bench.bandwidth import Copying
 from clpt.bench.figures import Figure, Taken, clock_complaint, timed
 from clpt.bench.flight import Flight
-from clpt.bench.traffic import traffic
 from clpt.records import SLABS
 from clpt.render.film.state import FILM_WORDS
-from clpt.render.flow import programs
+from clpt.render.flow import blocks, programs
+from clpt.render.records import Features
 from clpt.render.wavefront.bounce_loop import Step
 from clpt.render.wavefront.path_buffers import queue_sizes, queue_steps
 from clpt.scene import Scene
 
+_WORD = 4  # bytes
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+_CALL = re.compile(r"(?<!\w)(?P<verb>load|store)_(?P<member>\w+)\((?!Slab )")
+_QUEUED = {"append": (0, 1), "shade": (1, 0)}  # words read and written of a queue
 QUEUEING = [kernel for kernel, *_ in queue_steps(1, 1)]
 WARM = 4  # bounces before the measurement, so that paths of all depths are in flight
 BOUNCES = 4  # of a round: in a single bounce few paths may begin
 
 Work = tuple[int, Taken]  # items, and their time
+
+
+@dataclass(frozen=True)
+class Moved:
+    """Bytes that an item of a stage reads and writes, with all branches taken."""
+
+    read: int
+    written: int
+
+    @property
+    def total(self) -> int:
+        return self.read + self.written
+
+
+def traffic(features: Features, layout: str, *, queued: bool = False) -> dict[str, Moved]:
+    """Return the traffic of an item in each program, by the names of `programs.sources`.
+
+    An item is a slot with work: in `generate` a path that ends and its successor, in `intersect`
+    and `shade_...` a ray and its hit, in `shadow` a shadow ray, in `append` a slot.
+    """
+    texts = programs.sources(features, layout, 1, queued=queued)
+    unused = blocks.unused(features)
+    sizes = {
+        f"{record.name.lower()}_{member.name}": member.words
+        - (member.type == "spectrum" and not features.spectra.spectral)
+        for record in SLABS
+        for member in record.members
+        if member.name not in unused
+    }
+    moved = {}
+    for name, source in texts.items():
+        queue_words = _QUEUED.get(name.split("_")[0]) if queued else None
+        moved[name] = _moved(source.text, sizes, *(queue_words or (0, 0)))
+    return moved
+
+
+def _moved(text: str, sizes: Mapping[str, int], read: int, written: int) -> Moved:
+    """Return an item's traffic; sizes: words of slabs' members; read, written: further words."""
+    words: dict[str, set[str]] = {"load": set(), "store": set()}
+    for call in _CALL.finditer(_COMMENT.sub("", text)):
+        if call["member"] in sizes:
+            words[call["verb"]].add(call["member"])
+    read += sum(sizes[member] for member in words["load"])
+    written += sum(sizes[member] for member in words["store"])
+    return Moved(_WORD * read, _WORD * written)
 
 
 def measure(

@@ -108,8 +108,7 @@ def _opened(scene: Path, mode: str | None, variables: dict[str, Any]) -> Scene:
     built_in = str(scene) in PICTURE_SCENES and not scene.exists()
     if not built_in:
         locate(scene)
-    from clpt.bench.picture_scenes import PICTURES  # here: help needs no OpenCL
-    from clpt.bench.scenes import build_scene, in_mode
+    from clpt.bench.scenes import PICTURES, build_scene, in_mode  # here: help needs no OpenCL
 
     if built_in:
         return in_mode(build_scene(str(scene)), mode or PICTURES[str(scene)].mode)
@@ -118,7 +117,7 @@ def _opened(scene: Path, mode: str | None, variables: dict[str, Any]) -> Scene:
 
 def _reproduce(plan: Scene, scene: Path, folder: Path, stage: str, which: str | None) -> None:
     """Write a program that shows whether a device runs a stage right."""
-    from clpt.bench import agreement, repro
+    from clpt.bench import agreement, launches
 
     from .. import device
 
@@ -131,6 +130,6 @@ def _reproduce(plan: Scene, scene: Path, folder: Path, stage: str, which: str | 
     else:
         raise SceneError(f"no stage is wrong beside {witness.name}", file=scene)
     verdict, launch = result.problem or "right", result.launch
-    repro.write(folder, launch, str(scene), on.info, witness.name, verdict)
+    launches.write_program(folder, launch, str(scene), on.info, witness.name, verdict)
     terminal.say(f"{launch.stage} on {on.info.label}: {verdict}, beside {witness.name}", err=False)
     terminal.say(f"{folder / 'README.txt'} says how to run it without clpt", err=False)

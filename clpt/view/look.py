@@ -6,6 +6,9 @@ A look changes no scene: it makes another one of it for the renderers.
 from __future__ import annotations
 
 import dataclasses
+from collections import deque
+from collections.abc import Hashable
+from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
 import numpy as np
@@ -17,12 +20,12 @@ from clpt.scene.params import fields_of, params
 from clpt.scene.roles import EMISSION
 from clpt.spectra import Constant, Illuminant, Spectrum, illuminant, on_grid
 from clpt.spectra.cie import CIE_Y_INTEGRAL, LAMBDA_MAX, LAMBDA_MIN, cie_xyz
-from clpt.view.maps import PICTURE
-from clpt.view.pictures import METHOD
+from clpt.view.pictures import METHOD, PICTURE
 
 Region = tuple[int, int, int, int]
 
 GRID: Final = np.arange(LAMBDA_MIN, LAMBDA_MAX + 1.0)
+MOST_STEPS = 100
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,7 +34,7 @@ class Look:
 
     hidden: indices of shapes; lamp: whose spectrum all lights have, each as bright as its own;
     wavelength, width: [nm] of the only light, None for all; region: of the film, see `Film.crop`;
-    shows: the picture or a map of clpt.view.maps; layers: that the film has for it, beside the
+    shows: the picture or a map of clpt.view.pictures; layers: that the film has for it, beside the
     scene's own; denoises: whether the film is one for denoisers.
     """
 
@@ -111,3 +114,53 @@ def _luminance(spectrum: Spectrum) -> float:
         return float(spectrum.scale)
     values = np.asarray(on_grid(spectrum, LAMBDA_MIN, LAMBDA_MAX), float)
     return float(values @ cie_xyz(GRID)[..., 1] / CIE_Y_INTEGRAL)
+
+
+@dataclass(frozen=True)
+class State:
+    """A scene, and the way in which it is looked at."""
+
+    scene: Scene
+    look: Look
+
+
+class History:
+    """States before the present one, and those that undoing has left."""
+
+    def __init__(self) -> None:
+        self._past: deque[State] = deque(maxlen=MOST_STEPS)
+        self._future: list[State] = []
+        self._last: Hashable = None
+
+    def note(self, before: State, by: Hashable = None) -> None:
+        """Note the state before a change.
+
+        by: what changed, such as a parameter. Changes of the same one after the other are one step,
+        as a slider makes many; None is never the same.
+        """
+        if by is None or by != self._last:
+            self._past.append(before)
+        self._future.clear()
+        self._last = by
+
+    def back(self, now: State) -> State | None:
+        """Return the state before the present one; None where there is none."""
+        self._last = None
+        if not self._past:
+            return None
+        self._future.append(now)
+        return self._past.pop()
+
+    def forward(self, now: State) -> State | None:
+        """Return the state that was undone last; None where there is none."""
+        self._last = None
+        if not self._future:
+            return None
+        self._past.append(now)
+        return self._future.pop()
+
+    def clear(self) -> None:
+        """Forget all: the scene is another one."""
+        self._past.clear()
+        self._future.clear()
+        self._last = None

@@ -23,7 +23,7 @@ from clpt.scene.roles import INDEX, MEASUREMENT, MERL, SPECTRA, Param
 from clpt.scene.shapes import Group, Instance, Shape
 from clpt.scene.textures import Texture
 from clpt.spectra.sensors import OBSERVERS
-from clpt.view.commands import OF_VIEW, CommandError
+from clpt.view.messages import OF_VIEW, CommandError
 from clpt.view.target import Change
 
 # Controls of the page by the names of roles; others cannot be edited there.

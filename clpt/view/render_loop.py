@@ -23,7 +23,7 @@ from clpt.render.film_renderer import maker_of
 from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
-from clpt.view import maps, pictures
+from clpt.view import pictures
 from clpt.view.beginning import Beginning
 from clpt.view.messages import PREPARING
 from clpt.view.pictures import Display
@@ -72,7 +72,7 @@ class RenderLoop:
     ):
         self.scene, self.device, self.outlet = scene, device, outlet
         self.display = display
-        self.shows = maps.PICTURE  # or a map, or a layer of the film
+        self.shows = pictures.PICTURE  # or a map, or a layer of the film
         self.meanwhile: Callable[[], None] = lambda: None  # called while samples are taken
         self.paused = False
         self.watched = True
@@ -80,7 +80,7 @@ class RenderLoop:
         self.kept: Image | None = None  # a picture to compare with
         self.seconds = 0.0  # of rendering the whole picture
         self._film: Image | None = None
-        self._errors = maps.ErrorMap()
+        self._errors = pictures.ErrorMap()
         self._options = {"cancel_seconds": CANCEL_SECONDS, **options}
         self._divider = first_divider(scene)
         self._whole = self._make if make is None else partial(make, **self._options)
@@ -124,7 +124,7 @@ class RenderLoop:
             self._beginning.note(change)
         self._previews_left, self._begins = PREVIEW_SAMPLES, True
         self._film, self.has_shown = None, False
-        self._errors = maps.ErrorMap()
+        self._errors = pictures.ErrorMap()
         self._changes += 1
         asked, self._asked = self._asked, None
         self._waited = 0.0 if asked is None else time.perf_counter() - asked
@@ -360,12 +360,12 @@ class RenderLoop:
     def _shown(self, renderer: Renderer, whole: bool) -> tuple[NDArray[np.uint8], Any]:
         """Return what a renderer has for the screen, and the legend of its colours or None."""
         if self.shows in renderer.scene.film.layers:
-            return maps.layer(self.shows, renderer.layers()[self.shows]), None
-        if whole and self.shows == maps.DENOISED:
+            return pictures.layer(self.shows, renderer.layers()[self.shows]), None
+        if whole and self.shows == pictures.DENOISED:
             return pictures.denoised(renderer, self.display), None
-        if whole and self.shows == maps.SAMPLES:
-            return maps.samples(renderer.film.get())
-        found = self._errors.shown(renderer.film.get()) if self.shows == maps.ERROR else None
+        if whole and self.shows == pictures.SAMPLES:
+            return pictures.samples(renderer.film.get())
+        found = self._errors.shown(renderer.film.get()) if self.shows == pictures.ERROR else None
         if found is not None and whole:
             return found
         return pictures.shown(renderer, self.display), None

@@ -1,7 +1,8 @@
-"""Files that a page saves: new ones in the folder that was given at the start, never elsewhere.
+"""Views, and files that a page saves: new ones in the folder that was given at the start.
 
-The name of a file is taken by making the file, which fails where anything has that name, a link to
-nowhere too. So two viewers that save in one folder never get the same name.
+A view is a camera and the look of its picture, as JSON that is saved, copied and opened again. The
+name of a file is taken by making the file, which fails where anything has that name, a link to
+nowhere too. So two viewers that save in the same folder never get the same name.
 """
 
 from __future__ import annotations
@@ -13,22 +14,79 @@ import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.files import output_files
+from clpt.errors import SceneError, UnknownKindError
+from clpt.files import output_files, text
 from clpt.formats import save as save_scene
 from clpt.render.renderer import Renderer
-from clpt.scene import Scene
-from clpt.view import pictures
-from clpt.view.commands import CommandError
+from clpt.scene import Scene, kinds
+from clpt.scene.cameras import Camera
+from clpt.scene.params import fields_of, params
+from clpt.view import panels, pictures
+from clpt.view.messages import COMMANDS, CommandError, Request
+from clpt.view.pictures import Display
 
 MOST_FILES = 10_000
 EXCLUSIVE = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
 
 WriteExr = Callable[[Path, Renderer, float], None]  # path, renderer, seconds of rendering
+
+
+def written(scene: Scene, display: Display) -> dict[str, Any]:
+    """Return a view: its camera as scene.json has it, exposure and tone curve."""
+    shown = {"exposure": display.exposure, "tone": display.tone}
+    return {"camera": panels.written(scene.camera), "display": shown}
+
+
+def camera_of(document: object, present: Camera | None = None) -> Camera:
+    """Return the camera that a view has. Raises CommandError.
+
+    present: gives what no view holds: a lens, the medium around, motion and shutter.
+    """
+    if not isinstance(document, dict):
+        raise CommandError("the camera of a view is an object, as in scene.json")
+    known, values = kinds("camera"), dict(document)
+    kind = values.pop("type", None)
+    if not isinstance(kind, str) or kind not in known:
+        raise CommandError(str(UnknownKindError("camera", str(kind), known)))
+    declared = params(known[kind])
+    held = {name: param for name, param in declared.items() if panels.is_plain(param)}
+    for name in values:
+        if name not in held:
+            raise CommandError(f"a view of a camera {kind} has no {name!r}")
+    read = {name: panels.read(name, value, held[name]) for name, value in values.items()}
+    had = {} if present is None else fields_of(present)
+    kept = {name: had[name] for name in declared if name in had and name not in held}
+    try:
+        return cast(Camera, known[kind](**kept, **read))
+    except SceneError as error:
+        raise CommandError(str(error)) from None
+
+
+def request(document: object) -> Request:
+    """Return the command that opens a view. Raises CommandError."""
+    if not isinstance(document, dict) or "camera" not in document:
+        raise CommandError("this is no view: it has no camera")
+    display = document.get("display")
+    given = {"exposure": 0.0, "tone": "none", **(display if isinstance(display, dict) else {})}
+    kinds_of = COMMANDS["open_view"].parameters
+    values = {"camera": document["camera"], **given}
+    checked = {name: kind.check(values[name]) for name, kind in kinds_of.items()}
+    camera_of(checked["camera"])
+    return Request("open_view", checked)
+
+
+def load(path: Path) -> Request:
+    """Return the command that opens the view of a file. Raises SceneError."""
+    content = text.read(path)
+    try:
+        return request(json.loads(content))
+    except (ValueError, CommandError) as error:
+        raise SceneError(f"is no view: {error}", file=path) from error
 
 
 class Folder:
@@ -62,7 +120,7 @@ class Folder:
         return folder / "scene.json"
 
     def save_view(self, view: dict[str, Any]) -> Path:
-        """Write a view, see clpt.view.views."""
+        """Write a view, see clpt.view.saving."""
         with self._new_file(".view.json") as (path, partial):
             partial.write_text(json.dumps(view, indent=2) + "\n", "utf-8")
         return path

@@ -33,8 +33,15 @@ from websockets.http11 import Response
 
 from clpt.errors import ClptError
 from clpt.view.access import LOOPBACK, Access, is_wildcard, outward_address
-from clpt.view.commands import COMMANDS, LARGEST_MESSAGE, CommandError, parse
-from clpt.view.messages import PREPARING, answering, as_json
+from clpt.view.messages import (
+    COMMANDS,
+    LARGEST_MESSAGE,
+    PREPARING,
+    CommandError,
+    answering,
+    as_json,
+    parse,
+)
 from clpt.view.session import Session
 
 log = logging.getLogger(__name__)

@@ -15,12 +15,10 @@ from clpt.denoise import oidn
 from clpt.device import Device
 from clpt.errors import SceneError
 from clpt.scene import Scene
-from clpt.view import maps, panels, views
+from clpt.view import panels, pictures, saving
 from clpt.view.camera_work import CameraWork
-from clpt.view.commands import COMMANDS, CommandError, Request
-from clpt.view.history import History, State
-from clpt.view.look import Look
-from clpt.view.messages import Reply, answering, error_message
+from clpt.view.look import History, Look, State
+from clpt.view.messages import COMMANDS, CommandError, Reply, Request, answering, error_message
 from clpt.view.pictures import METHOD, Display
 from clpt.view.probe import Probe, Question
 from clpt.view.render_loop import Outlet, RenderLoop
@@ -153,7 +151,7 @@ class Session(CameraWork):
             "device": self.where,
             "names": {
                 **panels.names(self._loop.display.view is not None),
-                "maps": maps.offered(),
+                "maps": pictures.offered(),
             },
             "objects": panels.objects(scene),
             "panels": panels.panels(scene),
@@ -446,22 +444,22 @@ class Session(CameraWork):
         reply({"type": "view", "view": self._view()})
 
     def _view(self) -> dict[str, Any]:
-        return views.written(self.scene, self._loop.display)
+        return saving.written(self.scene, self._loop.display)
 
     def _do_display(self, reply: Reply, exposure: float, tone: str) -> None:
         self._loop.show(Display(exposure, tone, self._loop.display.view), self.look.shows)
 
     def _do_shows(self, reply: Reply, name: str) -> None:
-        if name not in maps.MAPS:
+        if name not in pictures.MAPS:
             raise CommandError(f"there is no {name} to show")
-        if name == maps.DENOISED and not self.look.denoises:
+        if name == pictures.DENOISED and not self.look.denoises:
             try:
                 oidn.check_installed()
             except SceneError as error:
                 raise CommandError(error.message) from error
             self._look(shows=name, denoises=True)
             return
-        if name in maps.SURFACES and name not in (*self.scene.film.layers, *self.look.layers):
+        if name in pictures.SURFACES and name not in (*self.scene.film.layers, *self.look.layers):
             self._look(shows=name, layers=(*self.look.layers, name))
             return
         self.look = dataclasses.replace(self.look, shows=name)

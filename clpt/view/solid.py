@@ -1,12 +1,13 @@
 """A scene in plain colours, which is shown while its own kernels are compiled.
 
-A path that ends at the first surface tells the colour and the normal there, and a lamp beside the
+A path that ends at the first surface finds the colour and the normal there, and a lamp beside the
 camera lights it. Its few kernels are the same for most scenes.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -20,11 +21,11 @@ from clpt.scene.integrators import Path
 from clpt.scene.materials import Diffuse, Material, Null
 from clpt.scene.params import Kind, fields_of, params
 from clpt.scene.roles import REFLECTANCE
-from clpt.scene.shapes import Mesh, Shape
+from clpt.scene.shapes import Group, Instance, Mesh, Shape
 from clpt.scene.textures import Bitmap
 from clpt.spectra import Spectrum
-from clpt.view.bare import bare, each
 
+PLAIN: dict[str, Any] = {"emission": None, "interior": None, "exterior": None, "priority": 0}
 SAMPLES = 4  # of a pixel
 LAYERS = ("albedo", "shading_normal")
 LAMP = np.array([0.35, 0.5, -0.8])  # where it is in the camera's space: left, up, behind
@@ -32,6 +33,33 @@ SHADE = 0.3  # what is left where the lamp does not reach
 BEHIND = 0.06  # radiance where there is no surface
 SHINES, OTHER = 1.0, 0.5  # albedo of lamps, and of what has no colour of its own
 SIDE = 64  # texels of an image along a side that its mean is of, about
+
+
+def bare(shape: Shape, **more: object) -> Shape:
+    """Return a shape without light and media; more: further fields that it is to have."""
+    given = fields_of(shape)
+    wanted = PLAIN | more
+    own = {name: value for name, value in wanted.items() if given[name] is not value}
+    return dataclasses.replace(shape, **own) if own else shape
+
+
+def each(shapes: Iterable[Shape], change: Callable[[Shape], Shape | None]) -> list[Shape]:
+    """Return the shapes as `change` makes them, without those of which it makes None.
+
+    What several instances place is changed once.
+    """
+    groups: dict[int, Group] = {}
+    changed: list[Shape | None] = []
+    for shape in shapes:
+        if isinstance(shape, Instance):
+            group = shape.group
+            if id(group) not in groups:
+                kept = [one for one in map(change, group.shapes) if one is not None]
+                groups[id(group)] = Group(shapes=tuple(kept), name=group.name)
+            changed.append(dataclasses.replace(shape, group=groups[id(group)]))
+        else:
+            changed.append(change(shape))
+    return [shape for shape in changed if shape is not None]
 
 
 def solid(scene: Scene) -> Scene:

@@ -18,8 +18,7 @@ import numpy as np
 from clpt import images
 from clpt.device import Device
 from clpt.scene import Scene
-from clpt.view.commands import checked
-from clpt.view.messages import answering, finite
+from clpt.view.messages import answering, checked, finite
 from clpt.view.session import Session
 
 MODULES = (  # of the page, in an order in which each finds what it needs

@@ -27,35 +27,16 @@
 #endif
 
 #ifdef NATIVE_GATHER
-inline real gather(global const float *p, integer at) { return NATIVE_GATHER(p, at); }
-inline integer gather_i(global const uint *p, integer at) { return as_integer(NATIVE_GATHER(p, at)); }
-inline integer gather_constant(constant uint *p, integer at) { return as_integer(NATIVE_GATHER(p, at)); }
+#define READ(TYPE) TYPE r = as_##TYPE(NATIVE_GATHER(p, at));
 #elif LANES == 1
-inline real gather(global const float *p, integer at) { return p[at]; }
-inline integer gather_i(global const uint *p, integer at) { return as_int(p[at]); }
-inline integer gather_constant(constant uint *p, integer at) { return as_int(p[at]); }
+#define READ(TYPE) TYPE r = p[at];
 #else
-#define LOAD(i) r.s##i = p[at.s##i];
-inline real gather(global const float *p, integer at)
-{
-    real r;
-    FOR_LANES(LOAD)
-    return r;
-}
-inline integer gather_i(global const uint *p, integer at)
-{
-    natural r;
-    FOR_LANES(LOAD)
-    return as_integer(r);
-}
-inline integer gather_constant(constant uint *p, integer at)
-{
-    natural r;
-    FOR_LANES(LOAD)
-    return as_integer(r);
-}
-#undef LOAD
+#define READ_LANE(i) r.s##i = p[at.s##i];
+#define READ(TYPE) TYPE r; FOR_LANES(READ_LANE)
 #endif
+inline real gather(global const float *p, integer at) { READ(real) return r; }
+inline integer gather_i(global const uint *p, integer at) { READ(natural) return as_integer(r); }
+inline integer gather_constant(constant uint *p, integer at) { READ(natural) return as_integer(r); }
 
 #ifdef NATIVE_SCATTER
 inline void scatter_if(global float *p, integer at, mask m, real v) { NATIVE_SCATTER(p, at, m, v); }

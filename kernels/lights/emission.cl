@@ -66,8 +66,8 @@ inline LightRay distant_emit(Scene scene, LightSample s, vec2 v)
 }
 
 /* Step emit: a ray from a light that `pick` chooses by its power. clpt/render/lights/emission_cases.py generates
- * `lamp_emit`, for lights off all shapes, and `area_surface_point`, a point of a light on a shape and what textures see
- * there. */
+ * `lamp_emit`, for lights off all shapes, and `area_surface_point`, a point of a light on a shape with its texture
+ * point. */
 inline LightRay light_emit(Scene scene, real pick, vec2 u, vec2 v, Wavelengths lambdas)
 {
     integer row = light_pick(scene, &pick, u.y);
@@ -129,8 +129,8 @@ inline LightRay area_ray_unseen(LightRay r, LightRow l)
 /* Twin, where rays see all lights on shapes. */
 inline LightRay area_ray_unseen(LightRay r, LightRow l) { return r; }
 
-/* Step densities: what transport/mis_ratio.cl asks of the light in a row, seen along wi. The generated `emit_case` and
- * `nee_case` are the densities of a light's kind. */
+/* Step densities: densities of the light in a row for transport/mis_ratio.cl. The generated `emit_case` and `nee_case`
+ * are the densities of a light's kind. */
 
 /* The density of light_emit for rays against wi to a surface across them at distance t; over the cosine at a light on a
  * shape. Squared distances cancel: [1/(m^2 sr)], and for a light at a point per t^2 [1/m^2], in units of

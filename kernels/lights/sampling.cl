@@ -1,6 +1,6 @@
 /* Next-event estimation for all kinds of lights in a scene. clpt/render/lights/cases.py generates, for the kinds off
- * all shapes, `lamp_sample`, for lights on shapes `area_point`, a point as seen from a LightView with what textures see
- * there, and `area_pdf` [1/sr], and for infinite lights `infinite_case`. */
+ * all shapes, `lamp_sample`, for lights on shapes `area_point`, a point as seen from a LightView with its texture
+ * point, and `area_pdf` [1/sr], and for infinite lights `infinite_case`. */
 
 /* Step. */
 /* Samples a light and a direction to it. pick: chooses the light, u: the point. */
@@ -15,7 +15,7 @@ inline LightSample light_sample(Scene scene, vec3 p, Receiver receiver, real pic
     return area_unseen(light_chosen(s, row, pmf), l);
 }
 
-/* The density of a direction in which a ray met a light at distance t, with the normal n there [1/sr]. */
+/* The density of a direction wi to a light that a ray met at distance t, with the normal n there [1/sr]. */
 inline real light_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 wi, real t, vec3 n)
 {
     LightRow l = light_at(scene, row);

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from bench import board
-from clpt.bench.picture_scenes import PICTURES
+from clpt.bench.scenes import PICTURES
 from clpt.errors import SceneError
 
 VOID = ("meta",)

@@ -10,7 +10,7 @@ from PIL import Image
 
 from clpt.bench import card, pictures
 from clpt.bench.figures import Figure
-from clpt.bench.picture_scenes import PICTURES
+from clpt.bench.scenes import PICTURES
 
 ABOUT = {"device": "A <very> & long name " * 5, "driver": "1.0", "date": "2026-11-26T09:00:00"}
 

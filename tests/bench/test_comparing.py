@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from clpt.bench import comparing, records
+from clpt.bench import records
 from clpt.bench.figures import Figure
 from clpt.errors import SceneError
 
@@ -46,7 +46,7 @@ def test_files_that_are_no_records(tmp_path: Path, text: str) -> None:
 def test_ratios_are_above_one_where_it_is_better() -> None:
     fast, start = figure(3.0, 3.0, 3.3), figure(2.0, name="warm start", unit="s")
     before = [figure(2.0).record(), figure(3.0, name="warm start", unit="s").record()]
-    quick, sooner = comparing.against([fast, start], before, "A")
+    quick, sooner = records.against([fast, start], before, "A")
     assert quick.ratio == sooner.ratio == 1.5
     assert quick.noise == pytest.approx(fast.spread)
 
@@ -58,20 +58,20 @@ def test_the_newest_record_of_the_device_is_taken() -> None:
     ]
     rows.append({"bench": "renders", "msamples": 1.0})  # as older parts of bench/ write them
     for device, value in (("A", 2.0), ("B", 9.0), ("C", 9.0)):
-        (ratio,) = comparing.against([figure(18.0)], rows, device)
+        (ratio,) = records.against([figure(18.0)], rows, device)
         assert ratio.then["value"] == value
 
 
 def test_below_a_limit_only_beyond_noise() -> None:
     before = [json.loads(json.dumps(figure(1.0).record()))]
-    (steady,) = comparing.against([figure(0.94, 0.94, 0.94)], before, "A")
-    (noisy,) = comparing.against([figure(0.8, 0.94, 1.1)], before, "A")
+    (steady,) = records.against([figure(0.94, 0.94, 0.94)], before, "A")
+    (noisy,) = records.against([figure(0.8, 0.94, 1.1)], before, "A")
     assert steady.below(0.95) and not steady.below(0.9)
     assert not noisy.below(0.95)
 
 
 def test_nothing_in_common() -> None:
     with pytest.raises(SceneError, match="none of the figures"):
-        comparing.against([figure(1.0)], [figure(1.0, name="other").record()], "A")
+        records.against([figure(1.0)], [figure(1.0, name="other").record()], "A")
     with pytest.raises(SceneError, match="none of the figures"):
-        comparing.against([figure(1.0).refuse("wrong")], [figure(1.0).record()], "A")
+        records.against([figure(1.0).refuse("wrong")], [figure(1.0).record()], "A")

@@ -12,7 +12,7 @@ import pytest
 from clpt.__main__ import run
 from clpt.bench import PARTS, agreement, apart, first_light, pictures
 from clpt.bench.figures import Figure
-from clpt.bench.picture_scenes import PICTURES
+from clpt.bench.scenes import PICTURES
 
 ABOUT = {"device": "rusticl card", "opencl": "OpenCL 3.0", "driver": "22.3"}
 WRONG = "wrong: 31 % of what it writes is wrong (beta), beside another"

@@ -14,7 +14,7 @@ import pytest
 
 from clpt import bench as benchmark
 from clpt import device
-from clpt.bench import agreement, launches, repro
+from clpt.bench import agreement, launches
 from clpt.bench.flight import Flight
 from clpt.bench.launches import EXACT, FREE, Launch
 from clpt.device import native_programs
@@ -132,7 +132,9 @@ def test_the_wrong_stage_is_named(
 @pytest.fixture
 def folder(on: device.Device, noted: dict[str, Launch], tmp_path: Path) -> Path:
     """A launch as a program of its own."""
-    repro.write(tmp_path / "fault", noted[STAGE], "cornell", on.info, "another device", "right")
+    launches.write_program(
+        tmp_path / "fault", noted[STAGE], "cornell", on.info, "another device", "right"
+    )
     return tmp_path / "fault"
 
 
@@ -216,4 +218,6 @@ def test_where_it_cannot_be_written(
 ) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(SceneError, match="cannot be written"):
-        repro.write(tmp_path / "file", noted[STAGE], "cornell", on.info, "another", "right")
+        launches.write_program(
+            tmp_path / "file", noted[STAGE], "cornell", on.info, "another", "right"
+        )

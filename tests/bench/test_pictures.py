@@ -11,13 +11,13 @@ import pytest
 
 from clpt import bench as benchmark
 from clpt import device
-from clpt.bench import pictures, tiles
+from clpt.bench import pictures
 from clpt.bench.figures import Figure
-from clpt.bench.picture_scenes import PICTURES, SIZES, picture
+from clpt.bench.scenes import PICTURES, SIZES, picture
 from clpt.errors import UnknownKindError
 
 GREY = np.full((128, 128, 3), 0.5, np.float32)
-RIGHT = tiles.Reference(
+RIGHT = pictures.Reference(
     np.full((65, 3), 0.5), np.full((65, 3), 0.01), 32, 1 << 17, MappingProxyType({})
 )
 
@@ -59,7 +59,7 @@ def painted(monkeypatch: pytest.MonkeyPatch) -> Iterator[type[Painted]]:
         pass
 
     monkeypatch.setattr(pictures, "Renderer", Own)
-    monkeypatch.setattr(tiles, "references", lambda: dict.fromkeys(PICTURES, RIGHT))
+    monkeypatch.setattr(pictures, "references", lambda: dict.fromkeys(PICTURES, RIGHT))
     monkeypatch.setattr(pictures, "first_wrong_stage", lambda *given: "first in intersect: 7")
     monkeypatch.setattr(device.Device, "open", lambda info: None)
     yield Own
@@ -122,8 +122,8 @@ def test_films_are_compared_to_the_bit_in_a_class_alone(
         ("another", pictures.film_digest(renderer), None),
     ):
         films = {"quick": film, "class": made_by}
-        kept = tiles.Reference(RIGHT.mean, RIGHT.deviation, 32, 1 << 17, films)
-        monkeypatch.setattr(tiles, "references", lambda kept=kept: dict.fromkeys(PICTURES, kept))
+        kept = pictures.Reference(RIGHT.mean, RIGHT.deviation, 32, 1 << 17, films)
+        monkeypatch.setattr(pictures, "references", lambda kept=kept: dict.fromkeys(PICTURES, kept))
         assert measured(only=("mist",))[0].more["exact"] is exact
 
 
@@ -131,7 +131,7 @@ def test_scenes_and_sizes() -> None:
     with pytest.raises(UnknownKindError, match="mist"):
         picture("mits", "quick")
     for size in SIZES.values():
-        assert size.side % tiles.TILES == 0
+        assert size.side % pictures.TILES == 0
     scene = picture("glass", "large", 5)
     assert (scene.film.size, scene.film.mode, scene.seed) == ((1024, 1024), "spectral", 5)
     assert PICTURES.keys() <= benchmark.scenes.SCENES.keys()

@@ -7,9 +7,9 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
-from clpt.bench import tiles
-from clpt.bench.picture_scenes import BENCHMARK_VERSION, PICTURES
-from clpt.bench.tiles import Reference, compare, limit, regions
+from clpt.bench import pictures
+from clpt.bench.pictures import Reference, compare, limit, regions
+from clpt.bench.scenes import BENCHMARK_VERSION, PICTURES
 
 SIDE, SAMPLES, COUNT = 32, 1000, 32
 NOISE = 0.01  # the standard deviation of a tile's mean
@@ -47,7 +47,7 @@ def test_right_pictures_are_called_wrong_at_the_stated_rate(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """At a rate of 0.1 in place of 1e-4, of 1,000 right ones 10 % at most: z < 4 (p = 3e-5)."""
-    monkeypatch.setattr(tiles, "FALSE_ALARMS", 0.1)
+    monkeypatch.setattr(pictures, "FALSE_ALARMS", 0.1)
     rng, wrong = np.random.default_rng(2), 0
     for _ in range(1000):
         wrong += bool(compare(picture(rng), reference(rng), SAMPLES).wrong)
@@ -82,11 +82,11 @@ def test_more_samples_find_smaller_faults() -> None:
 
 
 def test_references_are_shipped_for_every_scene() -> None:
-    kept = tiles.references()
+    kept = pictures.references()
     assert kept.keys() == PICTURES.keys()
-    with np.load(tiles.FILE) as file:
+    with np.load(pictures.FILE) as file:
         assert f'"version": {BENCHMARK_VERSION},' in str(file["about"])
-    assert tiles.FILE.stat().st_size < 64 << 10
+    assert pictures.FILE.stat().st_size < 64 << 10
     for one in kept.values():
         assert one.mean.shape == one.deviation.shape == (65, 3) and one.count % 2 == 0
         assert (one.mean > 0).all() and np.isfinite(one.deviation).all()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from clpt.bench.traffic import Moved, traffic
+from clpt.bench.stages import Moved, traffic
 from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Film, Scene, lights, materials, shapes
 from clpt.scene.cameras import Perspective

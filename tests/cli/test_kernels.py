@@ -10,7 +10,7 @@ import pytest
 from clpt import device
 from clpt.__main__ import run
 from clpt.bench import agreement
-from clpt.bench.picture_scenes import PICTURES
+from clpt.bench.scenes import PICTURES
 from clpt.choices import PICTURE_SCENES
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"

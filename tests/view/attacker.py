@@ -10,7 +10,7 @@ from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 
-from clpt.view.commands import Request
+from clpt.view.messages import Request
 from clpt.view.server import Server
 
 

@@ -33,7 +33,7 @@ from typing import Any
 from websockets.exceptions import InvalidHandshake, WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
-from clpt.view.commands import COMMANDS, Choice, Flag, Name, Number, Optional, Type, Whole
+from clpt.view.messages import COMMANDS, Choice, Flag, Name, Number, Optional, Type, Whole
 
 quiet = logging.getLogger(__name__)
 quiet.setLevel(logging.CRITICAL)

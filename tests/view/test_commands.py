@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from clpt.view.commands import (
+from clpt.view.messages import (
     COMMANDS,
     Choice,
     CommandError,

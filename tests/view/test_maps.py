@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clpt.view import maps
+from clpt.view import pictures
 
 SHAPE = (96, 128)
 
@@ -23,7 +23,7 @@ def test_the_error_is_that_of_independent_samples() -> None:
     """
     rng = np.random.default_rng(1)
     sigma = np.where(np.arange(SHAPE[1]) < SHAPE[1] // 2, 1.0, 4.0) * np.ones(SHAPE)
-    errors = maps.ErrorMap()
+    errors = pictures.ErrorMap()
     sums, count = np.zeros(SHAPE), 0
     for n in (4, 4, 8, 16, 16, 16):  # the film is noted at 4, 8, 16, 32, 64
         assert errors.of(film(sums, max(count, 1))) is None or count > 4
@@ -32,7 +32,7 @@ def test_the_error_is_that_of_independent_samples() -> None:
         if errors.wants(count):
             errors.note(film(sums, count))
     squared = errors.of(film(sums, count)) ** 2
-    inside = maps.WINDOW
+    inside = pictures.WINDOW
     left = squared[:, : SHAPE[1] // 2 - inside].mean()
     right = squared[:, SHAPE[1] // 2 + inside :].mean()
     # what is darker than DARK of the mean counts as brighter: the level is 10.1
@@ -42,7 +42,7 @@ def test_the_error_is_that_of_independent_samples() -> None:
 
 def test_colours_go_from_few_to_many() -> None:
     counts = np.tile(np.linspace(16, 64, SHAPE[1]), (SHAPE[0], 1))
-    shown, legend = maps.samples(np.dstack([np.zeros((*SHAPE, 3)), counts]).astype(np.float32))
+    shown, legend = pictures.samples(np.dstack([np.zeros((*SHAPE, 3)), counts]).astype(np.float32))
     assert shown.shape == (*SHAPE, 3) and (legend.low, legend.high) == ("16", "64 samples")
     brightness = shown[0].astype(int).sum(axis=1)
     assert (np.diff(brightness) >= 0).all() and brightness[-1] > 600 > 10 > brightness[0]
@@ -51,7 +51,7 @@ def test_colours_go_from_few_to_many() -> None:
 def test_pixels_that_get_no_more_samples_keep_out_of_the_mean() -> None:
     """A pixel that was left says nothing; its neighbours do."""
     rng = np.random.default_rng(2)
-    errors = maps.ErrorMap()
+    errors = pictures.ErrorMap()
     sums = 40.0 + 2.0 * rng.standard_normal(SHAPE)
     errors.note(film(sums, 4))
     later = film(sums + 120.0 + np.sqrt(12.0) * rng.standard_normal(SHAPE), 16)

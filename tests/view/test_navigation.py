@@ -10,7 +10,7 @@ import pytest
 from clpt import transforms
 from clpt.scene import viewpoint
 from clpt.scene.cameras import Camera, Matrix, Orthographic, Perspective, Spherical, ThinLens
-from clpt.view import navigation
+from clpt.view import camera_work
 
 ORIGIN, TARGET = np.array([1.0, 2.0, 5.0]), np.array([0.5, 0.0, 0.0])
 LOOK = transforms.look_at(ORIGIN, TARGET, [0, 1, 0])
@@ -44,7 +44,7 @@ def test_the_pose_is_that_of_look_at(camera: Camera) -> None:
 @each
 def test_an_orbit_keeps_the_pivot_where_it_is_seen(camera: Camera) -> None:
     pivot, up = np.array([0.2, 0.4, -0.3]), np.array([0.0, 1.0, 0.0])
-    turned = navigation.orbit(camera, pivot, up, 0.2, 0.1)
+    turned = camera_work.orbit(camera, pivot, up, 0.2, 0.1)
     before, after = viewpoint.pose(camera), viewpoint.pose(turned)
     assert np.linalg.norm(after.origin - pivot) == pytest.approx(
         np.linalg.norm(before.origin - pivot)
@@ -59,9 +59,9 @@ def test_an_orbit_keeps_the_pivot_where_it_is_seen(camera: Camera) -> None:
 def test_an_orbit_ends_before_the_pole(camera: Camera) -> None:
     up = np.array([0.0, 1.0, 0.0])
     for dy in (20.0, -20.0):
-        turned = navigation.orbit(camera, TARGET, up, 0.0, dy)
+        turned = camera_work.orbit(camera, TARGET, up, 0.0, dy)
         height = abs(viewpoint.pose(turned).forward @ up)
-        assert height == pytest.approx(math.cos(navigation.POLE), abs=1e-9)
+        assert height == pytest.approx(math.cos(camera_work.POLE), abs=1e-9)
 
 
 @pytest.mark.parametrize("camera", [CAMERAS[0], CAMERAS[1]], ids=lambda camera: camera.kind)
@@ -70,23 +70,23 @@ def test_pan_and_look_follow_the_pointer(camera: Camera) -> None:
     at, aspect = viewpoint.pose(camera), 1.5
     height = 2.0 * camera.half_height(aspect)
     distance = float(np.linalg.norm(TARGET - ORIGIN))
-    panned = navigation.pan(camera, distance, 0.1, 0.05, aspect)
+    panned = camera_work.pan(camera, distance, 0.1, 0.05, aspect)
     assert np.allclose(on_screen(panned, TARGET), (0.1 * height, 0.05 * height))
-    looked = navigation.look(camera, at.up, 0.01, 0.005, aspect)
+    looked = camera_work.look(camera, at.up, 0.01, 0.005, aspect)
     assert np.allclose(on_screen(looked, TARGET), (0.01 * height, 0.005 * height), rtol=0.1)
     assert np.allclose(viewpoint.pose(looked).origin, ORIGIN)
 
 
 @each
 def test_dolly_and_fly(camera: Camera) -> None:
-    near = navigation.dolly(camera, TARGET, math.log(2.0))
+    near = camera_work.dolly(camera, TARGET, math.log(2.0))
     if isinstance(camera, Orthographic):
         half = type(camera).half_height
         assert half(near, 1.0) == pytest.approx(half(camera, 1.0) / 2.0)
     else:
         assert np.allclose(viewpoint.pose(near).origin, (ORIGIN + TARGET) / 2.0)
     at = viewpoint.pose(camera)
-    flown = viewpoint.pose(navigation.fly(camera, 2.0, 0.5, 0.25, 1.0))
+    flown = viewpoint.pose(camera_work.fly(camera, 2.0, 0.5, 0.25, 1.0))
     assert np.allclose(flown.origin, ORIGIN - at.left + 0.5 * at.up + 2.0 * at.forward)
 
 

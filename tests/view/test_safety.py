@@ -21,9 +21,8 @@ from clpt import device
 from clpt.errors import LONGEST, ClptError, KernelBuildError, MemoryBudgetError, SceneError
 from clpt.scene import KINDS, cameras
 from clpt.scene.params import params
-from clpt.view import panels, views
-from clpt.view.commands import COMMANDS, CommandError, parse
-from clpt.view.messages import error_message
+from clpt.view import panels, saving
+from clpt.view.messages import COMMANDS, CommandError, error_message, parse
 from clpt.view.saving import Folder
 from clpt.view.session import Session
 from tests.view.test_commands import message
@@ -209,7 +208,7 @@ def test_no_view_names_a_file(tmp_path: Path) -> None:
                 for path in paths:
                     for value in namings(str(path)):
                         camera = {"type": cls.kind, key: value}
-                        told.append(refusal(lambda camera=camera: views.camera_of(camera)))  # type: ignore[misc]
+                        told.append(refusal(lambda camera=camera: saving.camera_of(camera)))  # type: ignore[misc]
     assert len(told) > 5000 and None not in told
     assert not any(SECRET in text or str(tmp_path) in text for text in told if text)
 
@@ -430,9 +429,9 @@ def test_a_view_keeps_what_it_does_not_hold(session: Session, audience: Audience
     lens = cameras.Lens(lens="tessar" if "tessar" in _lenses() else _lenses()[0])
     written = panels.written(lens)
     assert "lens" not in written
-    again = views.camera_of(written, lens)
+    again = saving.camera_of(written, lens)
     assert isinstance(again, cameras.Lens) and again.lens == lens.lens
-    assert views.camera_of({"type": "spherical"}, lens).kind == "spherical"
+    assert saving.camera_of({"type": "spherical"}, lens).kind == "spherical"
 
 
 def _lenses() -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from clpt.errors import ClptError
 from clpt.view import server as serving
 from clpt.view.access import Access, is_loopback
-from clpt.view.commands import LARGEST_MESSAGE
+from clpt.view.messages import LARGEST_MESSAGE
 from clpt.view.server import MOST_FRAMES, MOST_VIEWERS, SAFETY, Server
 from tests.view.attacker import Recorder, answer_to, ask, cookie, do, frame, message, opened
 

@@ -26,9 +26,9 @@ from clpt.errors import SceneError
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene, cameras, integrators, lights, shapes
 from clpt.scene.params import fields_of
-from clpt.view import panels, probe, views
-from clpt.view.commands import COMMANDS, CommandError, Request, parse
+from clpt.view import panels, probe, saving
 from clpt.view.look import Look
+from clpt.view.messages import COMMANDS, CommandError, Request, parse
 from clpt.view.saving import Folder
 from clpt.view.session import Session, Source, merged
 from clpt.view.target import Change
@@ -606,7 +606,7 @@ def test_a_view_is_copied_saved_and_opened(opened, audience, tmp_path) -> None:
     ask(session, audience, "home")
     ask(session, audience, "display", exposure=0.0, tone="none")
     assert not np.array_equal(audience.rest()[1], turned)
-    session.post(views.load(saved), audience.message)
+    session.post(saving.load(saved), audience.message)
     _, again = audience.rest()
     assert np.allclose(session.scene.camera.to_world, camera.to_world)
     assert np.array_equal(again, turned) and session.state()["display"]["tone"] == "aces"
@@ -632,7 +632,7 @@ def test_what_is_no_view_is_told(tmp_path, document, told) -> None:
     path = tmp_path / "a.view.json"
     path.write_text(json.dumps(document))
     with pytest.raises(SceneError, match=told):
-        views.load(path)
+        saving.load(path)
 
 
 def test_what_changes_no_sample_does_not_wait_for_them(opened, audience, monkeypatch) -> None:

@@ -11,9 +11,9 @@ from rich.table import Table
 from rich.text import Text
 
 from clpt import bench as benchmark
-from clpt.bench import apart, card, comparing, first_light, records, scenes
-from clpt.bench.comparing import Ratio
+from clpt.bench import apart, card, first_light, records, scenes
 from clpt.bench.figures import Figure
+from clpt.bench.records import Ratio
 from clpt.files import output_files
 
 from ... import device as dev
@@ -49,7 +49,7 @@ def _report(console: Console, which: Which, settings: Mapping[str, Any], report:
     label = str(about["device"])
     some = any(figure.rounds and not figure.refused for figure in figures)
     if report.before is not None and some:
-        ratios = comparing.against(figures, report.before, label)
+        ratios = records.against(figures, report.before, label)
         limit = report.fail_below
         _show_ratios(console, ratios, limit)
         failed |= limit is not None and any(ratio.below(limit) for ratio in ratios)

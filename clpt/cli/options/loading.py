@@ -52,11 +52,21 @@ def _parse(_: click.Context, __: click.Parameter, definitions: Iterable[str]) ->
     return {name: value for name, _, value in pairs}
 
 
+def _add_variants(ctx: click.Context, _: click.Parameter, variants: tuple[str, ...]) -> None:
+    """Make the variants a variable of the scene."""
+    if variants:
+        ctx.params["variables"]["variant"] = ",".join(variants)
+
+
 _OPTIONS = (
     click.option(
         "-D", "variables", multiple=True, metavar="NAME=VALUE", callback=_parse,
         is_eager=True,  # before --camera, which adds to it
         help="Set a $name of an .xml; of glTF scene, animation or time. See --frames for {frame}.",
+    ),
+    click.option(
+        "--variant", multiple=True, metavar="SET=NAME", expose_value=False, callback=_add_variants,
+        help="Select a variant of USD, or by its NAME of glTF.",
     ),
     click.option(
         "--load-memory", type=Bytes(), metavar="SIZE", expose_value=False,

@@ -120,9 +120,14 @@ class SceneOptions:
     @property
     def renderer_options(self) -> dict[str, Any]:
         """The options of renderers, see `RenderOptions`."""
+        return {**self.build, "denoise": self.changes.denoise}
+
+    @property
+    def build(self) -> dict[str, Any]:
+        """The options of trees and textures, by their names in `RenderOptions`."""
         return {
             "layout": self.layout, "tree_quality": self.tree_quality,
-            "texture_budget": self.texture_budget, "denoise": self.changes.denoise,
+            "texture_budget": self.texture_budget,
         }  # fmt: skip
 
     def scene(self, file: Path, progress: Progress | None = None) -> Scene:

@@ -17,11 +17,11 @@ from ...cluster.multi_renderer import MultiRenderer
 from ...formats import locate
 from ...scene import Scene
 from ...view.access import is_loopback
-from ...view.commands import OF_VIEW
+from ...view.messages import OF_VIEW
 from ...view.pictures import Display
 from ...view.saving import Folder
+from ...view.saving import load as load_view
 from ...view.session import Session, Source
-from ...view.views import load as load_view
 from ..display import Display as Progress
 from ..display import display
 from ..files import outputs, targets
@@ -59,7 +59,7 @@ def show(scene: Path, settings: Settings) -> int:
             display=looked_at,
             where=where,
             make=make,
-            **settings.options.renderer_options,
+            **settings.options.build,
         )
         resources.callback(session.close)
         if begins is not None:

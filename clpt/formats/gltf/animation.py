@@ -214,6 +214,8 @@ def _deforming(
     if any(not np.array_equal(way.faces, shape.faces) for way in ways):
         warnings.append(f"{name}: its triangles are others at other times")
         return shape
+    if all(way.vertices is shape.vertices and way.normals is shape.normals for way in ways):
+        return shape
     points = np.stack([np.asarray(way.vertices) for way in ways])
     normals = None
     if all(way.normals is not None for way in ways):

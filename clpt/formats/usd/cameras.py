@@ -10,17 +10,15 @@ from pxr import Usd, UsdGeom
 from clpt import transforms
 from clpt.formats.gltf.cameras_lights import FROM_GLTF, size
 from clpt.formats.usd.document import Document
+from clpt.formats.usd.render_settings import Settings
 from clpt.scene.cameras import Camera, Orthographic, Perspective, ThinLens
 
 TENTH = 0.1  # of a unit of the stage: the unit of focal lengths and apertures
 FAR = 1e30  # [m] where the file's far plane is none
 
 
-def camera(document: Document, prim: Usd.Prim, aspect: float | None) -> Camera:
-    """Return a camera. aspect: of the picture, None for that of the camera's aperture.
-
-    A picture that is wider or higher than the aperture shows more.
-    """
+def camera(document: Document, prim: Usd.Prim, settings: Settings) -> Camera:
+    """Return a camera for a picture of the settings' form."""
     view = UsdGeom.Camera(prim).GetCamera(document.time)
     to_world = transforms.rigid(document.to_metres @ document.placement(prim)) @ FROM_GLTF
     width, height = view.horizontalAperture, view.verticalAperture
@@ -29,8 +27,7 @@ def camera(document: Document, prim: Usd.Prim, aspect: float | None) -> Camera:
     unit = TENTH * document.metres
     near, far = view.clippingRange.min * document.metres, view.clippingRange.max * document.metres
     shared: dict[str, Any] = {"near": max(near, 0.0), "far": far if far > near else FAR}
-    if aspect is not None:
-        width, height = max(width, height * aspect), max(height, width / aspect)
+    width, height = settings.aperture(width, height)
     if view.projection == view.Orthographic:
         half = 0.5 * width * unit
         return Orthographic(to_world=to_world @ transforms.scale([half, half, 1.0]), **shared)
@@ -42,7 +39,7 @@ def camera(document: Document, prim: Usd.Prim, aspect: float | None) -> Camera:
         "offset_x": view.horizontalApertureOffset / width,
         "offset_y": -view.verticalApertureOffset / height,
     }
-    if view.fStop > 0.0 and view.focusDistance > 0.0:
+    if view.fStop > 0.0 and view.focusDistance > 0.0 and not settings.sharp:
         radius = 0.5 * view.focalLength * unit / view.fStop
         focus = view.focusDistance * document.metres
         return ThinLens(aperture_radius=radius, focus_distance=focus, **shared)

@@ -21,7 +21,7 @@ Kept = TypeVar("Kept")
 class Document:
     """A stage that is read at one time code.
 
-    file: of the root layer; time: the time code; metres: of a unit of the stage; up: "y" or "z";
+    file: of the root layer; code: the time code; metres: of a unit of the stage; up: "y" or "z";
     level: of subdivision, None for that which suits each mesh. left_out: prim paths by message.
     """
 
@@ -29,16 +29,21 @@ class Document:
         self,
         file: Path,
         stage: Usd.Stage,
-        time: Usd.TimeCode,
+        time: float,
         level: int | None = None,
     ):
-        self.file, self.stage, self.time, self.level = file, stage, time, level
+        self.file, self.stage, self.level = file, stage, level
         self.metres = float(UsdGeom.GetStageMetersPerUnit(stage))
         self.up: Up = "z" if UsdGeom.GetStageUpAxis(stage) == "Z" else "y"
         self.to_metres = np.diag([self.metres] * 3 + [1.0])
-        self.transforms = UsdGeom.XformCache(time)
         self.left_out: dict[str, list[str]] = {}
         self.memory: dict[object, Any] = {}
+        self.set_time(time)
+
+    def set_time(self, code: float) -> None:
+        """Read at another time code from now on."""
+        self.code, self.time = code, Usd.TimeCode(code)
+        self.transforms = UsdGeom.XformCache(self.time)
 
     def warn(self, message: str, path: object) -> None:
         """Note what is left out or replaced at a prim."""

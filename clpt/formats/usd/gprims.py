@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, UsdShade
 
 from clpt import transforms
@@ -94,7 +95,7 @@ def content(
         material = document.memory["bound", key[1]]
         prototype = several[0].GetPrototype()
         make = partial(content, document, prototype, np.eye(4), material, depth + 1)
-        inner = document.once(("content", *key), make)
+        inner = document.once(("content", document.code, *key), make)
         whole.copies.append((inner, np.stack([placement(prim) for prim in several])))
     for prim in prims["instancers"]:
         whole.copies += _instancer(document, prim, placement(prim), inherited, depth)
@@ -132,27 +133,40 @@ def _instancer(
         return []
     budget.take_parts(len(indices), "instances", document.file)
     budget.take(BYTES * len(indices), "instances", document.file)
-    whole = instancer.ComputeInstanceTransformsAtTime(
-        document.time, document.time, UsdGeom.PointInstancer.ExcludeProtoXform,
-        UsdGeom.PointInstancer.IgnoreMask,
-    )  # fmt: skip
-    matrices = placement @ np.array(whole, np.float64).reshape(-1, 4, 4).swapaxes(1, 2)
+    matrices, there = _transforms(document, instancer, len(indices))
     if len(matrices) != len(indices):
         document.warn("left out: its arrays are not of one length", prim.GetPath())
         return []
-    mask = instancer.ComputeMaskAtTime(document.time)
-    there = np.array(list(mask), bool) if len(mask) else np.ones(len(indices), bool)
+    matrices = placement @ matrices
     copies = []
     for number, root in enumerate(roots):
         own = matrices[there & (indices == number)]
         if not root or not len(own):
             continue
         above = transforms.inverse(document.placement(root.GetParent()))
-        key = "content", str(root.GetPath()), str(inherited.GetPath()) if inherited else ""
+        key = (
+            "content",
+            document.code,
+            str(root.GetPath()),
+            str(inherited.GetPath()) if inherited else "",
+        )
         make = partial(content, document, root, above, inherited, depth + 1)
         inner = document.once(key, make)
         copies.append((inner, own))
     return copies
+
+
+def _transforms(
+    document: Document, instancer: UsdGeom.PointInstancer, count: int
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return the transforms of instances (n, 4, 4), and which are shown, (count,)."""
+    whole = instancer.ComputeInstanceTransformsAtTime(
+        document.time, document.time, UsdGeom.PointInstancer.ExcludeProtoXform,
+        UsdGeom.PointInstancer.IgnoreMask,
+    )  # fmt: skip
+    mask = instancer.ComputeMaskAtTime(document.time)
+    there = np.array(list(mask), bool) if len(mask) else np.ones(count, bool)
+    return np.array(whole, np.float64).reshape(-1, 4, 4).swapaxes(1, 2), there
 
 
 def placed(document: Document, whole: Content) -> list[Shape]:

@@ -11,24 +11,38 @@ from numpy.typing import NDArray
 from pxr import Usd, UsdGeom, UsdShade
 
 from clpt.arrays import Integers
+from clpt.files import budget
 from clpt.formats.meshes.mesh import Arrays, checked
 from clpt.formats.usd import primvars
 from clpt.formats.usd.document import Document, rows
 from clpt.formats.usd.materials import Surface, surface
 from clpt.formats.usd.primvars import Primvar, Topology
+from clpt.geometry import catmull_clark
+from clpt.geometry.catmull_clark import Cage
 from clpt.geometry.polygons import smooth_normals, triangulate
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import SECOND_UV
 
+MOST_FACES = 400_000  # of a mesh that is refined by a level of its own
+# How the boundaries of texture coordinates go, by faceVaryingLinearInterpolation.
+BOUNDARIES = {"none": "edgeOnly", "boundaries": "linear", "all": "bilinear"}
+
 
 @dataclasses.dataclass(frozen=True)
 class Polygons:
-    """A mesh before it is cut into triangles: its vertices (n, 3), faces and primvars by name."""
+    """A mesh before it is cut into triangles: its vertices (n, 3), faces and normals.
+
+    parents (f,): the face of the file of each face. cage: of the file's faces, if these were
+    refined, `levels` times.
+    """
 
     points: NDArray[np.float32]
     topology: Topology
     normals: Primvar | None
+    parents: Integers
     flipped: bool
+    cage: Cage | None = None
+    levels: int = 0
 
 
 def meshes(document: Document, prim: Usd.Prim, material: UsdShade.Material | None) -> list[Mesh]:
@@ -37,21 +51,31 @@ def meshes(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
     material: that of the faces in no subset. Raises SceneError for faces of vertices that are not
     there.
     """
-    polygons = _polygons(document, prim)
-    if polygons is None:
+    stays = not any(
+        prim.GetAttribute(name).ValueMightBeTimeVarying() for name in ("points", "normals")
+    )
+    key = "meshes", str(prim.GetPath()), str(material.GetPath()) if material else ""
+    if stays:
+        return document.once(key, lambda: _all(document, prim, material))
+    return _all(document, prim, material)
+
+
+def _all(document: Document, prim: Usd.Prim, material: UsdShade.Material | None) -> list[Mesh]:
+    topology = _topology(document, prim)
+    if topology is None:
         return []
-    parts = []
-    for faces, bound in _subsets(document, prim, len(polygons.topology.counts), material):
-        both = bool(document.value(prim, "doubleSided", False))
+    polygons = _polygons(document, prim, topology)
+    both, parts = bool(document.value(prim, "doubleSided", False)), []
+    for faces, bound in _subsets(document, prim, len(topology.counts), material):
         look = surface(document, bound, prim, both=both)
         part = _mesh(document, prim, polygons, faces, look)
         parts += [] if part is None else [part]
     return parts
 
 
-def _polygons(document: Document, prim: Usd.Prim) -> Polygons | None:
-    """Return a mesh prim's polygons; None for a mesh without any."""
-    points = document.array(prim, "points", 3)
+def _topology(document: Document, prim: Usd.Prim) -> Topology | None:
+    """Return a mesh prim's faces; None for a mesh without any."""
+    points = document.value(prim, "points")
     counts = document.array(prim, "faceVertexCounts", 0, np.int64)
     corners = document.array(prim, "faceVertexIndices", 0, np.int64)
     if points is None or counts is None or corners is None or not len(corners):
@@ -62,9 +86,116 @@ def _polygons(document: Document, prim: Usd.Prim) -> Polygons | None:
     if corners.min() < 0 or corners.max() >= len(points):
         message = f"faceVertexIndices name a vertex beyond the {len(points)} that there are"
         raise document.error(message, prim.GetPath())
-    topology = Topology(counts, corners, len(points))
+    return Topology(counts, corners, len(points))
+
+
+def _polygons(document: Document, prim: Usd.Prim, topology: Topology) -> Polygons:
+    points = document.array(prim, "points", 3)
     flipped = document.value(prim, "orientation", "rightHanded") == "leftHanded"
-    return Polygons(points, topology, _normals(document, prim, topology), flipped)
+    scheme = str(document.value(prim, "subdivisionScheme", "catmullClark"))
+    levels = document.level
+    if levels is None:
+        levels = next((n for n in (2, 1) if len(topology.corners) * 4 ** (n - 1) <= MOST_FACES), 0)
+    if scheme == "catmullClark" and levels > 0 and (topology.counts >= 3).all():
+        return _refined(document, prim, topology, points, levels, flipped)
+    parents = np.arange(len(topology.counts))
+    own = _normals(document, prim, topology)
+    if own is None and scheme in ("catmullClark", "loop"):
+        triangles, _ = triangulate(points, topology.counts, topology.corners)
+        smooth = smooth_normals(points, topology.corners[triangles])
+        own = Primvar(-smooth if flipped else smooth, np.arange(len(points)), "vertex")
+    return Polygons(points, topology, own, parents, flipped)
+
+
+def _refined(
+    document: Document,
+    prim: Usd.Prim,
+    topology: Topology,
+    points: NDArray[np.float32],
+    levels: int,
+    flipped: bool,
+) -> Polygons:
+    """Return the polygons of a Catmull-Clark surface, at their limit."""
+    budget.take(300 * len(topology.corners) * 4 ** (levels - 1), "subdivision", document.file)
+    cage = _cage(document, prim, topology)
+    child, moved = catmull_clark.refined(cage, points.astype(np.float64), levels)
+    at = catmull_clark.limits(child, moved)
+    directions, corner = catmull_clark.normals(child, at)
+    if flipped:
+        directions = -directions
+    parents = np.repeat(np.arange(len(topology.counts)), topology.counts)
+    return Polygons(
+        at.astype(np.float32),
+        Topology(child.counts, child.corners, len(at)),
+        Primvar(directions.astype(np.float32), corner, "faceVarying"),
+        np.repeat(parents, 4 ** (levels - 1)),
+        flipped, cage, levels,
+    )  # fmt: skip
+
+
+def _cage(document: Document, prim: Usd.Prim, topology: Topology) -> Cage:
+    """Return a prim's faces with its creases, sharp corners and boundaries."""
+    sharp = np.zeros(topology.vertices)
+    corners = rows(document.value(prim, "cornerIndices", ()), 0, np.int64)
+    sharpness = rows(document.value(prim, "cornerSharpnesses", ()), 0, np.float64)
+    lengths = rows(document.value(prim, "creaseLengths", ()), 0, np.int64)
+    chain = rows(document.value(prim, "creaseIndices", ()), 0, np.int64)
+    crease = rows(document.value(prim, "creaseSharpnesses", ()), 0, np.float64)
+    whole = np.concatenate([corners, chain])
+    if len(whole) and (whole.min() < 0 or whole.max() >= topology.vertices):
+        raise document.error("a crease or corner names a vertex that is not there", prim.GetPath())
+    if len(corners) == len(sharpness):
+        sharp[corners] = sharpness
+    edges = np.zeros((0, 2), np.int64)
+    if len(lengths) and (lengths >= 2).all() and lengths.sum() == len(chain):
+        last = np.cumsum(lengths) - 1
+        inner = np.setdiff1d(np.arange(len(chain)), last)
+        edges = np.stack([chain[inner], chain[inner + 1]], axis=1)
+        # A chain has one sharpness, or one for each of its edges.
+        each = np.repeat(crease, lengths - 1) if len(crease) == len(lengths) else crease
+        crease = each if len(each) == len(edges) else np.full(len(edges), catmull_clark.INFINITE)
+    rule = str(document.value(prim, "interpolateBoundary", "edgeAndCorner"))
+    rule = "edgeOnly" if rule == "edgeOnly" else "edgeAndCorner"
+    return Cage(topology.counts, topology.corners, edges, crease[: len(edges)], sharp, rule)
+
+
+def _primvar(
+    document: Document, prim: Usd.Prim, polygons: Polygons, name: str, width: int
+) -> Primvar | None:
+    """Return a primvar for a mesh's faces, refined as they are."""
+    cage = polygons.cage
+    if cage is None:
+        return primvars.read(document, prim, name, polygons.topology, width)
+    coarse = Topology(cage.counts, cage.corners, len(cage.corner))
+    primvar = primvars.read(document, prim, name, coarse, width)
+    if primvar is None or primvar.interpolation == "constant":
+        return primvar
+    if primvar.interpolation == "uniform":
+        return dataclasses.replace(primvar, indices=primvar.indices[polygons.parents])
+    if primvar.interpolation == "faceVarying":
+        rule = str(document.value(prim, "faceVaryingLinearInterpolation", "cornersPlus1"))
+        first, like = primvars.joined([cage.corners, primvar.indices])
+        values, corners = primvar.values[primvar.indices[first]], like
+        cage = Cage(
+            cage.counts, corners, np.zeros((0, 2), np.int64), np.zeros(0), np.zeros(len(first)),
+            BOUNDARIES.get(rule, "edgeAndCorner"),
+        )  # fmt: skip
+        child, moved = _limit_values(cage, values, polygons.levels)
+        return Primvar(moved, child.corners, "faceVarying")
+    if primvar.interpolation == "varying":
+        cage = dataclasses.replace(cage, smooth="bilinear")
+    moved = _limit_values(cage, primvar.values[primvar.indices], polygons.levels)[1]
+    return Primvar(moved, np.arange(len(moved)), "vertex")
+
+
+def _limit_values(
+    cage: Cage, values: NDArray[np.float32], levels: int
+) -> tuple[Cage, NDArray[np.float32]]:
+    """Return a refined cage and its values at the limit surface."""
+    child, moved = catmull_clark.refined(cage, values.astype(np.float64), levels)
+    if cage.smooth != "bilinear":
+        moved = catmull_clark.limits(child, moved)
+    return child, moved.astype(np.float32)
 
 
 def _normals(document: Document, prim: Usd.Prim, topology: Topology) -> Primvar | None:
@@ -107,16 +238,20 @@ def _mesh(
     """Return the mesh of some faces; None where they have no triangle."""
     topology = polygons.topology
     triangles, polygon = triangulate(polygons.points, topology.counts, topology.corners)
-    if faces is not None:
-        chosen = np.zeros(len(topology.counts), bool)
-        chosen[faces] = True
-        triangles = triangles[chosen[polygon]]
+    holes = rows(document.value(prim, "holeIndices", ()), 0, np.int64)
+    if faces is not None or len(holes):
+        chosen = np.ones(int(polygons.parents.max()) + 1, bool)
+        if faces is not None:
+            chosen[:] = False
+            chosen[faces] = True
+        chosen[holes[(holes >= 0) & (holes < len(chosen))]] = False
+        triangles = triangles[chosen[polygons.parents[polygon]]]
     if not len(triangles):
         return None
     if polygons.flipped:
         triangles = triangles[:, ::-1]
     named = {"normals": polygons.normals} | {
-        name: primvars.read(document, prim, name, topology, width)
+        name: _primvar(document, prim, polygons, name, width)
         for name, width in look.primvars.items()
     }
     used = {name: primvar for name, primvar in named.items() if primvar is not None}
@@ -124,9 +259,6 @@ def _mesh(
     for name, row in look.fallbacks.items():
         values.setdefault(name, np.tile(np.array([row], np.float32), (len(values[""]), 1)))
     normals = values.pop("normals", None)
-    if normals is None and document.value(prim, "subdivisionScheme", "catmullClark") != "none":
-        smooth = smooth_normals(polygons.points, topology.corners[triangles])
-        normals = smooth[values[""][:, 0].astype(np.int64)]
     return _shape(document, prim, look, polygons, values, normals, like.reshape(-1, 3))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -12,20 +13,26 @@ from pxr import Gf, Tf, Usd, UsdUtils, Vt  # noqa: F401  all are loaded at one t
 from clpt.errors import SceneError, nearest
 from clpt.files import input_files
 from clpt.formats import framing
-from clpt.formats.usd import cameras, gprims, lights
+from clpt.formats.gltf import animation
+from clpt.formats.usd import cameras, gprims, lights, render_settings
 from clpt.formats.usd.document import Document
 from clpt.scene import Scene
 from clpt.scene.lights import Constant, Light
 
-VARIABLES = ("camera",)
+VARIABLES = ("camera", "time", "shutter", "variant", "subdivision")
 DARK = Constant(radiance=0.0)  # in place of the studio's lights where shapes alone shine
+MOST_LEVELS = 6  # of subdivision
+PLACED = re.compile(r"In <(.*?)>: (.*?)(?: introduced by | \(|\n|$)", re.DOTALL)
 
 
 def load(path: Path, /, **variables: Any) -> Scene:
     """Read a stage; a camera or light that it lacks is added, as for a bare mesh.
 
-    variables: `camera` is the name, the prim path or the number of one of several. Raises
-    SceneError with the prim path of what is wrong.
+    variables: `camera` is the name, the prim path or the number of one of several. `time` is a time
+    code, by default the stage's first. `shutter`: time codes from `time` on for which light comes
+    to the film, by default as the camera says. `variant`: SET=NAME, several with commas between.
+    `subdivision`: levels of subdivision surfaces. Raises SceneError with the prim path of what is
+    wrong.
     """
     unknown = sorted(set(variables) - set(VARIABLES))
     if unknown:
@@ -33,14 +40,99 @@ def load(path: Path, /, **variables: Any) -> Scene:
         raise SceneError(f"USD has no variable {unknown[0]!r}{advice}", file=path)
     delegate = UsdUtils.CoalescingDiagnosticDelegate()  # OpenUSD's own messages go here
     stage = _opened(path)
-    start = stage.GetStartTimeCode()
-    time = Usd.TimeCode(start) if stage.HasAuthoredTimeCodeRange() else Usd.TimeCode.EarliestTime()
-    document = Document(path, stage, time)
-    scene = _scene(document, variables)
+    _select(path, stage, str(variables.get("variant", "")))
+    level = variables.get("subdivision")
+    document = Document(
+        path,
+        stage,
+        _first_time(stage) if "time" not in variables else _number(path, variables, "time"),
+        None if level is None else int(_number(path, variables, "subdivision", 0, MOST_LEVELS)),
+    )
+    scene = _over_shutter(document, variables)
     for entry in delegate.TakeUncoalescedDiagnostics():
-        document.warn(entry.commentary.splitlines()[0], "OpenUSD")
-    scene.warnings = document.warnings()
+        placed = PLACED.match(entry.commentary)
+        text = placed[2] if placed else entry.commentary.splitlines()[0]
+        document.warn(text, placed[1] if placed else "OpenUSD")
+    scene.warnings = document.warnings() + scene.warnings
     return scene
+
+
+def _number(
+    path: Path,
+    variables: dict[str, Any],
+    name: str,
+    low: float = -1e9,
+    high: float = 1e9,
+) -> float:
+    """Return a variable that is a number within its limits. Raises SceneError for another."""
+    try:
+        number = float(variables[name])
+    except (TypeError, ValueError):
+        number = math.nan
+    if not low <= number <= high:
+        message = f"{name} must be a number from {low:g} to {high:g}, not {variables[name]!r}"
+        raise SceneError(message, file=path)
+    return number
+
+
+def _first_time(stage: Usd.Stage) -> float:
+    """Return the first time code of a stage, or that of its first sample."""
+    if stage.HasAuthoredTimeCodeRange():
+        return float(stage.GetStartTimeCode())
+    samples = [layer.ListAllTimeSamples() for layer in stage.GetUsedLayers()]
+    return float(min((times[0] for times in samples if times), default=0.0))
+
+
+def _over_shutter(document: Document, variables: dict[str, Any]) -> Scene:
+    """Return the scene, whose prims move while the shutter is open."""
+    stage, time = document.stage, document.code
+    scene = _scene(document, variables)
+    opening, length = scene.extra.pop("shutter")
+    if "shutter" in variables:
+        opening, length = 0.0, _number(document.file, variables, "shutter", 0.0)
+    moves = any(layer.ListAllTimeSamples() for layer in stage.GetUsedLayers())
+    if not length > 0.0 or not moves:
+        return scene
+    rate = stage.GetTimeCodesPerSecond()
+
+    def at(seconds: float) -> Scene:
+        document.set_time(seconds * rate)
+        posed = _scene(document, variables)
+        del posed.extra["shutter"]
+        return posed
+
+    return animation.scene_over_shutter(at, (time + opening) / rate, length / rate)
+
+
+def _select(path: Path, stage: Usd.Stage, variants: str) -> None:
+    """Select variants on all prims that have them. Raises SceneError for those of no prim."""
+    for choice in filter(None, variants.split(",")):
+        name, equals, wanted = choice.strip().partition("=")
+        if not equals:
+            message = f"a variant is SET=NAME, not {choice!r}; the stage has {_variants(stage)}"
+            raise SceneError(message, file=path)
+        known = False
+        for prim in stage.TraverseAll():
+            selection = prim.GetVariantSets().GetVariantSet(name)
+            if wanted in selection.GetVariantNames():
+                known = True
+                with Usd.EditContext(stage, stage.GetSessionLayer()):
+                    selection.SetVariantSelection(wanted)
+        if not known:
+            message = f"has no variant {choice.strip()!r}; it has {_variants(stage)}"
+            raise SceneError(message, file=path)
+
+
+def _variants(stage: Usd.Stage) -> str:
+    """Return the variants of a stage, for people."""
+    known = {
+        f"{name}={variant}"
+        for prim in stage.TraverseAll()
+        if prim.HasVariantSets()
+        for name in prim.GetVariantSets().GetNames()
+        for variant in prim.GetVariantSet(name).GetVariantNames()
+    }
+    return ", ".join(sorted(known)) or "none"
 
 
 def _opened(path: Path) -> Usd.Stage:
@@ -49,9 +141,12 @@ def _opened(path: Path) -> Usd.Stage:
     try:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as error:
-        raise SceneError(
-            f"is no USD file that can be read{_reason(error, path)}", file=path
-        ) from None
+        message = f"is no USD file that can be read{_reason(error, path)}"
+        raise SceneError(message, file=path) from None
+    for layer in stage.GetUsedLayers():
+        layer.Reload()  # one that was read before, and has changed since
+        if layer.realPath and layer.realPath != str(path):
+            input_files.checked(input_files.named("usd", path.parent, Path(layer.realPath)))
     return stage
 
 
@@ -68,21 +163,29 @@ def _scene(document: Document, variables: dict[str, Any]) -> Scene:
         lit = lights.light(document, prim, matrix)
         own_lights += lit.lights
         shapes += lit.shapes
-    chosen = _chosen(document, world.cameras, variables.get("camera"))
+    settings = render_settings.settings(document)
+    chosen = _chosen(document, world.cameras, variables.get("camera", settings.camera))
     if not shapes:
         document.warn("holds no shapes", "/")
-    view = None if chosen is None else cameras.camera(document, chosen, None)
+    view = None if chosen is None else cameras.camera(document, chosen, settings)
     glowing = [] if own_lights else [shape for shape in shapes if shape.emission is not None]
     known = own_lights or ([DARK] if glowing else [])
     scene = framing.show(shapes, file=document.file, camera=view, own_lights=known, up=document.up)
     scene.lights = [light for light in scene.lights if light is not DARK]
     scene.extra["cameras"] = [str(prim.GetPath()) for prim in world.cameras]
+    scene.extra["shutter"] = (0.0, 0.0)
+    size = settings.size
     if chosen is not None:
-        width, height = cameras.picture_size(document, chosen)
+        size = size or cameras.picture_size(document, chosen)
         stops = cameras.exposure(document, chosen)
-        scene.film = dataclasses.replace(
-            scene.film, width=width, height=height, display_exposure=stops
+        scene.film = dataclasses.replace(scene.film, display_exposure=stops)
+        opening, closing = (
+            document.number(chosen, f"shutter:{side}", 0.0) for side in ("open", "close")
         )
+        if not settings.still:
+            scene.extra["shutter"] = (opening, closing - opening)
+    if size is not None:
+        scene.film = dataclasses.replace(scene.film, width=size[0], height=size[1])
     return scene
 
 

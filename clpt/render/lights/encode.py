@@ -37,6 +37,7 @@ INFINITE_SHARE = 0.5  # of the choices, beside other lights
 
 FEW_LIGHTS = 256  # the most lights for which a random number chooses a light and a point on it
 
+
 @dataclass(frozen=True)
 class LightRows:
     """The table `lights`, and what features and settings need to know of it.

@@ -113,7 +113,7 @@ LightSample emissive_body_sample(EmissiveBody l, Scene scene, vec3 p, vec2 u, Wa
     return s;
 }
 
-/* Step chosen: the density of next-event estimation from p for a direction d in which a body is [1/sr]. */
+/* Step chosen: the density of next-event estimation from p for a direction d to a body [1/sr]. */
 inline real body_light_pdf(Scene scene, integer row, vec3 p, Receiver receiver, vec3 d)
 {
     LightRow l = light_at(scene, row);

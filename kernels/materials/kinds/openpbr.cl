@@ -1,7 +1,7 @@
 /* OpenPBR Surface 1.1: from the outside in fuzz, a coat, and facets of a metal or of a dielectric, under which light is
  * scattered back, goes into a body that scatters it, or is let through. A layer dims what lies under it by its
  * directional albedo. f [1/sr]. Front side; both sides where light goes through; thin: both sides are alike, light is
- * not refracted. The index of the base is that over the coat, where there is one, and nearer to 1 where
+ * not refracted. The index of the base is relative to the coat's if there is a coat, and nearer to 1 where
  * `specular_weight` is below 1. As in materials/kinds/gltf_surface.cl no branch is around work that lobes share. */
 #include "materials/openpbr_layers.cl"
 
@@ -189,8 +189,8 @@ inline Spectrum openpbr_under(Openpbr m, OpenpbrParts p, vec3 wo, vec3 wi, mask 
     return v;
 }
 
-/* What a coat does: the share that it reflects of light from wo and from wi, and the colour that is left of what goes
- * through it both ways, darkened by what it throws back. */
+/* The effect of a coat: its reflectance for light from wo and from wi, and the transmittance of its colour both ways,
+ * also with darkening by internal reflection. */
 typedef struct { real o, i; Spectrum absorbed, darkened; } OpenpbrCoat;
 /* Passes through the coat, as many as it takes to be seen through at its index. */
 inline real openpbr_passes(Openpbr m, real z)
@@ -302,8 +302,8 @@ inline Spectrum openpbr_facets(Openpbr m, OpenpbrParts p, vec3 wo, vec3 wi, real
     return spectrum_scale(turned, v * share);
 }
 
-/* How layers above dim what they reflect shares o and i of: facets by the lesser of what is left, and diffuse light by
- * both over the mean, which loses nothing where both are seen from above. */
+/* The transmittance of a layer with reflectances o and i for wo and wi: for facets the lesser transmittance, for
+ * diffuse light the product of both over the mean, which conserves energy if both directions are above. */
 typedef struct { real facets, diffuse; } OpenpbrDimmed;
 inline OpenpbrDimmed openpbr_dimmed(OpenpbrDimmed d, real o, real i, real mean, mask both)
 {
@@ -353,7 +353,7 @@ inline Spectrum openpbr_value(Openpbr m, OpenpbrParts p, vec3 wo, vec3 wi)
         FuzzLobe o = fuzz_lobe(fabs(wo.z), m.fuzz_roughness), i = fuzz_lobe(fabs(wi.z), m.fuzz_roughness);
         real e_o = sel(thin | front, m.fuzz_weight * fuzz_albedo(o), (real)(0.0f));
         real e_i = sel(thin | (wi.z > 0.0f), m.fuzz_weight * fuzz_albedo(i), (real)(0.0f));
-        real mean = max_r(fuzz_albedo_mean(o) - 0.01f, (real)(0.0f)); /* of what facets let through: less */
+        real mean = max_r(fuzz_albedo_mean(o) - 0.01f, (real)(0.0f)); /* facets let less through */
         fuzzy = openpbr_dimmed(dimmed, e_o, e_i, m.fuzz_weight * mean, both);
         v = spectrum_scale(m.fuzz_color, sel(outside, m.fuzz_weight * fuzz(o, i, wo, wi), (real)(0.0f)));
         dimmed = fuzzy;
