@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clpt.formats.mitsuba.principled import at_yellow
 from clpt.formats.mitsuba.properties import Context
@@ -22,7 +23,8 @@ from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.params import fields_of
 from clpt.scene.textures import Product
-from clpt.spectra import RGB, Constant, RGBUnbounded
+from clpt.scene.values import Textured, TexturedNumber
+from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum
 
 KINDS = ("coating", "roughcoating")
 METALS = {
@@ -46,10 +48,10 @@ class Coat:
     element: Element
     context: Context
     indices: dict[str, Any]
-    specular: Any
-    alpha: Any
+    specular: Textured
+    alpha: TexturedNumber
     rough: bool
-    depth: Any
+    depth: Spectrum | float
     kept: dict[str, Any]
 
     def over(self, base: Material) -> Material:
@@ -91,7 +93,7 @@ class Coat:
         values = {**self.kept, **coat, "coat_alpha": self.alpha, **metal, **smooth}
         return materials.CoatedConductor(**values)
 
-    def _over_diffuse(self, albedo: Any) -> Material:
+    def _over_diffuse(self, albedo: Textured) -> Material:
         """Return Plastic whose base is darker by the light that Plastic sends back to it."""
         inside = float(scattering.EVEN @ scattering.internal_fresnel(self._ratio))
         base = map_values(self._absorbed(albedo), lambda r: r / (1.0 + inside * r))
@@ -101,7 +103,7 @@ class Coat:
             return materials.RoughPlastic(**values, alpha=self.alpha)
         return materials.Plastic(**values)
 
-    def _absorbed(self, albedo: Any) -> Any:
+    def _absorbed(self, albedo: Textured) -> Any:
         """Return a reflectance times the mean transmittance of the coat, in and out."""
         if self.depth in (0.0, Constant(0.0)):
             return albedo
@@ -116,7 +118,7 @@ class Coat:
         return Product(first=albedo, second=share, rgb=True)
 
 
-def transmitted_twice(ior: float, depth: Any) -> Any:
+def transmitted_twice(ior: float, depth: ArrayLike) -> Any:
     """Return the square of the mean transmittance of even light that is refracted into a layer.
 
     ior: relative index; depth: optical depths along the normal, any shape, which is returned.
