@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,9 +21,9 @@ from clpt.errors import SceneError
 from clpt.render.edit.plan import Plan
 from clpt.render.film.state import FilmState, Ranges
 from clpt.render.makers import planning
-from clpt.render.makers.contents import Contents
+from clpt.render.makers.contents import Contents, Settle
 from clpt.render.makers.device_film import DeviceFilm, open_device
-from clpt.render.makers.maker import Call, Held, Settle
+from clpt.render.makers.maker import Call, Held, Tick
 from clpt.render.makers.planning import Changes
 from clpt.render.options import check_options, check_scene
 from clpt.render.resumable import ResumableRenderer
@@ -147,7 +147,7 @@ class ClusterMaker(HostMaker):
 
         return settle
 
-    def run(self, call: Call, adaptive: Adaptive | None, tick: Callable[[], bool]) -> bool:
+    def run(self, call: Call, adaptive: Adaptive | None, tick: Tick) -> bool:
         """Add samples to all pixels, filling gaps, or to noisy pixels; see `Farm.run`."""
         if adaptive is not None and call.noise is not None:
             return adaptive.run(call.end, call.noise, lambda _: tick())
@@ -173,13 +173,13 @@ class ClusterMaker(HostMaker):
             end, left = max(after, end), left - gap
         return first, end + left
 
-    def add(self, selection: Selection, first: int, end: int, tick: Callable[[], bool]) -> bool:
+    def add(self, selection: Selection, first: int, end: int, tick: Tick) -> bool:
         """Add samples first to end - 1 of a selection; return False after a stop."""
         return self._take(selection, self._pixels, (first, end), None, tick)
 
     def _take(
         self, selection: Selection, pixels: int, samples: tuple[int, int], taken: Ranges | None,
-        tick: Callable[[], bool],
+        tick: Tick,
     ) -> bool:  # fmt: skip
         """Add samples, see `Farm.run`; taken: None where pixels have different samples."""
         merged = taken is not None

@@ -17,9 +17,9 @@ from clpt.errors import DeviceError, SceneError
 from clpt.render.edit.plan import Plan
 from clpt.render.film.state import FilmState, Ranges
 from clpt.render.makers import planning
-from clpt.render.makers.contents import Contents
+from clpt.render.makers.contents import Contents, Settle
 from clpt.render.makers.device_film import DeviceFilm, texture_budget_of
-from clpt.render.makers.maker import Call, Held, Settle
+from clpt.render.makers.maker import Call, Held, Tick
 from clpt.render.makers.planning import Changes
 from clpt.render.options import RenderOptions, check_options, check_scene
 from clpt.render.resumable import ResumableRenderer
@@ -121,7 +121,7 @@ class DevicesMaker(HostMaker):
 
         return settle
 
-    def run(self, call: Call, adaptive: Adaptive | None, tick: Callable[[], bool]) -> bool:
+    def run(self, call: Call, adaptive: Adaptive | None, tick: Tick) -> bool:
         """Add samples to the film; return whether all were added.
 
         Raises ClusterError when the last device has failed: the film then holds the saved samples.
@@ -143,14 +143,14 @@ class DevicesMaker(HostMaker):
                 self._drop(adaptive.wavefront, error)
                 self.put(film)
 
-    def _run_adaptively(self, call: Call, adaptive: Adaptive, tick: Callable[[], bool]) -> bool:
+    def _run_adaptively(self, call: Call, adaptive: Adaptive, tick: Tick) -> bool:
         if call.noise is not None:
             return adaptive.run(call.end, call.noise, lambda _: tick())
         finished = self.add(self.crew.whole, call.first, call.end, tick)
         adaptive.skip(call.end)  # after a stop too: sample numbers are not reused
         return finished
 
-    def add(self, selection: Selection, first: int, end: int, tick: Callable[[], bool]) -> bool:
+    def add(self, selection: Selection, first: int, end: int, tick: Tick) -> bool:
         """Add samples first to end - 1 of a selection; return False after a stop."""
         return self.crew.run(selection, ((first, end),), tick)
 

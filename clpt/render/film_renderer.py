@@ -30,8 +30,16 @@ from clpt.render.film.saved_film import (
     other_devices,
 )
 from clpt.render.film.state import join_ranges
-from clpt.render.makers.contents import Change, Contents, FilmOwner, Stop, healing, synchronized
-from clpt.render.makers.maker import Call, Discarded, Maker, Settle
+from clpt.render.makers.contents import (
+    Change,
+    Contents,
+    FilmOwner,
+    Settle,
+    Stop,
+    healing,
+    synchronized,
+)
+from clpt.render.makers.maker import Call, Discarded, Maker
 from clpt.render.makers.planning import Changes
 from clpt.render.options import check_changes, check_scene
 from clpt.render.progress import Progress
@@ -67,7 +75,7 @@ class FilmRenderer(FilmOwner, Pictures):
         self._seconds: dict[str, float] = {}  # to the first sample
         self._seconds_rendered = 0.0  # since the film was empty, or gone on with
         self._telling = False  # of progress, while samples are taken
-        self._told: list[str] = []  # warnings of what took samples before
+        self._told: list[str] = []  # warnings of earlier sessions on other devices
 
     # ---- what there is
 
@@ -78,7 +86,7 @@ class FilmRenderer(FilmOwner, Pictures):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of the scene, and of those who take its samples, for people."""
+        """Warnings of the scene, and of devices and workers, for people."""
         return [one_line(text, LONGEST_WARNING) for text in (*self._maker.warnings, *self._told)]
 
     @property
@@ -98,7 +106,7 @@ class FilmRenderer(FilmOwner, Pictures):
 
     @property
     def counts(self) -> Counts:
-        """Counts of samples and rays so far, and of those that the film refused."""
+        """Counts of samples and rays so far, and of samples that the film refused."""
         if self._closed:
             raise self._closed_error()
         return self._maker.counts
@@ -120,7 +128,7 @@ class FilmRenderer(FilmOwner, Pictures):
 
     @property
     def first_sample(self) -> int:
-        """The number of the first sample of the film, or of the first one to come."""
+        """The number of the first sample of the film, or of the next if the film is empty."""
         taken = self._known.taken
         return taken[0][0] if taken and not self._maker.adds_films else self._first_sample
 
@@ -132,7 +140,7 @@ class FilmRenderer(FilmOwner, Pictures):
 
     @property
     def _former_seconds(self) -> float:
-        """Seconds for which others rendered the film, before this renderer went on with it."""
+        """The rendering time of earlier sessions of the film [s]."""
         return sum(session.seconds for session in self._known.sessions)
 
     @property
@@ -174,16 +182,15 @@ class FilmRenderer(FilmOwner, Pictures):
     def run(
         self, samples: int, progress: OnProgress | None = None, *, noise: float | None = None
     ) -> bool:
-        """Add samples to every pixel and wait; `self.samples` is then the next one's number.
+        """Add samples to every pixel and wait; `self.samples` is then the number of the next.
 
-        noise: leave pixels as soon as the noise around them is as low, relative to the picture,
-        such as 0.02; `samples` is then the most that a pixel gets, see
-        clpt.render.wavefront.adaptive. A renderer with `denoise` counts what is left after that.
-        progress: called every few milliseconds to seconds; if it returns something false, but not
-        None, the run stops soon, as after `cancel`. Returns whether it came to its end. What
-        progress raises, or Ctrl+C at any line, is raised when the paths in flight have ended. The
-        film is whole after a stop too:
-        its pixels have fewer samples, and the numbers of those left out are not used again.
+        noise: a limit of the relative noise around pixels that get more samples, such as 0.02;
+        `samples` is then the most that a pixel gets, see clpt.render.wavefront.adaptive. A renderer
+        with `denoise` measures the noise after denoising. progress: called every few milliseconds
+        to seconds; if it returns a false value other than None, the run stops soon, as after
+        `cancel`. Returns whether the run was completed. An error of progress, or Ctrl+C at any
+        line, is raised when the paths in flight have ended. The film is whole after a stop too: its
+        pixels have fewer samples, and numbers of omitted samples are not used again.
 
         Raises SceneError for noise that makes no sense with the scene, and for more than 2^31 - 1
         samples.
@@ -209,7 +216,7 @@ class FilmRenderer(FilmOwner, Pictures):
         return finished
 
     def _add_samples(self, call: Call, watch: Watch) -> bool:
-        """Add samples to all pixels, or to those with noise; return whether all were added.
+        """Add samples to all pixels, or to noisy pixels; return whether all were added.
 
         watch: called all the while.
         """
@@ -254,12 +261,12 @@ class FilmRenderer(FilmOwner, Pictures):
         finally:
             self._contents = settle(None)
 
-    def _adding(self, what: str, call: Call) -> tuple[Change, Settle]:
-        """Return the change of a film that samples are added to, and what it then holds."""
+    def _adding(self, name: str, call: Call) -> tuple[Change, Settle]:
+        """Return the change that adds samples to the film, and the function that ends it."""
         now = self._settled
         taken = join_ranges(now.taken, ((call.first, call.end),))
         settle = self._maker.begin(call, now, dataclasses.replace(now, taken=taken))
-        return self._change(what, settle), settle
+        return self._change(name, settle), settle
 
     def _so_far(self, end: int, seconds: float) -> Progress:
         """Return how far a run is after some seconds; end: the number after its last sample."""
@@ -272,19 +279,18 @@ class FilmRenderer(FilmOwner, Pictures):
         return Progress(mean, end, counts.samples, counts.rays, seconds, self.active, noise)
 
     def cancel(self, *, discard: bool = False) -> None:
-        """Let the `run` of another thread, or else the next one, stop soon and return False.
+        """Let the `run` of another thread, or else the next `run`, stop soon and return False.
 
-        discard: the film is of no use any more, which one device makes use of: paths in flight are
-        left as they are, which is sooner, and a run that has begun leaves the film as after
-        `reset`. A step is not stopped. It may be called from anywhere, also from a signal's
-        handler, and waits for nothing.
+        discard: the film is not needed any more. A single device then abandons paths in flight,
+        which stops sooner, and the film is empty as after `reset`. A step is not stopped. `cancel`
+        may be called from anywhere, also from a signal's handler, and waits for nothing.
         """
         if discard:
             self._maker.leave(True)
         self._stop.set()
 
     def _rest(self) -> None:
-        """Note that no run is under way, nor to be stopped any more."""
+        """Note that no run is under way, and withdraw requests to stop."""
         self._telling = False
         self._maker.leave(False)
         self._stop.clear()
@@ -297,7 +303,7 @@ class FilmRenderer(FilmOwner, Pictures):
         seed: int | None = None,
         first_sample: int | None = None,
     ) -> cl.Event:
-        """Enqueue that the film is emptied; the next sample is the first one again.
+        """Enqueue that the film is emptied; the next sample is the first sample again.
 
         wait_for: events of the caller that come first. first_sample: its number from now on, from
         0 to 2^31 - 1, by default as before. seed: of the samples from now on, from 0 to 2^32 - 1,
@@ -337,17 +343,17 @@ class FilmRenderer(FilmOwner, Pictures):
     ) -> cl.Event:
         """Bring what changed to the device, and begin again at sample 0.
 
-        camera: another one. materials: by the material of the scene that they replace, or by a
+        camera: another camera. materials: by the material of the scene that they replace, or by a
         shape's key. transforms: (4, 4) by shape; vertices: (n, 3) float32 by shape, of numpy or on
         the device; of `Spheres` their centres, perhaps (n, 4) with the radii. The key of a shape is
         the shape, its name, or its index in `scene.shapes`. A shape or material that the renderer
         had at first remains the key of whatever has replaced it. scene: another scene of the same
-        film, for any other change; arrays and images that it shares with the present one are taken
-        to be unchanged, and what is "auto" is chosen anew, as edits alone do not. motion: what
-        changes place, of shapes, lights and the camera, moves from where it was to where it is, and
-        so do vertices, while the shutter of the camera is open; the next update goes on from there.
-        wait_for: events of the caller that come first. The scene is lowered again then, and once
-        more after.
+        film, for any other change; arrays and images that it shares with the present scene are
+        taken to be unchanged, and what is "auto" is chosen anew, as edits alone do not. motion:
+        what changes place, of shapes, lights and the camera, moves from where it was to where it
+        is, and so do vertices, while the shutter of the camera is open; the next update goes on
+        from there. wait_for: events of the caller that come first. The scene is lowered again then,
+        and once more after.
 
         The first of three ways that is possible is taken:
 
@@ -363,8 +369,8 @@ class FilmRenderer(FilmOwner, Pictures):
         `self.scene` is then the new scene, and the picture will be that of a new renderer. At level
         DEBUG the logger `clpt.render.renderer` says why a quicker way was not taken.
 
-        Raises SceneError for what is not in the scene, or makes no sense in it, and for a film of
-        another size, TypeError for a scene that is none; nothing has changed then. Raises
+        Raises SceneError for keys that are not in the scene, for invalid values, and for a film of
+        another size, TypeError for a `scene` of another type; nothing has changed then. Raises
         MemoryBudgetError and KernelBuildError where the device cannot do what the new scene needs.
         """
         if scene is not None:
@@ -399,8 +405,8 @@ class FilmRenderer(FilmOwner, Pictures):
             return maker
         now = self._settled
 
-        def finish(error: BaseException) -> Contents:
-            if isinstance(error, Exception):
+        def finish(error: BaseException | None) -> Contents:
+            if error is None or isinstance(error, Exception):
                 return now  # the last device has failed
             raise error  # samples may be in two films, or in none
 
@@ -425,9 +431,9 @@ class FilmRenderer(FilmOwner, Pictures):
     def denoised(self, method: str | None = None) -> Image:
         """The picture so far without most of its noise, as `image` returns it.
 
-        method: oidn or statistical, by default what the renderer was made for, else oidn. Make the
-        renderer with the option `denoise`: so the film has what the denoiser wants. See
-        `clpt.DenoisedPicture`, also for what it raises.
+        method: oidn or statistical, by default the renderer's option `denoise`, else oidn. With
+        this option the film has the layers that the denoiser needs. See `clpt.DenoisedPicture`,
+        also for the errors that it raises.
         """
         return DenoisedPicture(self, method).image()
 
@@ -442,9 +448,9 @@ class FilmRenderer(FilmOwner, Pictures):
         """Write the picture so far to a file, in the format of the path's suffix; wait for it.
 
         An .exr has the film's layers and bands, and as its data window the place of a crop. A
-        renderer with `denoise` writes what is denoised. A film with alpha: see `clpt.write_image`.
-        exposure [stops] over the film's `display_exposure`, tone, view: of files for screens, see
-        `clpt.write_image`.
+        renderer with `denoise` writes the denoised picture. A film with alpha: see
+        `clpt.write_image`. exposure [stops] over the film's `display_exposure`, tone, view: of
+        files for screens, see `clpt.write_image`.
 
         Raises SceneError for an unknown suffix, and for a file that cannot be written.
         """
@@ -473,7 +479,7 @@ class FilmRenderer(FilmOwner, Pictures):
 
 
 class Watch:
-    """Called while a run takes samples: it tells of them, and returns whether they go on.
+    """A callback of a run: it reports the progress, and returns whether the run goes on.
 
     end: the number after the last sample. raised: what `progress` raised.
     """
@@ -509,17 +515,17 @@ class Watch:
 
 
 def maker_of(renderer: FilmRenderer) -> Maker:
-    """Return what takes the samples of a renderer, for other parts of clpt."""
+    """Return the maker of a renderer, for other parts of clpt."""
     return renderer._maker
 
 
 def next_range(first: int, samples: int) -> tuple[int, int]:
-    """Return the numbers, first and end, of so many samples from the first. Raises SceneError."""
+    """Return the range of so many samples from the first. Raises SceneError."""
     return first, checked_number(first + checked_samples(samples))
 
 
 def checked_number(number: int) -> int:
-    """Return a sample's number. Raises SceneError for one below 0, and for one too large."""
+    """Return a sample's number. Raises SceneError for a number below 0, and for a large number."""
     number = scalars.whole(number, 0, where="first_sample")
     if number > MOST_SAMPLES:
         raise SceneError(f"a pixel cannot have more than {MOST_SAMPLES} samples", where="samples")
@@ -527,7 +533,7 @@ def checked_number(number: int) -> int:
 
 
 def checked_samples(samples: int) -> int:
-    """Return a number of samples. Raises SceneError for one that is none."""
+    """Return a number of samples. Raises SceneError unless it is whole and above 0."""
     if not scalars.is_whole(samples) or samples < 1:
         raise SceneError(f"samples per pixel must be a whole number above zero, not {samples!r}")
     return int(samples)

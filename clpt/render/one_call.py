@@ -1,10 +1,10 @@
-"""From a scene or a file to a picture in one call."""
+"""`clpt.render`: from a scene or a file to a picture."""
 
 from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -15,9 +15,8 @@ from clpt import device as dev
 from clpt import formats
 from clpt.arrays import Image
 from clpt.errors import SceneError
-from clpt.render.film_renderer import checked_samples
+from clpt.render.film_renderer import OnProgress, checked_samples
 from clpt.render.options import RenderOptions, check_names, check_scene
-from clpt.render.progress import Progress
 from clpt.render.renderer import Renderer
 from clpt.scalars import is_number, is_whole, plain
 from clpt.scene import Film, Scene, viewpoint
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 CameraLike = Camera | Sequence[float] | NDArray[Any] | str | int
-SHOWN, SHOWN_SAMPLES = 400, 32  # pixels a side and samples of what a notebook shows of a scene
+SHOWN, SHOWN_SAMPLES = 400, 32  # pixels a side and samples of a scene's picture in notebooks
 ORBIT = "(azimuth, elevation), such as (45, 20), or with a distance, in those that frame the scene"
 
 
@@ -36,8 +35,8 @@ class PictureOptions(RenderOptions, total=False):
 
     size: (width, height) of the picture [pixels].
     mode: "spectral" or "rgb".
-    camera: a camera; (azimuth, elevation) in degrees, or with a distance, from which the whole
-    scene is seen; or, of a file with several, the name or number of one.
+    camera: a camera; (azimuth, elevation) in degrees, or with a distance, of a camera that frames
+    the whole scene; or the name or number of a camera in a file with several.
     env: an image that surrounds the scene, in place of its sky and of the light of the studio.
 
     What is left out, or None, is as the scene has it.
@@ -59,7 +58,7 @@ def render(
     *,
     noise: float | None = None,
     device: dev.Device | str | int | None = None,
-    progress: Callable[[Progress], bool | None] | None = None,
+    progress: OnProgress | None = None,
     **options: Unpack[PictureOptions],
 ) -> Image:
     """Render a scene or a file: (h, w, 3) float32 linear Rec. 709; else see `Renderer.image`.
@@ -68,8 +67,8 @@ def render(
     spp: samples per pixel, by default the scene's own.
     noise: leave pixels as soon as they have as little noise, such as 0.02; see `Renderer.run`.
     device, progress: see `Renderer` and `Renderer.run`.
-    options: size=(width, height), mode, camera, env: see `PictureOptions`; and `RenderOptions`,
-    with whose `denoise` the picture is denoised.
+    options: size=(width, height), mode, camera, env: see `PictureOptions`; and `RenderOptions`;
+    with `denoise` the picture is denoised.
 
     Raises as `clpt.load` and `Renderer` do.
     """

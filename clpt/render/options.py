@@ -19,29 +19,29 @@ from clpt.scene.params import Kind, params
 
 
 class RenderOptions(TypedDict, total=False):
-    """Named arguments of `clpt.render` and `clpt.Renderer`. No one needs them for a right picture.
+    """Named arguments of `clpt.render` and `clpt.Renderer`. Pictures are right without them.
 
     queue: a `pyopencl.CommandQueue` of the caller, instead of a device: all buffers and programs
     are made in its context, all commands go there, and no other OpenCL object is made or changed.
     threads: how many cores of a CPU take part at most.
     profiling: whether the queue that is made measures times, for `Renderer.stats`.
-    texture_budget: [bytes] that bitmaps may take; larger ones are halved. By default half of what
-    the device has free.
+    texture_budget: [bytes] for bitmaps; larger bitmaps are halved. By default half of the free
+    memory of the device.
     layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS.
     tree_quality: "high", or "fast", which is built sooner and traced a little slower.
     slots: paths in flight.
-    queued: whether stages that the host enqueues shade along queues by material; they can where a
-    work-item shades one path, as on GPUs. The loop on the device sorts by itself.
+    queued: whether stages that the host enqueues shade along queues by material, which is possible
+    for work-items that shade a single path, as on GPUs. The loop on the device sorts by itself.
     looped: whether a kernel on the device runs all bounces.
     first_sample: the number of the first sample, 0 to 2^31 - 1, by default 0. Renderers that take
     other numbers have other samples, and their films merge, see `Renderer.merge`.
     halves: whether even and odd samples are kept apart, for `Renderer.halves`.
-    denoise: oidn or statistical, for `Renderer.denoised`: the scene gets what the denoiser wants,
-    see clpt.denoise.needs.
-    cancel_seconds: [s] in which a `run` is to end after `cancel`, for pictures that people steer:
-    the device gets less to do at once, and is a little slower.
+    denoise: oidn or statistical, for `Renderer.denoised`: the scene gets the layers that the
+    denoiser needs, see clpt.denoise.needs.
+    cancel_seconds: [s] from `cancel` to the end of a `run`, for interactive pictures: launches are
+    shorter, and the device is a little slower.
 
-    What is left out, or None, is chosen to suit the device and the scene.
+    An option that is absent or None has a default for the device and the scene.
     """
 
     queue: cl.CommandQueue | None
@@ -60,12 +60,12 @@ class RenderOptions(TypedDict, total=False):
 
 
 def check_scene(scene: object) -> None:
-    """Raise TypeError for what is no scene."""
+    """Raise TypeError unless `scene` is a Scene."""
     if isinstance(scene, Scene):
         return
-    found = f"{scene!r}" if isinstance(scene, str) else type(scene).__name__
+    value = f"{scene!r}" if isinstance(scene, str) else type(scene).__name__
     advice = f"clpt.load({scene!r}) reads one" if isinstance(scene, str) else "clpt.load reads one"
-    raise TypeError(f"the scene must be a clpt.Scene, not {found}; {advice} from a file")
+    raise TypeError(f"the scene must be a clpt.Scene, not {value}; {advice} from a file")
 
 
 def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
@@ -77,8 +77,8 @@ def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
     check_names(scene, options, RenderOptions.__annotations__)
     queue, layout = options.get("queue"), options.get("layout")
     if queue is not None and not isinstance(queue, cl.CommandQueue):
-        found = f"queue must be a pyopencl.CommandQueue, not {type(queue).__name__}"
-        raise TypeError(f"{found}; a device is chosen by its name or index: device={queue!r}")
+        message = f"queue must be a pyopencl.CommandQueue, not {type(queue).__name__}"
+        raise TypeError(f"{message}; a device is chosen by its name or index: device={queue!r}")
     if layout is not None and layout not in bvh.LAYOUTS:
         raise UnknownKindError("layout", str(layout), bvh.LAYOUTS, where="layout")
     if options.get("denoise") is not None and needs.check_method(options["denoise"]) == "oidn":
@@ -98,7 +98,7 @@ def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
 
 
 def check_changes(camera: object, **by_key: object) -> None:
-    """Raise SceneError for what `Renderer.update` cannot take as a camera or as changes by key."""
+    """Raise SceneError for a camera or changes by key that `Renderer.update` cannot take."""
     if camera is not None and not isinstance(camera, Camera):
         message = f"must be a camera, such as clpt.scene.cameras.Perspective, not {camera!r}"
         raise SceneError(message, where="camera")

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pyopencl as cl
 
 from clpt import device as dev
-from clpt.render.film_renderer import next_range
+from clpt.render.film_renderer import OnProgress, next_range
 from clpt.render.makers.contents import synchronized
 from clpt.render.makers.device_film import DeviceFilm, open_device
 from clpt.render.makers.device_maker import DeviceMaker
@@ -31,14 +30,14 @@ class Renderer(ResumableRenderer):
 
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
     progress: called when a step has ended, in a thread of the driver. beside: another renderer, of
-    a scene that has much in common with this one, such as the same in another size: what both need
-    is prepared once, so an array that both have is to hold the same. options: see `RenderOptions`.
+    a similar scene, such as the same in another size: shared parts are prepared once, so an array
+    that both scenes have must hold the same values. options: see `RenderOptions`.
 
-    It may be used from several threads: one method runs at a time. With `with`, `close`, or when it
-    is dropped, it gives the device's memory back.
+    It may be used from several threads, whose calls exclude each other. With `with`, `close`, or
+    when it is dropped, it gives the device's memory back.
 
-    Raises TypeError for what is no scene, queue or option; SceneError for a scene or an option that
-    makes no sense; DeviceError, MemoryBudgetError, KernelBuildError.
+    Raises TypeError for a wrong type of scene, queue or option; SceneError for an invalid scene or
+    option; DeviceError, MemoryBudgetError, KernelBuildError.
     """
 
     _maker: DeviceMaker
@@ -48,7 +47,7 @@ class Renderer(ResumableRenderer):
         scene: Scene,
         device: dev.Device | str | int | None = None,
         *,
-        progress: Callable[[Progress], Any] | None = None,
+        progress: OnProgress | None = None,
         beside: Renderer | None = None,
         **options: Unpack[RenderOptions],
     ):
@@ -61,7 +60,7 @@ class Renderer(ResumableRenderer):
 
     @synchronized
     def step(self, samples: int = 1, wait_for: dev.Events = None) -> cl.Event:
-        """Enqueue `samples` more of every pixel; `self.samples` is then the next one's number.
+        """Enqueue `samples` more of every pixel; `self.samples` is then the number of the next.
 
         Nothing is waited for or read: when the event that is returned has ended, `film` holds the
         picture. wait_for: events of the caller that come first. On an in-order queue whatever the
@@ -81,10 +80,10 @@ class Renderer(ResumableRenderer):
             self._report_later(event, self._progress_of_steps)
         return event
 
-    def _report_later(self, event: cl.Event, progress: Callable[[Progress], Any]) -> None:
+    def _report_later(self, event: cl.Event, progress: OnProgress) -> None:
         """Call `progress` once the event has ended.
 
-        What the caller then raises is logged: in a thread of the driver nobody could catch it.
+        An error of the caller is logged: nobody could catch it in a thread of the driver.
         """
         samples, start = self.samples, self._maker.start
         pixels = self._wavefront.paths.pixels

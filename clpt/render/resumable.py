@@ -52,10 +52,11 @@ class ResumableRenderer(FilmRenderer):
 
     @synchronized
     def merge(self, state: FilmState) -> None:
-        """Add the samples of another film of the same scene to this one, and wait.
+        """Add the samples of another film of the same scene to this film, and wait.
 
-        The picture is then that of one renderer that took them all, to the bit. To go on where a
-        state was taken, merge it into a new renderer. `self.samples` is then after the last one.
+        The picture is then equal to the bit to the picture of a renderer that took all samples. To
+        continue a state, merge it into a new renderer. `self.samples` is then the number after the
+        last sample.
 
         Raises SceneError if the film has another form, or a sample is in both: nothing has changed.
         """
@@ -64,9 +65,9 @@ class ResumableRenderer(FilmRenderer):
         self._put("merge", merged, after)
 
     def _put(
-        self, what: str, film: FilmState, after: Contents, counts: Counts | None = None
+        self, name: str, film: FilmState, after: Contents, counts: Counts | None = None
     ) -> None:
-        """Let the film be another one; after: what it then holds; counts: where it goes on."""
+        """Replace the film; after: its contents; counts: of a film that is continued."""
 
         def put(_: BaseException | None = None) -> Contents:
             self._maker.put(film, counts)
@@ -74,15 +75,15 @@ class ResumableRenderer(FilmRenderer):
                 self._held, self._seconds_rendered = None, 0.0
             return after
 
-        with self._change(what, put):
+        with self._change(name, put):
             self._contents = put()
 
     def save_state(self, path: str | Path) -> None:
-        """Write the film to a file, from which `load_state` goes on, in another process too.
+        """Write the film to a file for `load_state`, also in another process.
 
-        path: of the file; the former one is replaced.
+        path: of the file; a former file is replaced.
 
-        Raises SceneError for a file that cannot be written: the former one is then as it was.
+        Raises SceneError for a file that cannot be written: the former file is then unchanged.
         """
         saved = self.saved_film()
         try:
@@ -213,10 +214,9 @@ class ResumableRenderer(FilmRenderer):
     def film(self) -> dev.DeviceArray:
         """The picture so far on the device, (h, w, 4) float32, valid when its `events` have ended.
 
-        Red, green and blue, linear in the film's output space, as `colours` but for an ulp of what
-        they are sums of; last, how many samples the pixel has. Always the same memory, on the
-        renderer's queue; steps wait for those of its `events` that readers add, as its `get_async`
-        does.
+        Red, green and blue, linear in the film's output space, equal to `colours` within an ulp of
+        the largest sum; last, the number of samples of the pixel. Always the same memory, on the
+        renderer's queue; steps wait for `events` that readers add, as its `get_async` does.
         """
         return self._wavefront.film.picture
 

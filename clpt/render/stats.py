@@ -17,12 +17,12 @@ class RenderStats:
     are intersected without triangles; lights: rows to choose from; integrator: its kind, and
     light_paths: for each sample, with the reason where clpt chose them, else ""; light_paths_end:
     where they end, so that what follows is left to the camera's paths: kinds of materials, and
-    "normal maps"; photons: most of a pass; photon_radius: of the first one's disk [m]. tables,
+    "normal maps"; photons: most of a pass; photon_radius: of the first pass's disks [m]. tables,
     trees: bytes by name; photon_memory: bytes of the photons; memory: of all buffers on the device.
     programs: built before the first sample; programs_cached: those of them that were in clpt's
     cache (a driver does not tell what it takes from its own). seconds: of `lower`, `trees` and
-    `programs`; from the start to `ready`, when samples may begin, and, once there is one, to
-    `first_sample`.
+    `programs`; from the start to `ready`, when samples may begin, and to
+    `first_sample`, after the first sample.
     """
 
     triangles: int
@@ -70,7 +70,7 @@ def collect(
         photons=photons.places if photons else 0,
         photon_radius=float(lowered.settings["radius"]),
         photon_memory=photons.bytes if photons else 0,
-        # A table that the scene does not need has one word.
+        # A table that the scene does not need has a single word.
         tables={name: array.nbytes for name, array in arrays.items() if array.size > 1},
         trees=scene.trees.bytes,
         memory=scene.buffers.used + sum(scene.trees.bytes.values()),

@@ -78,6 +78,18 @@ class Light(Kind):
         """The name of its record, and of its functions, in kernels."""
         return self.kind
 
+    def record_members(self) -> dict[str, Any]:
+        """Return members of its record beside its placement and emission, by name.
+
+        "factor" is the image that its light passes; see `clpt.render.records.lights`.
+        """
+        return {}
+
+    @property
+    def image_half_size(self) -> tuple[float, float]:
+        """Half the width and height of its image a metre away; 1 for an image all around."""
+        return 1.0, 1.0
+
     def bounds(self) -> LightBounds | None:
         """Return the box around all points that emit, and the cone of their rays, before `motion`.
 
@@ -269,6 +281,11 @@ def _cone(
     return LightBounds(origin, origin, axis, theta_o, theta_e)
 
 
+def _normalized(image: Textured) -> dict[str, Any]:
+    scale, factor = image.normalized() if is_texture(image) else (1.0, image)
+    return {"scale": scale, "factor": factor}
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Spot(PoweredLamp):
     """A point that emits into a cone about +z of `to_world`, smoothly cut off at its edge."""
@@ -288,6 +305,20 @@ class Spot(PoweredLamp):
     @property
     def record(self) -> str:
         return "image_spot" if is_texture(self.image) else self.kind
+
+    def record_members(self) -> dict[str, Any]:
+        """Return its cone, and its image if any."""
+        return {
+            "cutoff": np.radians(self.cutoff),
+            "beam_width": np.radians(min(self.beam_width, self.cutoff)),
+            "smooth": SPOT_EDGES.index(self.edge),
+            **({"factor": self.image} if is_texture(self.image) else {}),
+        }
+
+    @property
+    def image_half_size(self) -> tuple[float, float]:
+        half = float(np.tan(np.radians(self.cutoff)))
+        return half, half
 
     def extent(self, area: float) -> float:
         """Return the solid angle of its cone, each direction counted as strong as it is [sr]."""
@@ -342,9 +373,18 @@ class Projector(Lamp):
         """Return its position and the half space in front of it."""
         return _cone(self.to_world, math.pi / 2.0, NARROW)
 
+    @property
+    def image_half_size(self) -> tuple[float, float]:
+        half = float(np.tan(np.radians(self.fov) / 2.0))
+        return half, half / self.image_aspect
+
+    def record_members(self) -> dict[str, Any]:
+        """Return its image with values up to 1, and their scale."""
+        return _normalized(self.image)
+
     def sampling_power(self, strength: float, scene_radius: float, image_mean: float) -> float:
         """Estimate its power [W/nm] from the area of its image a metre away."""
-        half = float(np.tan(np.radians(self.fov) / 2.0))
+        half, _ = self.image_half_size
         return 4.0 * half * half / self.image_aspect * strength * image_mean
 
 
@@ -363,10 +403,10 @@ class Goniometric(PoweredLamp):
     image: Textured = reflectance(1.0, "factor by direction; a bitmap may go beyond 1")
     to_world: Matrix4 = host(np.eye(4), "placement, (4, 4), without a shear")
 
-    @property
-    def polar_image(self) -> Textured:
-        """The image with its first and last rows held at the poles."""
-        return self.image.clamped_at_poles() if is_texture(self.image) else self.image
+    def record_members(self) -> dict[str, Any]:
+        """Return its image, clamped at the poles, with values up to 1, and their scale."""
+        image = self.image
+        return _normalized(image.clamped_at_poles() if is_texture(image) else image)
 
     def extent(self, area: float) -> float:
         """Return the solid angle of all directions, before the image takes its share [sr]."""

@@ -14,6 +14,7 @@ from clpt.geometry import triangles
 from clpt.render.lights import encode as lights
 from clpt.render.lights import images as image_lights
 from clpt.render.lights.check import check_light
+from clpt.render.lights.find import environment_of
 from clpt.render.lights.images import face_coordinates, face_directions
 from clpt.render.records import lights as light_records
 from clpt.scene.lights import (
@@ -344,7 +345,7 @@ def test_images_are_chosen_by_what_they_send(name):
     value = r[5] / r[4]
     assert (r[4] > 0.0).all()
     assert value.std() < 0.1 * value.mean()
-    mean = image_lights.mean_radiance(image_lights.content(lamp, scene.encoder.look))
+    mean = environment_of(lamp, scene.encoder.look).strength
     assert value.mean() == pytest.approx(4.0 * np.pi * mean, rel=0.02)
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clpt.render.lights import power as light_power
-from clpt.render.lights.find import emissions_of
+from clpt.render.lights.find import emissions_of, light_power
 from clpt.render.spectra.look import Look
 
 from ... import images
@@ -171,7 +170,7 @@ def _outshone(scene: Scene) -> Iterator[str]:
     """Yield a sentence where a lamp with a place sends out far more watts than any other lamp."""
     lit, look = plainly_lit(scene), Look.of(scene.film)
     powers = [
-        (light_power.power(lamp, _watts(lamp, look), 1.0, look), f"lights[{i}] ({lamp.kind})")
+        (light_power(lamp, _watts(lamp, look), 1.0, look), f"lights[{i}] ({lamp.kind})")
         for i, lamp in enumerate(lit.lights)
         if lamp.reach == "placed"
     ]

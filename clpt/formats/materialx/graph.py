@@ -24,6 +24,7 @@ LEAST, MOST = 256, 2048  # pixels along a side of a baked image
 PATTERN = 1024  # of a baked pattern without images
 DEEPEST = 200  # nodes, one after the other
 WRAPS = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror", "constant": "zero"}
+PLACES = np.random.default_rng(8).uniform(-1.0, 1.0, (4, 4, 3))  # in space, likewise
 PASSING = ("dot", "extract", "separate2", "separate3", "separate4")
 PROBES = np.random.default_rng(7).uniform(-1.0, 2.0, (4, 4, 2))  # places that tell how uv are moved
 
@@ -83,7 +84,8 @@ class Domain:
 
     own: whether the pixels of images are taken as they are. leaves, sets: what the graph has read;
     patterns: whether it reads coordinates beside those of images; varies: whether it reads any.
-    outputs: those of nodes that have been evaluated.
+    places: (h, w, 3) in space, None where there are none; solid: whether it reads them. outputs:
+    those of nodes that have been evaluated.
     """
 
     uv: Floats
@@ -91,32 +93,41 @@ class Domain:
     leaves: list[Leaf] = field(default_factory=list)
     sets: list[str] = field(default_factory=list)
     patterns: bool = False
+    places: Floats | None = None
+    solid: bool = False
     outputs: dict[tuple[str, str], Floats] = field(default_factory=dict)
 
     @property
     def varies(self) -> bool:
-        return bool(self.leaves or self.sets)
+        return bool(self.leaves or self.sets or self.solid)
+
+
+def probing() -> Domain:
+    """Return a domain of random places."""
+    return Domain(PROBES, places=PLACES)
 
 
 Evaluate = Callable[["Graph", Node, str, Domain], Floats]
+Solid = Callable[["Graph", Node, str, bool], Any]
 Inner = Callable[[Node, str], "tuple[Node, str] | None"]
 
 
 class Graph:
     """The network of a material.
 
-    functions: what a node of each category computes, see `nodes`; library: returns the node in a
+    functions: what a node of each category computes, see `nodes`; solid: returns a graph over
+    places in space as a texture, see `solids`; library: returns the node in a
     definition's graph that an output of a node stands for, None where there is none.
     """
 
-    def __init__(self, host: Host, functions: dict[str, Evaluate], library: Inner):
-        self.host, self.functions, self.library = host, functions, library
+    def __init__(self, host: Host, functions: dict[str, Evaluate], library: Inner, solid: Solid):
+        self.host, self.functions, self.library, self.solid = host, functions, library, solid
         self._stored: dict[str, images.Stored | None] = {}
         self._deep = 0
 
     def constant(self, node: Node, name: str, default: object) -> Floats:
         """Return an input (n,) that varies with nothing; of others, with a warning, the mean."""
-        probe = Domain(PROBES)
+        probe = probing()
         value = self._or_default(node, name, default, probe)
         if probe.varies:
             self.host.warn(f"{name} is one value for all of the surface: a mean", node.path)
@@ -129,10 +140,12 @@ class Graph:
         plain = None if source is None else self._plain(*source, wide=wide)
         if plain is not None:
             return plain
-        probe = Domain(PROBES)
+        probe = probing()
         value = self._or_default(node, name, default, probe)
         if not probe.varies:
-            return _said(value.reshape(-1), wide)
+            return said(value.reshape(-1), wide)
+        if probe.solid and source is not None:
+            return self._solid(*source, name, default, wide=wide)
         return self._baked(node, name, default, probe, wide=wide)
 
     def evaluated(self, node: Node, name: str, default: object, domain: Domain) -> Floats:
@@ -183,7 +196,15 @@ class Graph:
             self.host.warn(f"{left_out}; the default of {name} stands for it", node.path)
             domain.leaves.clear()
             domain.sets.clear()
+            domain.solid = False
             return numbers(default)
+
+    def _solid(self, node: Node, output: str, name: str, default: object, *, wide: bool) -> Any:
+        try:
+            return self.solid(self, node, output, wide)
+        except LeftOut as left_out:
+            self.host.warn(f"{left_out}; the default of {name} stands for it", node.path)
+            return said(numbers(default), wide)
 
     def _plain(self, node: Node, output: str, *, wide: bool) -> Any:
         """Return an image that nothing is done to, or an attribute of a mesh; else None."""
@@ -201,7 +222,7 @@ class Graph:
             return MeshAttribute(name=f"vertex_{node.value('geomprop', '')}")
         if kind != "image" or (wide and width(node.kind) < 3):
             return None
-        probe = Domain(PROBES)
+        probe = probing()
         try:
             self.output(node, "out", probe)
         except LeftOut:
@@ -332,7 +353,7 @@ def pixels_of(stored: images.Stored, space: str) -> NDArray[np.float32]:
     )
 
 
-def _said(value: Floats, wide: bool) -> Any:
+def said(value: Floats, wide: bool) -> Any:
     """Return numbers without what single precision has added to them."""
     said = [float(f"{number:.7g}") for number in value]
     return tuple(np.broadcast_to(said[:3], 3).tolist()) if wide else said[0]

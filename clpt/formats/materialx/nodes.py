@@ -237,7 +237,7 @@ def _pattern(graph: Graph, node: Node, output: str, domain: Domain) -> Floats:
     elif node.source("position") is not None:
         at = graph.evaluated(node, "position", None, domain)
     else:
-        raise LeftOut(f"{node.kind} over places in space is not read")
+        at = _position(graph, node, output, domain)
     count = max(width(node.kind.replace("FA", "")), 1)
     given = {
         key: graph.evaluated(node, key, default, domain) for key, default in PATTERN_INPUTS.items()
@@ -255,6 +255,13 @@ def _pattern(graph: Graph, node: Node, output: str, domain: Domain) -> Floats:
     if name.startswith("cell"):
         return noise.cells(at, count)
     return noise.worley(at, count, jitter, style)
+
+
+def _position(graph: Graph, node: Node, output: str, domain: Domain) -> Floats:
+    if domain.places is None:
+        raise LeftOut("a graph over places in space and images is not read")
+    domain.solid = True
+    return domain.places
 
 
 def _refused(graph: Graph, node: Node, output: str, domain: Domain) -> Floats:
@@ -314,13 +321,14 @@ FUNCTIONS: dict[str, Evaluate] = {
     "separate2": _separated, "separate3": _separated, "separate4": _separated,
     "convert": _converted,
     "image": _image,
+    "position": _position,
     "texcoord": _texcoord, "geompropvalue": _texcoord,
     "ramplr": _ramp, "ramptb": _ramp, "splitlr": _ramp, "splittb": _ramp,
     **dict.fromkeys(
         ("noise2d", "noise3d", "fractal2d", "fractal3d", "cellnoise2d", "cellnoise3d",
          "worleynoise2d", "worleynoise3d"), _pattern),
     **dict.fromkeys(
-        ("position", "normal", "tangent", "bitangent", "viewdirection", "geomcolor", "time",
+        ("normal", "tangent", "bitangent", "viewdirection", "geomcolor", "time",
          "frame"), _refused),
     **{name: _of(function, **{"in": 0.0}) for name, function in UNARY.items()},
 }  # fmt: skip

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from clpt.formats.materialx import document
+from clpt.formats.materialx import document, scattering, solids
 from clpt.formats.materialx.graph import Graph, Host, Node, category
 from clpt.formats.materialx.nodes import FUNCTIONS
 from clpt.scene import gltf_material, insides
@@ -57,7 +57,9 @@ def surface(node: Node, host: Host, name: str = "", *, walk: bool = True) -> Sur
         named = node.kind or "a shader without a kind"
         host.warn(f"{named} is not read; grey stands for it", node.path)
         return Surface(*gltf_material.finished(_grey(name), None, None, both=True))
-    read: Surface = READERS[kind](Graph(host, FUNCTIONS, document.inner), node, name, walk)
+    read: Surface = READERS[kind](
+        Graph(host, FUNCTIONS, document.inner, solids.texture), node, name, walk
+    )
     return read
 
 
@@ -212,9 +214,14 @@ def _with_normals(graph: Graph, node: Node, name: str, inner: Material) -> Mater
     if source is None:
         return inner
     map_node = source[0]
-    scale = _one(graph, map_node, "scale", 1.0)
-    if category(map_node.kind) == "bump":
-        height = graph.texture(map_node, "height", 0.0, wide=False)
+    scale, raised = _one(graph, map_node, "scale", 1.0), map_node.source("in")
+    heights = raised is not None and category(raised[0].kind) == "heighttonormal"
+    if category(map_node.kind) == "bump" or heights:
+        if raised is not None and heights:
+            scale *= _one(graph, raised[0], "scale", 1.0)
+            height = graph.texture(raised[0], "in", 0.0, wide=False)
+        else:
+            height = graph.texture(map_node, "height", 0.0, wide=False)
         if isinstance(height, float):
             return inner
         return BumpMap(material=inner, height=height, scale=scale)
@@ -292,7 +299,21 @@ def _unlit(graph: Graph, node: Node, name: str, walk: bool) -> Surface:
     return _finished(graph, node, "", inner, share, light)
 
 
+def _scattering(graph: Graph, node: Node, name: str, walk: bool) -> Surface:
+    """Return a surface of nodes of scattering and of light."""
+    source, light = node.source("bsdf"), node.source("edf")
+    inner = _grey(name) if source is None else scattering.material(graph, source[0], name)
+    share = graph.texture(node, "opacity", 1.0, wide=False)
+    emission = None
+    if light is not None and category(light[0].kind) == "uniform_edf":
+        emission = _emission(graph, light[0], "color", "")
+    elif light is not None:
+        graph.host.warn(f"{light[0].kind} is not read: the surface is dark", node.path)
+    return Surface(inner if share == 1.0 else Mask(material=inner, opacity=share), emission)
+
+
 READERS: dict[str, Any] = {
+    "surface": _scattering,
     "open_pbr_surface": _openpbr,
     "gltf_pbr": _gltf,
     "UsdPreviewSurface": _preview,

@@ -25,7 +25,7 @@ from clpt.scene.indices import check_index
 from clpt.scene.integrators import Film
 from clpt.spectra import Constant, Spectrum
 
-GHOST_LAMBDAS = np.linspace(420.0, 680.0, 14)  # [nm], at which pairs of surfaces are weighed
+GHOST_LAMBDAS = np.linspace(420.0, 680.0, 14)  # [nm], of the weights of pairs of surfaces
 EVEN = 0.1  # share of the ghosts' samples that is divided evenly among all pairs
 
 
@@ -42,8 +42,8 @@ def encode_camera(
     """Return the words (n,) float32 of a camera's record and of the tables behind it.
 
     width, height: of the film [pixels]; glass_rows: rows in `spectra` of its `dispersive_glasses`;
-    empty where all wavelengths have one index. Raises SceneError for a matrix, a glass or a lens
-    that cannot be used.
+    empty where no index depends on the wavelength. Raises SceneError for a matrix, a glass or a
+    lens that cannot be used.
     """
     kind = RECORDS[camera.kind]
     record, tables = np.zeros((), kind.dtype), _Tables(kind.words)

@@ -53,7 +53,7 @@ class Patch(Plan):
 
 
 def patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Patch | str:
-    """Return the words by which a scene differs from a former scene.
+    """Return the words that change from a former scene to a scene.
 
     The scenes may differ in the camera, of the same kind, and in values of materials. Else the
     function returns the difference as a text. Raises SceneError as `lower` does.

@@ -21,7 +21,7 @@ from clpt.render.wavefront.wavefront import Wavefront
 
 log = logging.getLogger(__name__)
 
-GAP = 256  # equal words between differences, up to which a single write covers both
+GAP = 256  # most equal words between two differences that share a write
 MOST_WRITES = 64  # if more are needed, a single write covers the whole range
 OF_FILM = (
     "width", "height", "margin", "crop_x", "crop_y", "film_width", "film_height", "bands", "alpha",
@@ -185,7 +185,7 @@ def _replaced(
 
 
 def _write_tables(scene: DeviceScene, lowered: Lowered, new: dict[str, cl.Buffer]) -> None:
-    """Enqueue the words by which tables differ from a lowering, except in new buffers."""
+    """Enqueue the words of tables that differ from a lowering, except in new buffers."""
     for name in UPLOADED:
         if name in new or name in lowered.zero_copy:
             continue
@@ -214,7 +214,7 @@ def _refit(scene: DeviceScene, changes: _Changes) -> None:
 
 
 def ranges(old: NDArray[Any], new: NDArray[Any]) -> list[tuple[int, int]]:
-    """Return ranges, begin and end, that cover all words by which two tables differ."""
+    """Return ranges, begin and end, that cover all different words of two tables."""
     differ = np.flatnonzero(old != new)
     if not len(differ):
         return []

@@ -98,7 +98,7 @@ def match_replacements(former: Scene, scene: Scene) -> Replacements:
 
 
 def resolve_device_arrays(scene: Scene, queue: cl.CommandQueue) -> Scene:
-    """Return a scene for lowering, in which arrays of the queue replace buffers on the device.
+    """Return a scene for lowering: arrays of the queue replace buffers on the device.
 
     Raises SceneError for memory of another context, or a buffer of the wrong size.
     """

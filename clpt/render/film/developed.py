@@ -70,11 +70,11 @@ class Developed(Still):
     def _variance(self) -> Image:
         """Return an estimate of the variance of each pixel's mean, (h, w, 3) float32.
 
-        Let a pixel's samples have the weight a in one part of the film and b in the other. The
-        squared difference of both means times a b / (a + b)^2 estimates the variance of the mean of
-        all samples, without bias if they are independent. For points that are spread evenly, even
-        and odd octaves differ more: the estimate is divided by `Sampler.octaves`. If a part is
-        empty, the squared value replaces the estimate.
+        Let a pixel's samples have the weight a in the first part of the film and b in the second.
+        The squared difference of both means times a b / (a + b)^2 estimates the variance of the
+        mean of all samples, without bias if they are independent. For points that are spread
+        evenly, even and odd octaves differ more: the estimate is divided by `Sampler.octaves`. If a
+        part is empty, the squared value replaces the estimate.
         """
         parts = [self._sum(part) for part in np.split(self._film.words, 2)]
         divisors = [self._divisor(words) for words in parts]

@@ -164,7 +164,7 @@ def _header(path: Path, text: object) -> dict[str, Any]:
 
 def _check_ranges(path: Path, taken: list[list[int]]) -> None:
     """Raise SceneError for ranges of samples that no render takes."""
-    ends = [-1, *(number for one in taken for number in one), MOST_SAMPLES + 1]
+    ends = [-1, *(number for span in taken for number in span), MOST_SAMPLES + 1]
     if not all(a < b for a, b in itertools.pairwise(ends)):
         message = "no film of clpt: its ranges of samples must ascend, be apart, and lie within "
         _fail(path, f"{message}0 to {MOST_SAMPLES}, not {taken}")

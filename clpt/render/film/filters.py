@@ -10,7 +10,7 @@ from clpt.errors import SceneError
 from clpt.render.records.tables import TableStore
 from clpt.scene.integrators import Filter
 
-CELLS = 1024  # of equal probability, on one side
+CELLS = 1024  # of equal probability, on each side
 PROFILE = 256  # steps of a filter's values
 STEPS = 1 << 16  # of the numerical integral of a filter
 LEAST = 1e-6  # share of the integral of |f| that the integral of f must exceed

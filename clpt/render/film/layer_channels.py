@@ -33,10 +33,10 @@ def write_layers(
 ) -> None:
     """Write the picture of a renderer or film and its layers as an .exr.
 
-    path: of the file. source: the renderer or film. names: one of SETS; "blender" gives names such
-    as ViewLayer.Combined.R. metadata: further attributes of the file. The picture is stored in half
-    floats; bands and layers are stored in float32. The data window of a crop is its part of the
-    whole film. Raises SceneError.
+    path: of the file. source: the renderer or film. names: a name of SETS; "blender" gives names
+    such as ViewLayer.Combined.R. metadata: further attributes of the file. The picture is stored in
+    half floats; bands and layers are stored in float32. The data window of a crop is its part of
+    the whole film. Raises SceneError.
     """
     source = source.developed()
     layers, form = source.layers(), source.form
@@ -90,7 +90,7 @@ def write_picture(
 def channels_of(layers: Mapping[str, Image], names: str = "clpt") -> dict[str, Image]:
     """Return the channels of layers as an .exr has them, (h, w) by names such as depth.Z.
 
-    layers: as `Renderer.layers` returns them; names: one of SETS, "blender" gives names such as
+    layers: as `Renderer.layers` returns them; names: a name of SETS, "blender" gives names such as
     ViewLayer.Position.X.
     """
     channels: dict[str, Image] = {}

@@ -179,7 +179,7 @@ class Resolve:
 
 @cache
 def _to_rec709(space: str) -> dict[str, Any]:
-    """Return the arguments by which kernels convert colours of a space to Rec. 709."""
+    """Return the arguments of kernels that convert colours of a space to Rec. 709."""
     rows = zip(("red", "green", "blue"), between(space, "rec709"), strict=True)
     return {"converted": int(space != "rec709")} | {name: (*row, 0.0) for name, row in rows}
 

@@ -21,10 +21,10 @@ MOST_NAMED = 8  # differences that an error names
 
 @dataclass(frozen=True)
 class Session:
-    """A session of rendering, in which a process added samples to a film.
+    """A session of rendering: a process added samples to a film.
 
     began: ISO 8601 in UTC; seconds: of rendering; clpt: its version; device: label, driver, lanes
-    of its kernels and layout of its trees, on which the last bits depend.
+    of its kernels and layout of its trees; the last bits depend on them.
     """
 
     began: str

@@ -1,4 +1,4 @@
-"""Blocks: which words of a slot's state shading reads and writes: kernels/transport/queue.cl."""
+"""Blocks: the words of a slot's state that shading uses, see kernels/transport/queue.cl."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ CHANGED = (
     "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "medium", "around", "bodies",
     "ray_offset", "mis_ratio", "merge_ratio", "expected", *ESCAPE, "state", "cone",
 )  # fmt: skip
-READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and not changed
-# members that not every scene has, each with the features that ask for it
+READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and not written
+# optional members, each with the features that need it
 NEEDED: dict[str, Callable[[Features], bool]] = {
     "lambdas": lambda f: f.spectra.spectral,
     "sampled_hemisphere": lambda f: f.hemispheres,
@@ -56,20 +56,20 @@ ELSEWHERE = frozenset({"weight", "light", "pixel_index", "film"})
 def unused(features: Features) -> frozenset[str]:
     """Return the members of slabs that no kind of paths of a scene uses."""
     used = set(ELSEWHERE)
-    for own in features.passes:
-        used |= {name for name in NEEDED if _has(own, name)}
+    for kind in features.passes:
+        used |= {name for name in NEEDED if _has(kind, name)}
     return frozenset(NEEDED.keys() - used)
 
 
 def _has(features: Features, name: str) -> bool:
-    """Whether paths of one kind have a member."""
+    """Whether paths with these features have a member."""
     return name not in NEEDED or NEEDED[name](features)
 
 
 def members(features: Features) -> dict[str, list[str]]:
-    """Return the members of each slab that a block takes.
+    """Return the members of each slab in a block.
 
-    As "changed" it has those of a path that shading may change, which come first.
+    "changed" has the members of a path that shading may write; they come first in "path".
     """
 
     def there(names: Iterable[str]) -> list[str]:
@@ -86,22 +86,22 @@ def members(features: Features) -> dict[str, list[str]]:
 
 
 def blocks_text(kinds: Sequence[Features]) -> str:
-    """Return the words of a slot's state that a block takes: `BLOCK_WORDS(which)` for paths.
+    """Return the table of the words in a block: `BLOCK_WORDS(which)` for each kind of paths.
 
-    Of a path those that shading may change are first.
+    Words of a path that shading may write are first.
     """
-    numbers = "".join(f"    uint {name};\n" for name in ("path", "changed", "hit", "shadow"))
+    counted = "".join(f"    uint {name};\n" for name in ("path", "changed", "hit", "shadow"))
     arrays = "".join(f"    uchar {r.name.lower()}_words[{r.words}];\n" for r in SLABS)
     t = next(m.word for m in SHADOW.members if m.name == "t")
-    rows = [f"typedef struct {{\n{numbers}{arrays}}} BlockWords;", f"#define SHADOW_T {t}"]
+    rows = [f"typedef struct {{\n{counted}{arrays}}} BlockWords;", f"#define SHADOW_T {t}"]
     values = []
     for features in kinds:
         kept = members(features)
-        own = {name: _words(features, name, names) for name, names in kept.items()}
-        counts = [str(len(own[name])) for name in ("path", "changed", "hit", "shadow")]
-        lists = (", ".join(map(str, own[record.name.lower()])) for record in SLABS)
-        values.append(", ".join([*counts, *(f"{{{words}}}" for words in lists)]))
-    table = ", ".join(f"{{{one}}}" for one in values)
+        words = {name: _words(features, name, names) for name, names in kept.items()}
+        counts = [str(len(words[name])) for name in ("path", "changed", "hit", "shadow")]
+        lists = (", ".join(map(str, words[record.name.lower()])) for record in SLABS)
+        values.append(", ".join([*counts, *(f"{{{numbers}}}" for numbers in lists)]))
+    table = ", ".join(f"{{{row}}}" for row in values)
     rows.append(f"constant BlockWords block_words[{len(kinds)}] = {{{table}}};")
     which = "which" if len(kinds) > 1 else "0"
     rows.append(f"#define BLOCK_WORDS(which) (&block_words[{which}])")
@@ -111,8 +111,8 @@ def blocks_text(kinds: Sequence[Features]) -> str:
 def _words(features: Features, slab: str, names: Iterable[str]) -> list[int]:
     """The words of a slab's members; "changed" is a part of a path's."""
     record = next(r for r in SLABS if r.name.lower() == ("path" if slab == "changed" else slab))
-    found = []
+    words: list[int] = []
     for member in (next(m for m in record.members if m.name == name) for name in names):
         count = member.words - (member.type == "spectrum" and not features.spectra.spectral)
-        found += [member.word + i for i in range(count)]
-    return found
+        words += [member.word + i for i in range(count)]
+    return words

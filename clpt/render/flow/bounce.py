@@ -10,13 +10,13 @@ from clpt.render.records import Features
 from clpt.render.records.dispatch import function
 from clpt.scene.scatterer import Scatterer
 
-# what a bounce does, in its order
+# steps of a bounce, in order
 VERBS = ("begin", "show", "intersect", "flight", "deposit", "train", "mix", "shade", "join")
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage of a bounce: what it does, its program, its kernel there, slots of a work-item."""
+    """A stage of a bounce: verb, program, kernel in the program, and slots of a work-item."""
 
     verb: str
     program: str
@@ -56,9 +56,9 @@ def _order(features: Features, layout: str, lanes: int, interleaved: bool) -> It
 
 
 def begin_and_join(features: Features) -> tuple[str, str]:
-    """Return the stage that begins paths, and the one that tests the rays that join them.
+    """Return the stage that begins paths, and the stage that tests their connecting rays.
 
-    Rays join paths to a light or, if the paths start at lights, to the camera.
+    Rays connect paths to a light or, if the paths start at lights, to the camera.
     """
     if not features.transport.light_paths:
         return "generate", "shadow"
@@ -66,31 +66,31 @@ def begin_and_join(features: Features) -> tuple[str, str]:
 
 
 def joins(features: Features) -> bool:
-    """Whether paths are joined to lights or, those that start at lights, to the camera."""
+    """Whether paths from the camera are connected to lights, or light paths to the camera."""
     return not features.transport.light_paths or features.transport.joined
 
 
 def deposits(features: Features) -> bool:
-    """Whether paths leave photons."""
+    """Whether paths store photons."""
     return features.transport.light_paths and features.transport.merged
 
 
 def gathered(features: Features) -> list[type[Scatterer]]:
-    """Return the phase functions in whose media rays from the camera gather photons."""
+    """Return the phase functions of media where rays from the camera gather photons."""
     if not features.transport.merged or features.transport.light_paths:
         return []
     return [cls for cls in features.materials.leaves if flags.gathers_along(features, cls)]
 
 
 def trains(features: Features) -> bool:
-    """Whether paths leave what a guide learns from."""
+    """Whether paths train a guide."""
     return features.transport.light_paths and features.transport.guided
 
 
 def flight(features: Features) -> str:
     """Return the program that takes rays through media.
 
-    That of light paths does without aims, and adds to no layers.
+    The program of light paths has no aims, and adds to no layers.
     """
     layers = features.media.emissive and bool(features.film.layers.lights)
     of_light = features.transport.light_paths and (features.media.aims or layers)
@@ -98,14 +98,14 @@ def flight(features: Features) -> str:
 
 
 def trace_lanes(layout: str, lanes: int) -> int:
-    """Return the number of rays that a work-item traces: one, or `lanes` where there is no tree."""
+    """Return the number of rays that a work-item traces: 1, or `lanes` without a tree."""
     return lanes if layout == "brute" else 1
 
 
 def join_lanes(features: Features, layout: str, lanes: int, interleaved: bool) -> int:
-    """Return the number of rays that a work-item tests to join paths.
+    """Return the number of connecting rays that a work-item tests.
 
-    Where shapes are analytic, a work-item tests interleaved rays, those of `lanes` paths.
+    In scenes with analytic shapes a work-item tests the interleaved rays of `lanes` paths.
     """
     return lanes if interleaved and features.geometry.analytic else trace_lanes(layout, lanes)
 
@@ -119,7 +119,7 @@ def has_both(features: Features) -> bool:
 class _Call:
     """A call of a stage in the loop, where it is a function.
 
-    args: what it takes beside slabs and scene, each a type and what is passed.
+    args: arguments beside slabs and scene, each a type and an expression.
     """
 
     stage: Stage
@@ -127,14 +127,14 @@ class _Call:
 
     @property
     def declaration(self) -> str:
-        own = "".join(f", {type_}" for type_, _ in self.args)
-        return f"void loop_{self.stage.program}(SLAB_ARGS, SCENE_ARGS{own}, uint at);"
+        types = "".join(f", {type_}" for type_, _ in self.args)
+        return f"void loop_{self.stage.program}(SLAB_ARGS, SCENE_ARGS{types}, uint at);"
 
     @property
     def text(self) -> str:
         """The statement that calls it for the slots from `slot` on."""
-        own = "".join(f", {passed}" for _, passed in self.args)
-        return f"loop_{self.stage.program}(SLAB_PASSED, SCENE_PASSED{own}, slot);"
+        passed = "".join(f", {value}" for _, value in self.args)
+        return f"loop_{self.stage.program}(SLAB_PASSED, SCENE_PASSED{passed}, slot);"
 
     @property
     def through(self) -> str:
@@ -146,26 +146,26 @@ class _Call:
 def stages_text(features: Features, layout: str, lanes: int, interleaved: bool) -> str:
     """Return the stages of the loop as functions, and the verbs of kernels/stage/bounce.cl.
 
-    A verb takes the slots from `first` to `end` through a stage, with the arguments of the loop. It
-    asks `which` paths are traced, where they differ in it, and does nothing where none has it.
+    A verb takes the slots from `first` to `end` through a stage, with the arguments of the loop. If
+    kinds of paths differ in the stage, it asks `which` are traced. A verb without a stage is empty.
     """
     passes = [
-        [_call(features, own, layout, stage) for stage in order(own, layout, lanes, interleaved)]
-        for own in features.passes
+        [_call(features, kind, layout, stage) for stage in order(kind, layout, lanes, interleaved)]
+        for kind in features.passes
     ]
     declared = dict.fromkeys(call.declaration for calls in passes for call in calls)
-    found = {
+    of_verbs = {
         verb: [[call for call in calls if call.stage.verb == verb] for calls in passes]
         for verb in VERBS
     }
-    shading = found.pop("shade")
+    shading = of_verbs.pop("shade")
     head = "void bounce_shade_at(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, int kind, uint slot)"
     kinds = enumerate(features.materials.leaves)
     phases = " || ".join(f"(kind) == {i}" for i, cls in kinds if cls.is_phase)
-    of_camera = [[not own.transport.light_paths] for own in features.passes]
+    of_camera = [[not kind.transport.light_paths] for kind in features.passes]
     rows = [
         *declared,
-        *(_verb(verb, calls) for verb, calls in found.items()),
+        *(_verb(verb, calls) for verb, calls in of_verbs.items()),
         function(head, *_cases(max(shading, key=len))),
         f"#define PATHS_ARE_SHADED {_asked(shading)}",
         f"#define PATHS_WALK {_asked(of_camera)}",
@@ -174,17 +174,17 @@ def stages_text(features: Features, layout: str, lanes: int, interleaved: bool) 
     return "\n".join([*rows, ""])
 
 
-def _call(features: Features, own: Features, layout: str, stage: Stage) -> _Call:
-    """The call of a stage for one kind of paths, whose features are `own`."""
-    begin, join = begin_and_join(own)
+def _call(features: Features, paths: Features, layout: str, stage: Stage) -> _Call:
+    """The call of a stage for a kind of paths."""
+    begin, join = begin_and_join(paths)
     groups = {
-        begin: signatures.begin_args(own),
-        "intersect": signatures.trace_args(own, layout),
-        "flight": signatures.flight_args(own),
-        "gather_along": signatures.gather_args(own),
-        "deposit": signatures.deposit_args(own),
-        "train": signatures.deposit_args(own),
-        join: signatures.join_args(own, layout),
+        begin: signatures.begin_args(paths),
+        "intersect": signatures.trace_args(paths, layout),
+        "flight": signatures.flight_args(paths),
+        "gather_along": signatures.gather_args(paths),
+        "deposit": signatures.deposit_args(paths),
+        "train": signatures.deposit_args(paths),
+        join: signatures.join_args(paths, layout),
         "shade": signatures.shade_args(features),
     }
     args = [(type_, name) for name, type_ in groups.get(stage.kernel, {}).items()]
@@ -195,7 +195,7 @@ def _call(features: Features, own: Features, layout: str, stage: Stage) -> _Call
 
 
 def _shade_call(features: Features, stage: Stage, args: list[tuple[str, str]]) -> _Call:
-    """The call of the part that shades a kind, with others where they share a vertex."""
+    """The call of the part that shades a kind, and other kinds of a shared vertex."""
     leaves = features.materials.leaves
     for vertex in vertices.vertices(features, stage.lanes):
         if stage.program in (f"shade_{leaves[kind].kind}" for kind in vertex.kinds):
@@ -206,16 +206,16 @@ def _shade_call(features: Features, stage: Stage, args: list[tuple[str, str]]) -
 
 
 def _verb(verb: str, passes: list[list[_Call]]) -> str:
-    """The macro of a verb, for each kind of paths its calls.
+    """The macro of a verb, with the calls of each kind of paths.
 
-    It stands there once where it is the same for all: compilers put into the loop what is called in
-    one place alone, which saves some hundredths of the time.
+    Equal calls stand there once: compilers inline functions with a single call into the loop, which
+    saves some hundredths of the time.
     """
     each = [" ".join(call.through for call in calls) for calls in passes]
     if len(set(each)) == 1:
         rows = [each[0]]
     else:
-        rows = [f"if (which == {i}) {{ {one} }}" for i, one in enumerate(each) if one]
+        rows = [f"if (which == {i}) {{ {calls} }}" for i, calls in enumerate(each) if calls]
     return " \\\n    ".join([f"#define bounce_{verb}(first, end)", *filter(None, rows)])
 
 
@@ -226,12 +226,13 @@ def _cases(shading: list[_Call]) -> list[str]:
         kinds.setdefault(call.text, []).append(f"case {kind}:")
     if len(kinds) == 1:
         return [*kinds]
-    return ["switch (kind) {", *(f"{' '.join(own)} {t} break;" for t, own in kinds.items()), "}"]
+    rows = (f"{' '.join(cases)} {call} break;" for call, cases in kinds.items())
+    return ["switch (kind) {", *rows, "}"]
 
 
 def _asked(passes: Sequence[Sequence[object]]) -> str:
-    """The condition for those kinds of paths that have something."""
-    having = [i for i, found in enumerate(passes) if any(found)]
+    """The condition that a kind of paths has a true value."""
+    having = [i for i, values in enumerate(passes) if any(values)]
     if len(having) in (0, len(passes)):
         return str(int(bool(having)))
     return f"(which == {having[0]})"

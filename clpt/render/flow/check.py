@@ -1,4 +1,4 @@
-"""Whether a scene is made of what it should be; values are checked where each is declared."""
+"""Checks of a whole scene; values of parameters are checked where each is declared."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from clpt.scene.textures import check_textures
 def check(scene: Scene) -> None:
     """Raise SceneError for a scene that cannot be rendered, whatever the device.
 
-    What passes is refused later only for what files hold, and for sizes.
+    A scene that passes is refused later only for contents of files, and for sizes.
     """
     check_at_rest(at_rest(scene), LoweringCache())
 
@@ -44,13 +44,13 @@ def check_at_rest(scene: Scene, cache: LoweringCache) -> None:
     _check_surfaces(shapes_, scene.film)
     check_light_paths(scene, shapes_)
     check_motion(scene, Motions.of(scene))
-    check_bodies([*shapes_, *(one for one in scene.shapes if isinstance(one, Instance))])
+    check_bodies([*shapes_, *(s for s in scene.shapes if isinstance(s, Instance))])
     if isinstance(scene.integrator, ParticleTracer):
         check_lit_media(scene, cache)
 
 
 def _check_surfaces(shapes_: list[Shape], film: Film) -> None:
-    """Raise SceneError for materials and lights of shapes; each is looked at once."""
+    """Raise SceneError for materials and lights of shapes; each is checked once."""
     seen: set[int] = set()
     for shape in shapes_:
         try:

@@ -30,14 +30,14 @@ class Common:
 
 def _parameters(text: str) -> tuple[tuple[str, str], ...]:
     """Split declared parameters into types and names."""
-    found = []
-    for one in text.split(", "):
-        name = one.split(" ")[-1].lstrip("*")
-        found.append((one.removesuffix(name), name))
-    return tuple(found)
+    parameters = []
+    for declared in text.split(", "):
+        name = declared.split(" ")[-1].lstrip("*")
+        parameters.append((declared.removesuffix(name), name))
+    return tuple(parameters)
 
 
-# What is short or called often stays inline: a call keeps structs in memory.
+# Functions that are short or called often stay inline: a call keeps structs in memory.
 FUNCTIONS = (
     Common(
         "Surface",
@@ -72,28 +72,28 @@ FUNCTIONS = (
 
 
 def shared(features: Features, lanes: int) -> list[Common]:
-    """Return the functions that several kinds of a scene call: none in one lane, as on GPUs."""
-    return [one for one in FUNCTIONS if lanes > 1 and one.shared(features)]
+    """Return the functions that several kinds of a scene call; none in a single lane."""
+    return [function for function in FUNCTIONS if lanes > 1 and function.shared(features)]
 
 
 def calls_text(elsewhere: Sequence[Common] = ()) -> str:
-    """Return what shading calls: functions of the part, where they are `elsewhere`, or its own."""
+    """Return the macros of calls: of functions in a part `elsewhere`, or in the same program."""
     rows = []
-    for one in FUNCTIONS:
-        if one in elsewhere:
-            declared = ", ".join(f"{type_}{name}" for type_, name in one.parameters)
-            rows.append(f"{one.returns} loop_{one.name}({declared});")
-        called = f"loop_{one.name}" if one in elsewhere else one.name
-        rows.append(f"#define common_{one.name} {called}")
+    for common in FUNCTIONS:
+        if common in elsewhere:
+            declared = ", ".join(f"{type_}{name}" for type_, name in common.parameters)
+            rows.append(f"{common.returns} loop_{common.name}({declared});")
+        called = f"loop_{common.name}" if common in elsewhere else common.name
+        rows.append(f"#define common_{common.name} {called}")
     return "\n".join([*rows, ""])
 
 
 def part_text(functions: Sequence[Common]) -> str:
     """Return the functions of the part."""
     rows = []
-    for one in functions:
-        declared = ", ".join(f"{type_}{name}" for type_, name in one.parameters)
-        passed = ", ".join(name for _, name in one.parameters)
-        rows.append(f"COMMON({one.returns}, {one.name})({declared})")
-        rows.append(f"{{\n    return {one.name}({passed});\n}}")
+    for common in functions:
+        declared = ", ".join(f"{type_}{name}" for type_, name in common.parameters)
+        passed = ", ".join(name for _, name in common.parameters)
+        rows.append(f"COMMON({common.returns}, {common.name})({declared})")
+        rows.append(f"{{\n    return {common.name}({passed});\n}}")
     return "\n".join([*rows, ""])

@@ -1,4 +1,4 @@
-"""Analysis: what a scene has, and what follows from that, before anything becomes words."""
+"""Analysis: facts about a scene and decisions that follow, before anything becomes words."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ from clpt.scene.media import Medium
 
 @dataclass(frozen=True)
 class Before:
-    """Decisions that were made before an edit, and stay.
+    """Decisions before an edit, which stay.
 
-    integrator: its film has a place for light paths, or none; lit_ghosts: whether light paths were
+    integrator: its film has sums for light paths, or none; lit_ghosts: whether light paths were
     ghosts of a lens.
     """
 
@@ -52,13 +52,13 @@ class Before:
 
 @dataclass(frozen=True)
 class Analysis:
-    """A scene with everything that was found in it before it is lowered.
+    """The facts about a scene that lowering encodes.
 
-    index: with the integrator that renders it; reason: why that one, "" where there was no choice;
-    sphere: centre and radius of one around the scene [m]; sources: what its lights send; sealed:
-    media that rays to lights cannot leave; light_media: media around lights; around: the media, or
-    the matter of bodies, at the camera; aims (k, 5): spheres at which paths aim, see `aims` and
-    `escape_lamps`; warnings: of media.
+    index: with the chosen integrator; reason: of the choice, "" without a choice; sphere: centre
+    and radius of a sphere around the scene [m]; sources: emission of its lights; sealed: media that
+    rays to lights cannot leave; light_media: media around lights; around: the media, or the matter
+    of bodies, at the camera; aims (k, 5): spheres that paths aim at, see `aims` and `escape_lamps`;
+    warnings: of media.
     """
 
     index: SceneIndex
@@ -74,9 +74,9 @@ class Analysis:
 
 
 def analyse(scene: Scene, cache: LoweringCache, before: Before | None = None) -> Analysis:
-    """Return what a scene is; cache: what the analysis before need not make again.
+    """Return the facts about a scene; cache: with results of the analysis before.
 
-    Raises SceneError where the scene makes no sense: it names the shape, light or material.
+    Raises SceneError for an invalid scene; it names the shape, light or material.
     """
     scene = at_rest(scene)
     check_at_rest(scene, cache)
@@ -117,8 +117,8 @@ def _media_at_lights(
     """Return the index with whether paths can start at lights in media, and the lights' media."""
     if not index.has_media or not index.may_have_light_paths:
         return index, NOWHERE
-    found = light_media(index, geometry, sources, sphere, cache)
-    return replace(index, lit_media=found.refusal), found
+    media = light_media(index, geometry, sources, sphere, cache)
+    return replace(index, lit_media=media.refusal), media
 
 
 def _at_the_camera(
@@ -138,19 +138,19 @@ def _at_the_camera(
 
 
 def _passed_through(index: SceneIndex, cache: LoweringCache) -> list[str]:
-    """A warning where the camera is not in the same media all the time, else none."""
+    """Return a warning if the camera enters other media while the shutter is open."""
     bounding = boundaries(index.listed, matter_of if index.nested else None)
     if index.motions.camera is None and stands_still(bounding):
         return []
-    found: list[tuple[Any, ...]] = []
+    surroundings: list[tuple[Any, ...]] = []
     for time in index.motions.looks():
         origin = camera_origin(index.camera, index.film, time)
-        found.append(
+        surroundings.append(
             bodies_at(bounding, matter_of, origin, time, cache)
             if index.nested
             else media_at(bounding, origin, time, cache)
         )
-    if all(one == found[0] for one in found):
+    if all(media == surroundings[0] for media in surroundings):
         return []
     return [
         "camera: it comes into another medium while the shutter is open; all its paths begin in "

@@ -1,8 +1,8 @@
-"""Flags: the macros by which kernels ask what a scene has, and a material.
+"""Flags: macros that tell kernels the features of a scene and of a material.
 
-A flag that holds is 1. One that does not hold is not defined: `#if` takes it for 0. `assemble`
-decides each `#if`, so that a text has no line for what its scene has not. Numbers and names are
-defined as they are.
+A true flag is 1. A false flag is not defined: `#if` takes it for 0. `assemble` decides each `#if`,
+so that a text has no line for features that its scene does not use. Numbers and names are defined
+as they are.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def fluoresces(features: Features, cls: type[Scatterer]) -> bool:
 
 
 def ends_light_paths(features: Features, cls: type[Scatterer]) -> bool:
-    """Whether a material does not do to light that comes the other way what it does to this."""
+    """Whether a material is not reciprocal, so that light paths end there."""
     return not cls.reversible or fluoresces(features, cls)
 
 
@@ -61,10 +61,10 @@ def has_lobe(features: Features, cls: type[Scatterer], name: str) -> bool:
 
 
 def is_chromatic(features: Features, cls: type[Scatterer]) -> bool:
-    """Whether a material is asked at each wavelength: densities of its directions may differ.
+    """Whether densities of a material's directions differ between wavelengths.
 
-    Without dispersion they do not. Then eta alone tells what carried light has instead of radiance
-    (kernels/integrator/steps/adjoint_weight.cl), unless lobes that refract and others share
+    Without dispersion they are equal. The adjoint weight of light paths then follows from eta alone
+    (kernels/integrator/steps/adjoint_weight.cl), unless lobes that refract and other lobes share
     directions.
     """
     if cls.is_phase:
@@ -73,31 +73,31 @@ def is_chromatic(features: Features, cls: type[Scatterer]) -> bool:
 
 
 def is_null(features: Features, cls: type[Scatterer]) -> bool:
-    """Whether a material is none: paths cross it as if nothing were there."""
+    """Whether paths cross a material as if it were absent."""
     return cls.is_null and features.materials.null_surfaces
 
 
 def is_guided(features: Features, cls: type[Scatterer]) -> bool:
     """Whether a guide helps to choose directions at a material."""
     unsuited = cls.delta or cls.is_null or cls.no_back or fluoresces(features, cls)
-    alone = cls.refracts and features.told_dispersion  # a direction may be of one wavelength
+    alone = cls.refracts and features.told_dispersion  # a direction may have a single wavelength
     return features.transport.guided and not (unsuited or alone)
 
 
 def asks_chance(features: Features, cls: type[Scatterer]) -> bool:
-    """Whether light paths ask at a material how often its gloss chooses their light."""
+    """Whether light paths need the probability that a light tree chooses their light here."""
     glossy = features.transport.balanced and features.lights.gloss > 0
     return glossy and not is_null(features, cls)
 
 
 def between_bodies(features: Features, cls: type[Scatterer]) -> bool:
-    """Whether the index outside of a material is that of a body there."""
+    """Whether the body outside of a material gives its outer index of refraction."""
     return features.media.bodies and cls.kind in BETWEEN_BODIES
 
 
-BETWEEN_BODIES = ("dielectric", "rough_dielectric")  # their index outside is that of a body there
+BETWEEN_BODIES = ("dielectric", "rough_dielectric")  # kinds with an outer index of refraction
 
-# name: whether it holds, or its value, of the features and the kind that a program shades
+# name: its value, of the features and the kind that a program shades
 MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
     "BSDF_KIND": lambda f, cls: f.materials.leaves.index(cls),
     "BSDF_DELTA": lambda f, cls: cls.delta,
@@ -122,13 +122,13 @@ SCENE = frozenset(dict(macros_of(Features())))  # the names of flags of a scene
 
 
 def of_scene(features: Features) -> Defines:
-    """Return the macros that features say."""
+    """Return the macros of features."""
     return {name: value for name, value in macros_of(features) if value is not None}
 
 
 def of_material(features: Features, cls: type[Scatterer]) -> Defines:
     """Return the macros of the kind of material that a program shades.
 
-    They are 0 where they do not hold: kernels also ask for them by `if`.
+    A false flag is 0, as kernels also ask for it by `if`.
     """
     return {name: int(value(features, cls)) for name, value in MATERIAL.items()}

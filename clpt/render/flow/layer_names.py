@@ -25,7 +25,7 @@ from clpt.scene import materials as mt
 from clpt.scene.layers import MOST_NAMED
 from clpt.scene.shapes import Instance, Shape
 
-REST = "rest"  # the group of lights that name none
+REST = "rest"  # the group of lights without a group
 
 
 def lower_names(
@@ -42,26 +42,26 @@ def lower_names(
 
     Raises SceneError for more shapes than a matte can tell apart.
     """
-    layers, things = index.layers, index.listed
+    layers, listed = index.layers, index.listed
     names: dict[str, tuple[str, ...]] = {}
     features = LayerFeatures(layers, present=bool(layers))
     if "crypto_object" in layers:
-        if len(things) > MOST_NAMED:
-            message = f"mattes are for {MOST_NAMED:,} shapes, not {len(things):,}"
+        if len(listed) > MOST_NAMED:
+            message = f"mattes are for {MOST_NAMED:,} shapes, not {len(listed):,}"
             raise SceneError(message, where="film.layers")
-        names["objects"] = tuple(_object_name(shape, i) for i, shape in enumerate(things))
+        names["objects"] = tuple(_object_name(shape, i) for i, shape in enumerate(listed))
     if "crypto_material" in layers or "material_id" in layers:
-        numbers, found = _materials(instancing.distinct(things))
+        numbers, materials = _materials(instancing.distinct(listed))
         of_rows = [numbers[id(shape.material)] for _, shape, _, _ in geometry.owners]
         row = store.append_floats("distributions", np.array([*of_rows, 0.0]))
         features = replace(features, material_numbers=row)
-        names["materials"] = tuple(_material_name(one, i) for i, one in enumerate(found))
+        names["materials"] = tuple(_material_name(m, i) for i, m in enumerate(materials))
     if "primitive_id" in layers:
         first = _primitive_rows(index, geometry, store, cache)
         features = replace(features, primitive_rows=first)
     if "light_groups" in layers:
         groups = _groups(index, geometry, lights)
-        groups += [REST] * bool(index.emitting)  # of what rays gather in media
+        groups += [REST] * bool(index.emitting)  # of emission in media
         names["light_groups"] = tuple(sorted({*groups})) or (REST,)
         numbers_of = np.searchsorted(names["light_groups"], np.array(groups, str))
         row = store.append_floats("distributions", np.array([*numbers_of, 0.0]))
@@ -92,12 +92,12 @@ def _words(numbers: ArrayLike) -> NDArray[np.float32]:
 def _materials(shapes: Iterable[Shape]) -> tuple[dict[int, int], list[mt.Material]]:
     """The number of each material by its identity, and all of them."""
     numbers: dict[int, int] = {}
-    found: list[mt.Material] = []
+    materials: list[mt.Material] = []
     for shape in shapes:
         if id(shape.material) not in numbers:
-            numbers[id(shape.material)] = len(found)
-            found.append(shape.material)
-    return numbers, found
+            numbers[id(shape.material)] = len(materials)
+            materials.append(shape.material)
+    return numbers, materials
 
 
 def _groups(index: SceneIndex, geometry: Geometry, lights: LightRows) -> list[str]:
@@ -113,12 +113,12 @@ def _groups(index: SceneIndex, geometry: Geometry, lights: LightRows) -> list[st
 
 
 def _object_name(shape: Shape, number: int) -> str:
-    """The name of one of the scene's shapes; of an instance without one, that of its group."""
+    """The name of a shape; an instance without a name has the name of its group."""
     group = shape.group.name if isinstance(shape, Instance) else ""
     return shape.name or group or f"{shape.kind}{number}"
 
 
 def _material_name(material: mt.Material, number: int) -> str:
-    """The name of a material, or of the first one inside it that has one."""
+    """The name of a material, or of its first part with a name."""
     names = (part.name for part in mt.parts(material) if part.name)
     return next(names, f"{material.kind}{number}")

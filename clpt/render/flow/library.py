@@ -61,9 +61,9 @@ def kernel_source(
     options = {"mode": (mode, ("rgb", "spectral")), "lanes": (lanes, LANES)}
     options |= {"layout": (layout, bvh.TREES)}
     options |= {"sampler": (sampler, tuple(cls.kind for cls in PIXELWISE))}
-    for name, (given, known) in options.items():
-        if given not in known:
-            raise SceneError(f"{given!r} is none of {', '.join(map(str, known))}", where=name)
+    for name, (value, known) in options.items():
+        if value not in known:
+            raise SceneError(f"{value!r} is none of {', '.join(map(str, known))}", where=name)
     virtual: dict[str, str | device.Part | tuple[str, ...]] = {
         "generated/spectrum.cl": (f"spectra/{mode}.cl",),
         "generated/sampler.cl": (f"samplers/kinds/{sampler}.cl",),
@@ -74,8 +74,8 @@ def kernel_source(
     for part in parts:
         files += PARTS[part] if part in PARTS else _bsdf(part, mode, virtual)
     virtual["library"] = tuple(files)
-    made = device.assemble("library", virtual, {"LANES": lanes}, library=True)
-    text = _own_inline(made.text)
+    source = device.assemble("library", virtual, {"LANES": lanes}, library=True)
+    text = _own_inline(source.text)
     if lines:
         return text + '#line 1 "program"\n'
     return re.sub(r"^#line .*\n", "", text, flags=re.MULTILINE)

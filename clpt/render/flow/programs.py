@@ -1,7 +1,7 @@
 """Programs: the kernel text of every stage, for the features of a scene.
 
-A stage's text holds only what the scene has; one program per material kind shades, so that a new
-material in a scene rebuilds nothing else.
+A stage's text holds only code that the scene uses; each material kind has a program that shades
+it, so that a new material in a scene rebuilds nothing else.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ BOTH = tuple(f"integrator/{name}.cl" for name in ("path", "particle_tracer", "bo
 
 Files = dict[str, str | device.Part | tuple[str, ...]]
 
-# Files of kernels that take the place of others where a work-item shades one path.
+# Replacements of kernel files for work-items that shade a single path.
 _ALONE: device.Virtual = {
     **bvh.ALONE,
     "core/spectrum_at_once.cl": ("core/spectrum_in_turn.cl",),
@@ -51,9 +51,9 @@ def sources(
     """Return the text of every program of a bounce, by program name.
 
     layout: of the triangles, a name in clpt.bvh.LAYOUTS; lanes: paths that a work-item shades;
-    queued: whether shading goes along queues, which `append` fills, if a work-item shades one path;
-    interleaved: a work-item of `intersect` has the rays of `lanes` paths in flight, and where there
-    are curves, that of `shadow` or `splat` too.
+    queued: whether work-items that shade a single path take slots from queues, which `append`
+    fills; interleaved: whether a work-item of `intersect`, and with curves of `shadow` or `splat`,
+    has the rays of `lanes` paths in flight.
     """
     queued = queued and lanes == 1
     texts = _stages(features, layout, lanes, interleaved)
@@ -97,8 +97,9 @@ def _stages(
     if bounce.trains(features):
         texts["train"] = make("train", files, defines, lanes)
     for cls in bounce.gathered(features):
-        own, given = _of_kind(features, cls, files), {**defines, **flags.of_material(features, cls)}
-        texts[f"gather_{cls.kind}"] = make(f"gather_{cls.kind}", own, given, lanes, "gather")
+        name, kind = f"gather_{cls.kind}", flags.of_material(features, cls)
+        kind_files = _of_kind(features, cls, files)
+        texts[name] = make(name, kind_files, {**defines, **kind}, lanes, "gather")
     if features.media.present:
         flight = bounce.flight(features)
         texts[flight] = make(flight, files, defines, lanes, "flight")
@@ -115,34 +116,34 @@ def _shading(
     texts: dict[str, device.Source] = {}
     for vertex in vertices.vertices(features, lanes if part is not None else 1):
         cls = vertices.leader(features, vertex)
-        own = _of_kind(features, cls, files)
+        virtual = _of_kind(features, cls, files)
         if vertex.shared:
-            own |= vertices.virtual_files(features, vertex)
+            virtual |= vertices.virtual_files(features, vertex)
             texts |= _materials(features, vertex, files, lanes, part)
         if part is not None:
-            own["generated/common.cl"] = common.calls_text(common.shared(features, lanes))
+            virtual["generated/common.cl"] = common.calls_text(common.shared(features, lanes))
         if cls.is_phase:
-            own["generated/shading_frame.cl"] = ("media/phase.cl#frame",)
+            virtual["generated/shading_frame.cl"] = ("media/phase.cl#frame",)
         kind = {**vertices.defines(features, vertex), "QUEUED": int(queued)}
         if part is not None and bounce.has_both(features):
-            own["generated/integrator.cl"] = BOTH
+            virtual["generated/integrator.cl"] = BOTH
             kind["SHADES_BOTH"] = 1
-        given = {**defines, **kind}
-        texts[vertex.program] = _source(vertex.program, own, given, lanes, "shade", part=part)
+        name, kind = vertex.program, {**defines, **kind}
+        texts[name] = _source(name, virtual, kind, lanes, "shade", part=part)
     return texts
 
 
 def _of_kind(features: Features, cls: type[Scatterer], files: Files) -> Files:
-    """The files of a scene with those of a kind."""
+    """The files of a scene with the files of a kind."""
     return {**files, **choices.material_files(features, cls), **_material(features, cls)}
 
 
 def _material(features: Features, cls: type[Scatterer]) -> Files:
     """The files of a kind's own functions."""
-    own: Files = {"generated/bsdf.cl": stages.bsdf_text(features, cls)}
+    files: Files = {"generated/bsdf.cl": stages.bsdf_text(features, cls)}
     if cls.source is not None:
-        own[f"{cls.folder}/{cls.kind}.cl"] = custom_materials.text(cls)
-    return own
+        files[f"{cls.folder}/{cls.kind}.cl"] = custom_materials.text(cls)
+    return files
 
 
 def _materials(
@@ -151,30 +152,30 @@ def _materials(
     """The parts of the kinds of a shared vertex, by program name."""
     texts = {}
     for cls in (features.materials.leaves[kind] for kind in vertex.kinds):
-        own = _of_kind(features, cls, files)
-        own["generated/material_part.cl"] = vertices.part_text(features, cls)
-        given = {**_defines(features, lanes), **flags.of_material(features, cls)}
+        virtual = _of_kind(features, cls, files)
+        virtual["generated/material_part.cl"] = vertices.part_text(features, cls)
+        defines = {**_defines(features, lanes), **flags.of_material(features, cls)}
         name = f"material_{cls.kind}"
-        texts[name] = _source(name, own, given, lanes, "material", part=part)
+        texts[name] = _source(name, virtual, defines, lanes, "material", part=part)
     return texts
 
 
 def append_source(features: Features, layout: str, lanes: int) -> device.Source:
-    """Return the text of `append`, which brings slots into queues.
+    """Return the text of `append`, which puts slots into queues.
 
-    lanes: paths that a work-item of the stages before it has, which tells how slabs lie.
+    lanes: paths of a work-item in other stages, which decides the layout of slabs.
     """
     files = _shared(features, layout)
     return _source("append", files, _defines(features, lanes), 1)
 
 
 def film_sources(features: Features, layout: str) -> dict[str, device.Source]:
-    """Return the text of what makes the picture of a film, by program name."""
+    """Return the programs that make the picture of a film, by name."""
     return _static(_alone(features, layout, "accumulate"))
 
 
 def noise_sources(features: Features, layout: str) -> dict[str, device.Source]:
-    """Return the text of what tells a film's noise, by program name."""
+    """Return the programs that measure the noise of a film, by name."""
     return _static(_alone(features, layout, "noise"))
 
 
@@ -185,20 +186,20 @@ def loop_sources(
     """Return the texts that are linked to the loop of all stages on the device, by name.
 
     "loop" holds the kernel, which traces each kind of paths of the scene; the others are the stages
-    as functions, see kernels/stage/stage.cl. Materials shade all kinds of paths, and other
-    stages that are the same for them stand there once. They are kept, since a renderer asks twice:
-    to compile ahead, and to link.
+    as functions, see kernels/stage/stage.cl. Materials shade all kinds of paths, and other stages
+    that are equal for all kinds stand there once. The texts are cached, since a renderer asks
+    twice: to compile ahead, and to link.
     """
     looks_up = lanes > 1 and features.textures.roles
     part = _textures(features, "elsewhere") if looks_up else {}
-    made = _shading(features, layout, lanes, part=part)
+    texts = _shading(features, layout, lanes, part=part)
     used: dict[str, None] = {}
-    for own in features.passes:
-        made |= _stages(own, layout, lanes, interleaved, part)
-        stages_ = bounce.order(own, layout, lanes, interleaved)
+    for paths in features.passes:
+        texts |= _stages(paths, layout, lanes, interleaved, part)
+        stages_ = bounce.order(paths, layout, lanes, interleaved)
         used |= dict.fromkeys(stage.program for stage in stages_ if stage.verb != "shade")
-    used |= dict.fromkeys(name for name in made if name.startswith(("shade_", "material_")))
-    made |= (shared := _shared_parts(features, layout, lanes, part))
+    used |= dict.fromkeys(name for name in texts if name.startswith(("shade_", "material_")))
+    texts |= (shared := _shared_parts(features, layout, lanes, part))
     used |= dict.fromkeys(shared)
     files = {
         **_shared(features, layout),
@@ -207,21 +208,21 @@ def loop_sources(
         "generated/bounce_stages.cl": bounce.stages_text(features, layout, lanes, interleaved),
     }
     loop = _source("loop", files, _defines(features, lanes), lanes)
-    parts = {name: made[name].with_private(name) for name in used}
+    parts = {name: texts[name].with_private(name) for name in used}
     return {**parts, "loop": loop.with_private("loop")}
 
 
 def _shared_parts(
     features: Features, layout: str, lanes: int, part: Files
 ) -> dict[str, device.Source]:
-    """The texts of what other parts of a loop call: for kinds of materials, and of textures."""
-    own: dict[str, Files] = {}
-    if found := common.shared(features, lanes):
-        own["common"] = {"generated/common_part.cl": common.part_text(found), **part}
+    """The parts of a loop that other parts call: common functions and textures."""
+    parts: dict[str, Files] = {}
+    if functions := common.shared(features, lanes):
+        parts["common"] = {"generated/common_part.cl": common.part_text(functions), **part}
     if part:
-        own["textures"] = _textures(features, "part")
+        parts["textures"] = _textures(features, "part")
     files, defines = _shared(features, layout), _defines(features, lanes)
-    return {name: _source(name, {**files, **its}, defines, lanes) for name, its in own.items()}
+    return {name: _source(name, {**files, **its}, defines, lanes) for name, its in parts.items()}
 
 
 def _textures(features: Features, where: textures.Where) -> Files:
@@ -235,7 +236,7 @@ def _stochastic(features: Features) -> bool:
 
 
 def _alone(features: Features, layout: str, *names: str) -> dict[str, device.Source]:
-    """The texts of programs whose work-items serve a pixel each."""
+    """The programs whose work-items serve a pixel each."""
     files, defines = _shared(features, layout), _defines(features, 1)
     return {name: _source(name, files, defines, 1) for name in names}
 
@@ -247,7 +248,9 @@ def _static(texts: dict[str, device.Source]) -> dict[str, device.Source]:
 @functools.lru_cache(maxsize=8)
 def _defines(features: Features, lanes: int) -> flags.Defines:
     """Return what all programs of a scene define; lanes: paths that a work-item shades."""
-    passed = int(lanes > 1 and _stochastic(features))  # by parts of a loop, in one form
+    passed = int(
+        lanes > 1 and _stochastic(features)
+    )  # parts of a loop pass texels in the same form
     block = SLAB_BLOCK if lanes == 1 else 0
     return {**flags.of_scene(features), "SLAB_BLOCK": block, "TEXELS_AT_RANDOM": passed}
 
@@ -263,25 +266,25 @@ def _source(
 ) -> device.Source:
     """The text of a program; stage: its file, if it is not called so.
 
-    part: of a loop; the files that its parts have in the place of a scene's.
+    part: of a loop; the files of its parts in place of a scene's.
     """
-    own: flags.Defines = {"PART": f"loop_{name}"} if part is not None else {}
-    given = {"LANES": lanes, "QUEUED": 0, **own, **defines}
+    of_part: flags.Defines = {"PART": f"loop_{name}"} if part is not None else {}
+    defines = {"LANES": lanes, "QUEUED": 0, **of_part, **defines}
     if part and lanes > 1:
         virtual = {**virtual, **part}
     file = f"stage/{stage or name}.cl"
-    if not given["SLAB_BLOCK"]:  # a CPU's rays go alone, too
-        return device.assemble(file, virtual, given)
+    if not defines["SLAB_BLOCK"]:  # a CPU also traces single rays
+        return device.assemble(file, virtual, defines)
     alone = {**virtual, **_ALONE}
     if few := registers.of_amd(name):
         alone |= _FEW
-        given["FEW_REGISTERS"] = few
-    source = device.assemble(file, alone, given)
+        defines["FEW_REGISTERS"] = few
+    source = device.assemble(file, alone, defines)
     return dataclasses.replace(source, registers=registers.limits(name))
 
 
 def _shared(features: Features, layout: str) -> Files:
-    """The generated files that are the same for all programs of a scene, as a dict of one's own."""
+    """The generated files that all programs of a scene share, as a new dict."""
     return dict(_generated(features, layout))
 
 

@@ -1,7 +1,7 @@
 """Arguments of kernels, as macros: records, tables and slabs; trees; film and counters.
 
 Each group of arguments is declared here once. From it follow the macro that declares it in a
-kernel, the one that passes it on, and what the host binds.
+kernel, the macro that passes it on, and the arguments that the host binds.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ SCENE_ARGS["settings"] = "global const Settings *restrict "
 
 
 def args_text(name: str, args: dict[str, str], behind: bool = False) -> list[str]:
-    """Return the macro that declares a group of arguments, and the one that passes them on.
+    """Return the macro that declares a group of arguments, and the macro that passes them on.
 
-    behind: with a comma before each, so that there may be none.
+    behind: with a comma before each argument, so that a group may be empty.
     """
     before = ", " if behind and args else ""
-    declared = ", ".join(f"{type_}{own}" for own, type_ in args.items())
+    declared = ", ".join(f"{type_}{argument}" for argument, type_ in args.items())
     return [
         f"#define {name}_ARGS {before}{declared}",
         f"#define {name}_PASSED {before}{', '.join(args)}",
@@ -35,7 +35,7 @@ def args_text(name: str, args: dict[str, str], behind: bool = False) -> list[str
 def virtual_files(features: Features, layout: str) -> dict[str, str]:
     """Return the generated files that define the groups of arguments, a file for each group.
 
-    So a stage that takes none of a group has the same text whatever is in it.
+    So a group does not change the text of a stage that takes none of it.
     """
     groups = {
         "trace": (trace_args(features, layout), False),
@@ -60,7 +60,7 @@ def scene_text(unused: Container[str] = (), features: Features | None = None) ->
     """Return records, the `Scene` struct and the macros that carry it through arguments.
 
     unused: members of the slabs that no kernel of the scene uses. features: without layers, the
-    settings end before what these need.
+    settings end before LAYER_SETTINGS.
     """
     without = () if features is None or features.film.layers.present else LAYER_SETTINGS
     slabs = [record.slab_text(unused) for record in SLABS]
@@ -99,7 +99,7 @@ def scene_text(unused: Container[str] = (), features: Features | None = None) ->
 
 
 def trace_args(features: Features, layout: str) -> dict[str, str]:
-    """Return the buffers of all trees, in which rays are traced."""
+    """Return the buffers of all trees."""
     if layout == "brute":
         return {"tris": "global const float *", "triangles": "uint "}
     trees = dict.fromkeys(("nodes", "leaves"), "global const float *")
@@ -111,23 +111,23 @@ def trace_args(features: Features, layout: str) -> dict[str, str]:
 
 
 def begin_args(features: Features) -> dict[str, str]:
-    """Return what the stage takes that begins paths."""
+    """Return arguments of the stage that begins paths."""
     film = ["film", "bands"] if features.film.bands else ["film"]
-    own = {"footprints": "global long *"} if features.film_weights else {}
-    rest = {"counters": "global uint *", "work_list": "global const uint *", "samples": "int2 "}
+    footprints = {"footprints": "global long *"} if features.film_weights else {}
+    common = {"counters": "global uint *", "work_list": "global const uint *", "samples": "int2 "}
     layers = layer_args(features) | light_layer_args(features)
-    return {**dict.fromkeys(film, "global uint *"), **layers, **own, **rest}
+    return {**dict.fromkeys(film, "global uint *"), **layers, **footprints, **common}
 
 
 def join_args(features: Features, layout: str) -> dict[str, str]:
-    """Return what the stage takes that tests rays to lights or, in `splat`, to the camera."""
-    own = begin_args(features) if features.transport.light_paths else {}
-    splats = {n: type_ for n, type_ in own.items() if n in ("film", "bands", "counters")}
+    """Return arguments of the stage that tests rays to lights or, in `splat`, to the camera."""
+    begin = begin_args(features) if features.transport.light_paths else {}
+    splats = {n: type_ for n, type_ in begin.items() if n in ("film", "bands", "counters")}
     return {**trace_args(features, layout), **splats, **light_layer_args(features)}
 
 
 def deposit_args(features: Features) -> dict[str, str]:
-    """Return what the stage takes that keeps light paths as photons."""
+    """Return arguments of the stage that stores light paths as photons."""
     if features.transport.guided and features.transport.light_paths:
         return {"guide": "global uint *"}
     if not (features.transport.merged and features.transport.light_paths):
@@ -136,7 +136,7 @@ def deposit_args(features: Features) -> dict[str, str]:
 
 
 def merge_args(features: Features) -> dict[str, str]:
-    """Return what shading takes that gathers photons."""
+    """Return arguments of shading that gathers photons."""
     if features.transport.guided and not features.transport.light_paths:
         return {"guide": "global const uint *"}
     if not features.transport.merged or features.transport.light_paths:
@@ -145,12 +145,12 @@ def merge_args(features: Features) -> dict[str, str]:
 
 
 def gather_args(features: Features) -> dict[str, str]:
-    """Return what the stage takes that gathers photons along rays, beside slabs and scene."""
+    """Return arguments of the stage that gathers photons along rays, beside slabs and scene."""
     return {**merge_args(features), **light_layer_args(features)}
 
 
 def layer_args(features: Features) -> dict[str, str]:
-    """Return what stages take that add to layers of the first samples, and to mattes."""
+    """Return arguments of stages that add to layers of the first samples, and to mattes."""
     names = ["layers"] * (features.film.layers.words > 0) + ["mattes"] * bool(
         features.film.layers.mattes
     )
@@ -158,39 +158,39 @@ def layer_args(features: Features) -> dict[str, str]:
 
 
 def light_layer_args(features: Features) -> dict[str, str]:
-    """Return what stages take that add to layers of light."""
+    """Return arguments of stages that add to layers of light."""
     return {"light_layers": "global uint *"} if features.film.layers.lights else {}
 
 
 def shade_args(features: Features) -> dict[str, str]:
-    """Return what shading takes beside slabs and scene."""
+    """Return arguments of shading, beside slabs and scene."""
     light = {} if features.transport.light_paths else light_layer_args(features)
     return {**merge_args(features), **layer_args(features), **light}
 
 
 def flight_args(features: Features) -> dict[str, str]:
-    """Return what the stage takes that takes rays through media, beside slabs and scene."""
+    """Return arguments of the stage that takes rays through media, beside slabs and scene."""
     gathers = features.media.emissive and not features.transport.light_paths
     return light_layer_args(features) if gathers else {}
 
 
 def loop_files(features: Features, layout: str) -> dict[str, str]:
-    """Return the generated file that defines what all stages of a loop take."""
+    """Return the generated file that defines the arguments of all stages of a loop."""
     return {
         "generated/loop_args.cl": "\n".join([*args_text("LOOP", loop_args(features, layout)), ""])
     }
 
 
 def loop_args(features: Features, layout: str) -> dict[str, str]:
-    """Return what the stages of a loop take, of all kinds of paths, beside slabs and scene."""
+    """Return arguments of the stages of a loop, of all kinds of paths, beside slabs and scene."""
     args = trace_args(features, layout)
-    for own in features.passes:  # deposit last, which writes what others read
-        args |= {**shade_args(own), **begin_args(own), **join_args(own, layout)}
-    return {**args, **{n: t for own in features.passes for n, t in deposit_args(own).items()}}
+    for paths in features.passes:  # deposit last: it writes arrays that other stages read
+        args |= {**shade_args(paths), **begin_args(paths), **join_args(paths, layout)}
+    return {**args, **{n: t for paths in features.passes for n, t in deposit_args(paths).items()}}
 
 
 def loop_arguments(features: Features, layout: str) -> tuple[device.Argument, ...]:
-    """Return what the kernel of stage/loop.cl takes: a linked kernel has no argument names."""
+    """Return the arguments of stage/loop.cl: a linked kernel has no argument names."""
     args = {**SLAB_ARGS, **SCENE_ARGS, **loop_args(features, layout), "queue": "global uint *"}
     args |= dict.fromkeys(("share", "bounces", "restart", "which"), "uint ")
     args["leave"] = "global const volatile uint *"

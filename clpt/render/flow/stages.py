@@ -1,4 +1,4 @@
-"""Generated parts of the stages' text: camera, lights, materials and what passes null surfaces.
+"""Generated parts of the stages' text: camera, lights, materials, null surfaces.
 
 The physics is always in a file.
 """
@@ -56,9 +56,9 @@ def _moved(ray: str, moves: bool) -> str:
 
 
 def connect_text(features: Features) -> str:
-    """Return `camera_connect` for paths that start at lights, or what ghosts of a lens need.
+    """Return `camera_connect` for light paths, or the file of a lens's ghosts.
 
-    It is nothing where no path is joined.
+    The text is empty if no path is connected to the camera.
     """
     if features.transport.lit_ghosts and features.transport.light_paths:
         return '#include "cameras/kinds/lens.cl#ghosts"\n'
@@ -69,12 +69,12 @@ def connect_text(features: Features) -> str:
     files = f'#include "cameras/kinds/{kind}.cl#connect"\n'
     camera = f"(global const {record.name} *)(scene).camera"
     if features.motion.camera:
-        rest = f"{kind}_connect({camera}, (scene).settings, p, away, lens)"
+        point = f"{kind}_connect({camera}, (scene).settings, p, away, lens)"
         return f'{files}#include "cameras/motion.cl#connect"\n' + function(
             "CameraPoint camera_connect(Scene scene, vec3 p, mask away, vec2 lens)",
             "Motion motion = camera_motion(scene);",
             "p = camera_point_back(motion, p, away);",
-            f"return camera_point_moved(motion, camera_near(scene, {rest}), away);",
+            f"return camera_point_moved(motion, camera_near(scene, {point}), away);",
         )
     return (
         f"{files}#define camera_connect(scene, p, away, lens) "
@@ -84,7 +84,7 @@ def connect_text(features: Features) -> str:
 
 
 def screen_text(features: Features) -> str:
-    """Return `camera_screen`, where on the film a point is seen, for the layer of motion."""
+    """Return `camera_screen`, the projection of a point to the film, for the layer of motion."""
     if not features.screen_motion:
         return ""
     kind = features.camera.kind
@@ -96,10 +96,10 @@ def screen_text(features: Features) -> str:
 
 
 def photon_text(features: Features) -> str:
-    """Return the struct of a photon, and `photon_met(kind)`: whether one is kept at a material.
+    """Return the struct of a photon, and `photon_met(kind)`: whether a material stores photons.
 
-    At a mixture one is kept while no part is chosen yet. `photon_along(kind)`: likewise in a medium
-    of a phase function; `photon_collides(kind)`: whether it is a phase function.
+    A mixture stores photons before its part is chosen. `photon_along(kind)`: the same in a medium
+    of a phase function; `photon_collides(kind)`: whether the kind is a phase function.
     """
     leaves = [*enumerate(features.materials.leaves)]
     kinds = [i for i, cls in leaves if flags.gathers_photons(features, cls)]
@@ -125,12 +125,12 @@ def _phases(features: Features) -> list[int]:
 
 
 def _among(kinds: Sequence[int]) -> str:
-    """The condition that a kind is one of these, in each lane."""
+    """The condition, in each lane, that a kind is among kinds."""
     return " | ".join(f"((kind) == {kind})" for kind in kinds) or "mask_of(0)"
 
 
 def grid_words_text(grids: GridFeatures) -> str:
-    """Return where behind a medium's coefficients the words of its grid's colours and parts lie."""
+    """Return the offsets of the words of a grid's colours and parts from its coefficients."""
     albedo = (
         19 + 6 * grids.emissive
     )  # behind the words of its light, kernels/media/medium_grid_light.cl
@@ -142,7 +142,7 @@ def grid_words_text(grids: GridFeatures) -> str:
 
 
 def lights_text(features: Features) -> str:
-    """Return the loader of emissions, from wherever they come in this scene, and the dispatch."""
+    """Return the loader of emissions, for all their sources in this scene, and the dispatch."""
     emissions = lights.emission_sources(features)
     factors = features.materials.sources_of("factor").get("value", frozenset())
     densities = emission.densities_text(features) if features.transport.balanced else ""
@@ -155,9 +155,9 @@ def lights_text(features: Features) -> str:
 
 
 def null_transmittance_text(features: Features) -> str:
-    """Return `null_transmittance`: how much light passes a surface with some material word.
+    """Return `null_transmittance`: the share of light that passes a surface without a vertex.
 
-    A mixture's children are one level below it, since kernels cannot call themselves.
+    Mixtures have a function for each level of nesting, since kernels cannot call themselves.
     """
     leaves = [*enumerate(features.materials.leaves)]
     passing = [f"(MATERIAL_KIND(word) == {i})" for i, cls in leaves if cls.is_null]
@@ -219,20 +219,21 @@ def smooth_boundary_text(features: Features) -> str:
 
 
 def functions_text(cls: type[Scatterer], mode: str, features: Features | None = None) -> str:
-    """Return a kind's struct and functions, with what its boundary needs.
+    """Return a kind's struct and functions, with the files of its boundary.
 
-    features: where its parameters come from; without, all are constants.
+    features: with the sources of its parameters; without features all are constants.
     """
     loaded = features.materials if features else MaterialFeatures()
-    own, layer = loaded.sources_of(cls.kind), loaded.sources_of("layer")
-    boundary = thin_films.boundary_text(cls, mode, own, layer)
+    sources, layer = loaded.sources_of(cls.kind), loaded.sources_of("layer")
+    measured = sources.get("data", frozenset())
+    boundary = thin_films.boundary_text(cls, mode, sources, layer)
     used = {param.role for param in device_params(cls).values()}
     for role, table in parameters.TABLES.items():
         if role in used:
-            boundary += _counts_text(role, own.get("data", frozenset())) if table.counted else ""
+            boundary += _counts_text(role, measured) if table.counted else ""
             boundary += f'#include "{table.file}"\n'
             boundary += f'#include "{table.load_file}"\n' if features else ""
-    struct, declared = parameters.struct_text(cls, own), _declared_text(cls)
+    struct, declared = parameters.struct_text(cls, sources), _declared_text(cls)
     return f'{boundary}{struct}{declared}#include "{cls.folder}/{cls.kind}.cl"\n'
 
 
@@ -248,7 +249,7 @@ def _counts_text(role: Role, sources: frozenset[str]) -> str:
 def _declared_text(cls: type[Scatterer]) -> str:
     """Declare a kind's costly functions as inline.
 
-    Only so do compilers see which lobes a scene leaves out, and what the functions have in common.
+    Then compilers remove lobes that a scene does not use, and shared parts of the functions.
     """
     types = {"sample": "BsdfSample", "eval": "Spectrum", "pdf": "real", "pdfs": "Spectrum"}
     last = {"sample": "vec3 u"}
@@ -287,10 +288,10 @@ def bsdf_text(features: Features, cls: type[Scatterer]) -> str:
 
 def interior(cls: type[Scatterer]) -> str:
     """The name of the medium inside of a material at `row`, see kernels/media/medium.cl."""
-    own = interior_params(cls)
-    first = row_words(cls) - sum(map(words, own.values()))
-    inside = f"((row) + {1 + first})" if own else "((integer)(0))"
-    if own and "thin" in device_params(cls):  # a sheet has no inside
+    declared = interior_params(cls)
+    first = row_words(cls) - sum(map(words, declared.values()))
+    inside = f"((row) + {1 + first})" if declared else "((integer)(0))"
+    if declared and "thin" in device_params(cls):  # a sheet has no inside
         at = parameters.word_before(cls, "thin")
         thin = f"gather_i(scene.materials, (row) + {at}) != 0"
         inside = f"sel_i({thin}, (integer)(0), {inside})"
@@ -298,12 +299,12 @@ def interior(cls: type[Scatterer]) -> str:
 
 
 def _shift_text(cls: type[Scatterer]) -> list[str]:
-    """`bsdf_shift`: the wavelengths by which light comes to a surface at `row`."""
+    """`bsdf_shift`: the wavelengths of light that excites a surface at `row`."""
     at = parameters.word_before(cls, "reradiation")
     table = f"gather_i((scene).materials, (row) + {at})"
-    own = "&(m).reflectance, &(m).reradiation, (m).amount"
+    values = "&(m).reflectance, &(m).reradiation, (m).amount"
     return [
         '#include "materials/reradiation.cl"',
         "#define bsdf_shift(scene, row, m, lambdas, u, depth) "
-        f"reradiation_shift(scene, {table}, {own}, lambdas, u, depth)",
+        f"reradiation_shift(scene, {table}, {values}, lambdas, u, depth)",
     ]

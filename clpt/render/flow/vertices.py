@@ -1,9 +1,9 @@
 """Vertices of paths that several kinds of materials share, in the loop of a CPU.
 
-Most of what shades a kind is the vertex of the path: light that is met and sought, weights against
-paths from the other end, roulette. Kinds for which that is the same are shaded by one part of the
-loop, and each has a part with what is its own, which the vertex calls for LANES paths of one kind
-at once. In one lane, as on GPUs, each kind has a program with all of it.
+Most of the code that shades a kind is the vertex of the path: emission, next-event estimation, MIS
+weights, roulette. Kinds with the same vertex code share a part of the loop. Each kind has a further
+part with its functions, which the vertex calls for LANES paths of the same kind at once. In a
+single lane, as on GPUs, each kind has a program with both.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from clpt.render.records.dispatch import function
 from clpt.scene.scatterer import Scatterer
 
 RUN_TIME = ("BSDF_KIND", "BSDF_TRANSMITS", "BSDF_SHINES", "BSDF_ABSORBS", "USES_CHOICE",
-            "STOCHASTIC_FILTERING")  # flags in which kinds of one vertex may differ  # fmt: skip
+            "STOCHASTIC_FILTERING")  # kinds of a vertex may differ in these flags  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -34,64 +34,64 @@ class Vertex:
 
 
 def vertices(features: Features, lanes: int) -> list[Vertex]:
-    """Return what shades the materials of a scene, in the order of their kinds."""
+    """Return the vertices of a scene, in the order of their kinds of materials."""
     leaves = features.materials.leaves
     alike: dict[object, list[int]] = {}
     for kind, cls in enumerate(leaves):
         key = _key(features, cls) if lanes > 1 and _may_share(features, cls) else kind
         alike.setdefault(key, []).append(kind)
-    found = []
+    vertices_ = []
     for kinds in alike.values():
         others = "_and_others" if len(kinds) > 1 else ""
-        found.append(Vertex(f"shade_{leaves[kinds[0]].kind}{others}", tuple(kinds)))
-    return found
+        vertices_.append(Vertex(f"shade_{leaves[kinds[0]].kind}{others}", tuple(kinds)))
+    return vertices_
 
 
 def _may_share(features: Features, cls: type[Scatterer]) -> bool:
-    """Whether the vertex asks a kind once: photons, guides, escapes, hero wavelengths ask more."""
-    own = (flags.is_chromatic, flags.fluoresces, flags.is_guided, flags.between_bodies)
+    """Whether a kind may share a vertex: not with photons, guides, escapes, hero wavelengths."""
+    special = (flags.is_chromatic, flags.fluoresces, flags.is_guided, flags.between_bodies)
     merged = features.transport.merged and flags.gathers_photons(features, cls)
-    turned = any(flags.has_lobe(features, cls, one) for one in ("clearcoat_apart", "anisotropy"))
+    turned = any(flags.has_lobe(features, cls, lobe) for lobe in ("clearcoat_apart", "anisotropy"))
     sent = features.media.escapes and cls.is_phase
-    alone = merged or turned or sent or any(holds(features, cls) for holds in own)
+    alone = merged or turned or sent or any(holds(features, cls) for holds in special)
     return features.transport.integrator != "whitted" and not alone
 
 
 def _key(features: Features, cls: type[Scatterer]) -> object:
-    """Return a key that is equal for kinds of one vertex; whether they shine does not matter."""
-    own = flags.of_material(features, cls)
+    """Return a key that is equal for kinds of a vertex, whether they emit light or not."""
+    values = flags.of_material(features, cls)
     files = {
         name: tuple(file.replace(f"met_emission.cl{TWIN}", "met_emission.cl") for file in chosen)
         for name, chosen in choices.material_files(features, cls).items()
     }
-    rest = (item for item in own.items() if item[0] not in RUN_TIME)
-    return (*rest, *files.items())
+    fixed = (flag for flag in values.items() if flag[0] not in RUN_TIME)
+    return (*fixed, *files.items())
 
 
 def leader(features: Features, vertex: Vertex) -> type[Scatterer]:
-    """Return the kind whose files serve all kinds of a vertex: one that shines, if any does."""
+    """Return the kind whose files serve all kinds of a vertex: a kind that emits, if any does."""
     classes = [features.materials.leaves[kind] for kind in vertex.kinds]
     return max(classes, key=lambda cls: cls.kind in features.materials.shining)
 
 
 def defines(features: Features, vertex: Vertex) -> flags.Defines:
-    """Return the flags of a vertex: what its kinds differ in follows from `scene.kind`."""
+    """Return the flags of a vertex; flags that differ between its kinds depend on `scene.kind`."""
     each = [flags.of_material(features, features.materials.leaves[kind]) for kind in vertex.kinds]
     if not vertex.shared:
         return each[0]
-    # Of black materials a path's end is known late, when it has no light to carry.
-    found = {**each[0], "SHADES_SEVERAL": 1, "BSDF_KIND": "scene.kind", "BSDF_ABSORBS": 0}
+    # At black materials the end of a path is known late, by its throughput.
+    values = {**each[0], "SHADES_SEVERAL": 1, "BSDF_KIND": "scene.kind", "BSDF_ABSORBS": 0}
     for name in ("BSDF_SHINES", "STOCHASTIC_FILTERING"):
-        found[name] = max(own[name] for own in each)
+        values[name] = max(material[name] for material in each)
     for name in ("BSDF_TRANSMITS", "USES_CHOICE"):
-        bits = sum(1 << kind for kind, own in zip(vertex.kinds, each, strict=True) if own[name])
+        bits = sum(1 << k for k, material in zip(vertex.kinds, each, strict=True) if material[name])
         every = sum(1 << kind for kind in vertex.kinds)
-        found[name] = int(bits > 0) if bits in (0, every) else f"((0x{bits:x} >> scene.kind) & 1)"
-    return found
+        values[name] = int(bits > 0) if bits in (0, every) else f"((0x{bits:x} >> scene.kind) & 1)"
+    return values
 
 
 def virtual_files(features: Features, vertex: Vertex) -> dict[str, str | tuple[str, ...]]:
-    """Return the files that stand for those of a single kind."""
+    """Return the files in place of the files of a single kind."""
     return {
         "generated/bsdf.cl": _calls_text(features, vertex),
         "generated/pair.cl": ("materials/bsdf.cl#pair_apart",),
@@ -103,8 +103,8 @@ _READ_PASSED = "scene, row, point, lambdas"
 
 
 @dataclass(frozen=True)
-class Own:
-    """A function of a kind's part: its type and name, and what it takes besides where it reads."""
+class PartFunction:
+    """A function of a kind's part; takes: its parameters besides `_READ`; value: its result."""
 
     returns: str
     name: str
@@ -122,23 +122,23 @@ class Own:
         return ", ".join([_READ_PASSED, *(name for _, name in self.takes)])
 
 
-def _functions(features: Features) -> list[Own]:
+def _functions(features: Features) -> list[PartFunction]:
     """Return the functions that the parts of a scene's kinds have."""
-    joined = any(own.transport.joined for own in features.passes)
+    joined = any(paths.transport.joined for paths in features.passes)
     directions = (("vec3", "wo"), ("vec3", "wi"), ("vec3", "u"), ("uint", "adjoint"))
     answer = f"material_answer(m, wo, wi, u, {'adjoint' if joined else '0'})"
-    found = [Own("BsdfAnswer", "answer", directions, answer)]
+    functions = [PartFunction("BsdfAnswer", "answer", directions, answer)]
     if features.film.layers.words:
-        found.append(Own("Spectrum", "albedo", (), "bsdf_albedo(m)"))
-    return found
+        functions.append(PartFunction("Spectrum", "albedo", (), "bsdf_albedo(m)"))
+    return functions
 
 
 def part_text(features: Features, cls: type[Scatterer]) -> str:
     """Return the functions of a kind's part."""
     rows = []
-    for own in _functions(features):
-        rows.append(f"APART({own.returns}, loop_{cls.kind}_{own.name})({own.parameters})")
-        rows.append(f"{{\n    Bsdf m = bsdf_load({_READ_PASSED});\n    return {own.value};\n}}")
+    for part in _functions(features):
+        rows.append(f"APART({part.returns}, loop_{cls.kind}_{part.name})({part.parameters})")
+        rows.append(f"{{\n    Bsdf m = bsdf_load({_READ_PASSED});\n    return {part.value};\n}}")
     return "\n".join([*rows, ""])
 
 
@@ -146,14 +146,14 @@ def _calls_text(features: Features, vertex: Vertex) -> str:
     """Return the material of a shared vertex: functions that call those of the kinds' parts."""
     classes = {kind: features.materials.leaves[kind] for kind in vertex.kinds}
     rows = []
-    for own in _functions(features):
+    for part in _functions(features):
         cases = []
         for kind, cls in classes.items():
-            called = f"loop_{cls.kind}_{own.name}"
-            rows.append(f"{own.returns} {called}({own.parameters});")
-            cases.append(f"case {kind}: value = {called}({own.passed}); break;")
-        body = (f"{own.returns} value;", "switch (scene.kind) {", *cases, "}", "return value;")
-        rows.append(function(f"{own.returns} apart_{own.name}({own.parameters})", *body))
+            called = f"loop_{cls.kind}_{part.name}"
+            rows.append(f"{part.returns} {called}({part.parameters});")
+            cases.append(f"case {kind}: value = {called}({part.passed}); break;")
+        body = (f"{part.returns} value;", "switch (scene.kind) {", *cases, "}", "return value;")
+        rows.append(function(f"{part.returns} apart_{part.name}({part.parameters})", *body))
     if features.media.absorbing:
         inside = (f"case {kind}: return {stages.interior(cls)};" for kind, cls in classes.items())
         head = "integer bsdf_interior(Scene scene, integer row)"

@@ -89,7 +89,7 @@ def _in_motion() -> list[str]:
 
 
 def points_text(features: Features) -> str:
-    """Return `<verb>_of_shape`, by which shading computes points of analytic shapes."""
+    """Return `<verb>_of_shape`: they compute points of analytic shapes for shading."""
     if not features.geometry.analytic:
         return ""
     functions = [_of_shape(features, "vec3", "onto", "vec3 p"), _of_shape(features, "real", "size")]

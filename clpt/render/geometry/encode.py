@@ -3,7 +3,7 @@
 The table `attributes` begins with a directory of zeros, which shapes without attributes use. A mesh
 has its own directory: for each (name, role, channel) that textures read, the word where its values
 would begin for vertex or face 0 of the scene, and the number of words of a value. A colour takes
-four words, as a texel does, a number one word.
+four words, as a texel does, a number a single word.
 """
 
 from __future__ import annotations

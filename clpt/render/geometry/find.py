@@ -109,7 +109,7 @@ class Geometry:
         return any(count > 1 for count in self.keys.values())
 
     def bounding_sphere(self) -> tuple[NDArray[np.float64], float]:
-        """Return centre and radius of a sphere around the scene; a unit one if it is empty.
+        """Return centre and radius of a sphere around the scene; the unit sphere if it is empty.
 
         Raises SceneError for a scene whose size is beyond float32.
         """

@@ -4,7 +4,7 @@ A ray knows its medium from the boundaries that it crosses. If it passes through
 is undefined: paths from the camera and paths from lights may assume different media, and their
 pictures differ.
 
-The edges of a hole have a triangle on only one side, or triangles of opposite winding. Its size is
+The edges of a hole have a triangle on a single side, or triangles of opposite winding. Its size is
 the area that its edges enclose, so a vertex on the edge of another triangle makes no hole.
 """
 

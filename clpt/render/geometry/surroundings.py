@@ -211,7 +211,7 @@ def stands_still(bounding: Sequence[Shape]) -> bool:
 
 
 def camera_origin(camera: Camera, film: Film, time: float) -> NDArray[np.float64]:
-    """Return the point (3,) [m] from which a camera sees at a time [s], see `Camera.view_point`."""
+    """Return a camera's `view_point` (3,) [m] at a time [s]."""
     origin = camera.view_point(film.width, film.height)
     if camera.motion is None:
         return origin

@@ -1,4 +1,4 @@
-"""Spheres around specular shapes, at which light paths aim: kernels/lights/aiming.cl."""
+"""Spheres around specular shapes, the targets of light paths: kernels/lights/aiming.cl."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST = 32  # spheres
 SHARP = 0.2  # roughness alpha of microfacets below which a surface counts as specular
 LARGE = 0.5  # of the scene's radius: a single sphere that is larger is no aim
 CLUSTERS = 256  # most clusters into which specular pieces are cut
-CELLS = 16  # along each side of a grid, in which many pieces are merged cell by cell
+CELLS = 16  # along each side of a grid that merges many pieces cell by cell
 GAP = 0.05  # of the span of pieces along an axis: wider gaps are cut first
 SEVERAL = 1 << 12  # most pieces among which gaps are searched
 PRICE = 1e-3  # of a sphere, over the area of all: a cut that gains less is not made
@@ -56,7 +56,7 @@ def is_sharp(material: mt.Material, below: float = SHARP) -> bool:
     """Whether a material, or a part of it, is specular or nearly so.
 
     A coat over a diffuse base does not count, nor does a material that ends light paths. below:
-    the roughness alpha up to which a rough material counts.
+    the upper limit of the roughness alpha.
     """
     if not material.reversible:
         return False
@@ -170,7 +170,7 @@ def _cut(columns: Floats) -> tuple[tuple[Floats, ...], bool]:
 
 
 def _fewer(pieces: Floats) -> Floats:
-    """Merge many pieces: a piece around those of each cell of a grid."""
+    """Merge many pieces: the result has a piece for each cell of a grid."""
     if len(pieces) <= CELLS**3:
         return pieces
     columns = _columns(pieces)

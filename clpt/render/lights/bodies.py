@@ -35,7 +35,7 @@ Cached = Callable[..., Any] | None
 
 @dataclass(frozen=True)
 class BodyLight:
-    """A homogeneous medium as one light, see kernels/lights/kinds/emissive_body.cl.
+    """A homogeneous medium as a single light, see kernels/lights/kinds/emissive_body.cl.
 
     matrix (3, 4): axes and middle of the ball or box around it [m]; ball: False for a box; power
     [W/nm].

@@ -33,8 +33,8 @@ def virtual_files() -> dict[str, str]:
     files = {f"generated/{record.snake_name}.cl": record.select_text() for record in VALUES}
     for kind, record in RECORDS.items():
         base = f'#include "generated/light/{BASES[kind]}.cl"\n' if kind in BASES else ""
-        own = f'{record.row_text()}#include "lights/kinds/{kind}.cl"\n'
-        files[f"generated/light/{kind}.cl"] = base + own
+        text = f'{record.row_text()}#include "lights/kinds/{kind}.cl"\n'
+        files[f"generated/light/{kind}.cl"] = base + text
     return files
 
 

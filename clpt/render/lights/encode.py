@@ -35,7 +35,8 @@ from clpt.scene.texture_values import mean
 PLACED_LIGHT_WEIGHT = 6  # rows of a light at a separate place, to decide on a light tree
 INFINITE_SHARE = 0.5  # of the choices, beside other lights
 
-FEW_LIGHTS = 256  # the most lights for which a random number chooses a light and a point on it
+FEW_LIGHTS = 256  # up to this number a single random number chooses a light and a point on it
+
 
 
 @dataclass(frozen=True)

@@ -11,17 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from clpt.arrays import fits_single
 from clpt.errors import SceneError
 from clpt.render.lights.check import placement, three, unit, unsheared
-from clpt.render.lights.find import emissions_of
-from clpt.render.lights.images import lower_image
-from clpt.render.lights.sky import lower_sky
+from clpt.render.lights.find import emissions_of, environment_of
 from clpt.render.materials.encoder import Encoder
 from clpt.render.records import lights as light_records
 from clpt.render.records.lights import RECORDS
-from clpt.scene import lights, roles
+from clpt.scene import roles
 from clpt.scene.lights import Light
 from clpt.scene.params import fields_of, params
 from clpt.scene.roles import Param, Role
-from clpt.scene.texture_values import is_texture
 
 
 def blank_row() -> NDArray[np.uint32]:
@@ -47,11 +44,9 @@ class Lowered(NamedTuple):
 def lower_lamp(lamp: Light, encoder: Encoder) -> Lowered:
     """Put a light into the tables. Raises SceneError for a light without position or direction."""
     kind, radiance = lamp.record, 0
-    if isinstance(lamp, (lights.Envmap, lights.CubeMap)):
-        members = lower_image(lamp, encoder)
-        kind = "spectral_envmap" if "bands" in members else kind
-    elif isinstance(lamp, lights.Sky):
-        kind, members = lower_sky(lamp, encoder)
+    environment = environment_of(lamp, encoder.look)
+    if environment is not None:
+        kind, members = environment.record(lamp, encoder)
     else:
         rows = {
             name: encoder.store.append("light_params", encoder.emission_words(value))
@@ -99,54 +94,22 @@ MEMBERS: dict[Role, Callable[[str, Any, Param, str], dict[str, ArrayLike]]] = {
 
 
 def _computed_members(kind: str, lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
-    """Return the members of another light's record but for its radiance."""
-    if kind in light_records.PROJECTED_RECORDS:
-        return _projected_members(lamp, encoder)
-    assert isinstance(lamp, lights.Spot)
-    placed = placement(lamp.to_world, "spot.to_world")
-    return {
-        "position": placed["position"],
-        "axis": placed["z"],
-        "cutoff": np.radians(lamp.cutoff),
-        "beam_width": np.radians(min(lamp.beam_width, lamp.cutoff)),
-        "smooth": lights.SPOT_EDGES.index(lamp.edge),
-    }
+    """Return the members of another light's record but for its radiance.
 
-
-def _projected_members(lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
-    """Return the members of a projecting light's record but for `radiance`.
-
-    Raises SceneError for a transform that shears, or an image that cannot be used.
+    Raises SceneError for a transform that shears below an image, or an unreadable image.
     """
-    if isinstance(lamp, lights.Projector):
-        half = float(np.tan(np.radians(lamp.fov) / 2.0))
-        axes = _place(lamp.to_world, "projector.to_world", half, half / lamp.image_aspect)
-        return {**axes, **_image(lamp.image, encoder)}
-    if isinstance(lamp, lights.Goniometric):
-        place = _place(lamp.to_world, "goniometric.to_world")
-        return {**place, **_image(lamp.polar_image, encoder)}
-    assert isinstance(lamp, lights.Spot)
-    half = float(np.tan(np.radians(lamp.cutoff)))
-    return {
-        **_place(lamp.to_world, "spot.to_world", half, half),
-        "cutoff": np.radians(lamp.cutoff),
-        "beam_width": np.radians(min(lamp.beam_width, lamp.cutoff)),
-        "smooth": lights.SPOT_EDGES.index(lamp.edge),
-        "factor": encoder.store.append("light_params", encoder.factor_words(lamp.image)),
-    }
-
-
-def _image(image: object, encoder: Encoder) -> dict[str, ArrayLike]:
-    """Return the members of an image, whose values are scaled to at most 1."""
-    scale, image = image.normalized() if is_texture(image) else (1.0, image)
-    return {
-        "scale": scale,
-        "factor": encoder.store.append("light_params", encoder.factor_words(image)),
-    }
+    to_world, where = fields_of(lamp)["to_world"], f"{lamp.kind}.to_world"
+    if kind in light_records.PROJECTED_RECORDS:
+        placed = _place(to_world, where, *lamp.image_half_size)
+        members = lamp.record_members()
+        words = encoder.factor_words(members["factor"])
+        return {**members, **placed, "factor": encoder.store.append("light_params", words)}
+    axes = placement(to_world, where)
+    return {**lamp.record_members(), "position": axes["position"], "axis": axes["z"]}
 
 
 def _place(
-    to_world: ArrayLike, where: str, half_x: float = 1.0, half_y: float = 1.0
+    to_world: ArrayLike, where: str, half_x: float, half_y: float
 ) -> dict[str, NDArray[np.float64]]:
     """Return position and axes; x and y are divided by half the image's size at a distance of 1."""
     position, axes = unsheared(to_world, where)

@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.arrays import Faces, Points
+from clpt.arrays import Faces, Floats, Points
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.geometry.motion import corners, swept
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights import images as image_lights
-from clpt.render.lights import power as light_power
 from clpt.render.lights import sky as sky_light
 from clpt.render.lights.bodies import BodyLight, volume_lights
 from clpt.render.lights.bounds import Bounds
 from clpt.render.lights.bricks import BrickLights
-from clpt.render.lights.power import triangle_means
 from clpt.render.records.lights import INFINITE
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
@@ -30,12 +29,17 @@ from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.media import Medium
 from clpt.scene.params import fields_of, params
-from clpt.scene.roles import EMISSION
+from clpt.scene.roles import EMISSION, REFLECTANCE
 from clpt.scene.shapes import Shape
-from clpt.scene.texture_values import mean
+from clpt.scene.texture_values import brightness_at, is_texture, mean
 from clpt.scene.textures import attributes_in
 
 Around: TypeAlias = Callable[[int | Emitter, light_bounds.Bounds], light_bounds.Bounds] | None
+
+LOOKS = 1 << 18  # at a texture, all triangles together
+FEWEST, MOST = 16, 1024  # of them for a triangle
+LEAST = 0.02  # of the texture's mean: a triangle that looks dark may yet hold a bright texel
+_GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # Roberts' sequence R2 (2018)
 
 
 @dataclass(frozen=True)
@@ -147,16 +151,30 @@ def emissions_of(lamp: Light) -> dict[str, Any]:
     return {name: values[name] for name, param in declared if param.role is EMISSION}
 
 
+ENVIRONMENTS: dict[type[Light], Any] = {  # functions of a light and a look
+    lights.Envmap: image_lights.envmap_content,
+    lights.CubeMap: image_lights.cube_content,
+    lights.Sky: sky_light.content,
+}
+
+
+def environment_of(lamp: Light, look: Look) -> image_lights.Content | sky_light.Content | None:
+    """Return the content of a light that is an image around the scene; None for another light."""
+    if type(lamp) not in ENVIRONMENTS:
+        return None
+    content: image_lights.Content | sky_light.Content = ENVIRONMENTS[type(lamp)](lamp, look)
+    return content
+
+
 def _of_lamp(lamp: Light, scene_radius: float, look: Look) -> Source:
-    if isinstance(lamp, (lights.Envmap, lights.CubeMap)):
-        strength = image_lights.mean_radiance(image_lights.content(lamp, look))
-    elif isinstance(lamp, lights.Sky):
-        strength = sky_light.content(lamp, look).strength
+    environment = environment_of(lamp, look)
+    if environment is not None:
+        strength = environment.strength
     else:
         values = emissions_of(lamp).values()
         strength = float(np.mean([mean(value, look) for value in values]))
-    power = light_power.power(lamp, strength, scene_radius, look)
-    counts = light_power.importance(lamp, strength, power)
+    power = light_power(lamp, strength, scene_radius, look)
+    counts = importance(lamp, strength, power)
     return Source(np.array([power]), light_bounds.of_lamp(lamp), np.array([counts]))
 
 
@@ -194,6 +212,58 @@ def _of_emitter(emitter: Emitter, look: Look) -> Source:
     power = strength * cache(_triangle_areas, *mesh) * means
     bounds = cache(_triangle_bounds, *mesh, both)
     return Source(power, bounds, power, float(means.max(initial=0.0)))
+
+
+def light_power(lamp: Light, strength: float, scene_radius: float, look: Look) -> float:
+    """Estimate the power of a light off all shapes in the scene, mean of channels [W/nm].
+
+    strength: the mean of its intensity, irradiance or radiance.
+    """
+    declared = params(type(lamp)).get("image")
+    passes = declared is not None and declared.role is REFLECTANCE
+    image_mean = mean(fields_of(lamp)["image"], look) if passes else 1.0
+    return lamp.sampling_power(strength, scene_radius, image_mean)
+
+
+def importance(lamp: Light, strength: float, power: float) -> float:
+    """Return the weight of a light off all shapes in a light tree.
+
+    A small flat light of power P gives an irradiance of P / pi at a metre, so the irradiance of a
+    light without a place counts pi times.
+    """
+    if lamp.reach == "placed" and lamp.falloff:
+        return power
+    return np.pi * strength * (np.pi if lamp.reach == "infinite" else 1.0)
+
+
+def triangle_means(
+    value: object,
+    look: Look,
+    uvs: NDArray[np.float32] | None,
+    faces: NDArray[Any],
+    attributes: Mapping[str, NDArray[np.float32]] = MappingProxyType({}),
+) -> Floats:
+    """Return the mean brightness of an emission over triangles (m, 3), as (m,).
+
+    look: of the film; uvs (n, 2): of the vertices; None: uv are barycentrics, as in
+    kernels/lights/area.cl; attributes: values (m, k) of the mesh attributes that the emission
+    reads by face.
+    """
+    if not is_texture(value):
+        return np.full(len(faces), mean(value, look))
+    corners = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
+    corner_uvs = (
+        np.tile(corners, (len(faces), 1, 1)) if uvs is None else np.asarray(uvs, float)[faces]
+    )
+    count = int(np.clip(LOOKS // max(len(faces), 1), FEWEST, MOST))
+    u = np.modf(0.5 + np.arange(count)[:, None] * _GOLDEN)[0]
+    root = np.sqrt(u[:, 0])
+    weights = np.stack([1.0 - root, root * (1.0 - u[:, 1]), root * u[:, 1]], axis=1)
+    places = np.einsum("kc,mcd->mkd", weights, corner_uvs)
+    edges = corner_uvs[:, 1:] - corner_uvs[:, :1]
+    area = 0.5 * np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    means = brightness_at(value, look, places, area / count, attributes).mean(axis=1)
+    return np.maximum(means, LEAST * mean(value, look))
 
 
 def _face_attributes(shape: Shape, value: object) -> dict[str, NDArray[np.float32]]:

@@ -25,12 +25,12 @@ from clpt.render.materials.encoder import Encoder
 from clpt.render.records.lowering_cache import version
 from clpt.render.spectra.look import Look
 from clpt.render.textures.texels import bands, texels
-from clpt.scene.lights import CubeMap, Envmap
+from clpt.scene.lights import CubeMap, Envmap, Light
 from clpt.scene.pixels import image_file
 from clpt.scene.roles import EMISSION
 from clpt.spectra import Tabulated, luminance
 
-PARTS = 128  # of an image's side: resolution at which bright and dark directions are separated
+PARTS = 128  # blocks along an image's side; each is a bright or a dark direction
 UNSEEN = 0.1  # share of the mean over bands in a texel's weight: invisible light counts too
 
 FACES = "+x -x +y -y +z -z"
@@ -55,25 +55,51 @@ class Content(NamedTuple):
     number: Tabulated | None = None
     notes: tuple[str, ...] = ()
 
+    @property
+    def strength(self) -> float:
+        """The mean of its radiance over all directions."""
+        if len(self.corners) == 1:
+            cell = np.pi / (self.height - 1) * 2.0 * np.pi / self.width
+        else:
+            cell = self.width**-2.0
+        return self.grid.total * cell / (4.0 * np.pi)
 
-def extent(lamp: Envmap | CubeMap, look: Look, share: float) -> float:
-    """Return the fraction of the sphere, 0 to 1, whose light is a share of an image light's power.
+    def extent(self, share: float) -> float:
+        """Return the fraction of the sphere, 0 to 1, that emits a share of the power.
 
-    The brightest directions count first, in blocks, PARTS along each side of an image. 1 for a
-    black image.
-    """
-    image = content(lamp, look)
-    if len(image.corners) == 1:
-        even = _even(image.corners)
-    else:
-        even = _cube_weights(np.ones((6, image.height + 2, image.width + 2), np.float32))
-    power, angle = _in_parts(image.corners), _in_parts(even)
-    brightest = np.argsort(-power / angle)
-    sums = np.cumsum(power[brightest])
-    if not sums[-1] > 0.0:
-        return 1.0
-    held = np.searchsorted(sums, share * sums[-1]) + 1
-    return float(angle[brightest[:held]].sum() / angle.sum())
+        The brightest directions count first, in blocks, PARTS along each side of an image. 1 for a
+        black image.
+        """
+        if len(self.corners) == 1:
+            even = _even(self.corners)
+        else:
+            even = _cube_weights(np.ones((6, self.height + 2, self.width + 2), np.float32))
+        power, angle = _in_parts(self.corners), _in_parts(even)
+        brightest = np.argsort(-power / angle)
+        sums = np.cumsum(power[brightest])
+        if not sums[-1] > 0.0:
+            return 1.0
+        held = np.searchsorted(sums, share * sums[-1]) + 1
+        return float(angle[brightest[:held]].sum() / angle.sum())
+
+    def record(self, lamp: Light, encoder: Encoder) -> tuple[str, dict[str, ArrayLike]]:
+        """Append the texels and the grid; return the name and the members of the record.
+
+        Raises SceneError for a transform that is no rotation.
+        """
+        axes = rotation(lamp)
+        encoder.warnings.update(self.notes)
+        members: dict[str, ArrayLike] = {name: axes[:, i] for i, name in enumerate("xyz")}
+        members |= {
+            "width": self.width,
+            "height": self.height,
+            "texels": encoder.store.append_floats("texels", self.texels),
+            **grid_members(self.corners, self.grid, encoder),
+        }
+        if self.number is None:
+            return lamp.kind, members
+        members |= {"bands": self.bands, "number": encoder.spectra.row(self.number)}
+        return f"spectral_{lamp.kind}", members
 
 
 def _in_parts(weights: NDArray[Any]) -> NDArray[np.float64]:
@@ -85,23 +111,16 @@ def _in_parts(weights: NDArray[Any]) -> NDArray[np.float64]:
     return sums.ravel().astype(np.float64)
 
 
-def content(lamp: Envmap | CubeMap, look: Look) -> Content:
-    """Return an image light's content, cached. Raises SceneError for an unreadable image."""
+def envmap_content(lamp: Envmap, look: Look) -> Content:
+    """Return the content of an envmap, cached. Raises SceneError for an unreadable image."""
+    source = lamp.image, lamp.scale, look.spectral, look.lo, look.hi, lamp.mis_compensation
+    return look.cache(_sphere, *source, by=(version(lamp.image), *source[1:]))
+
+
+def cube_content(lamp: CubeMap, look: Look) -> Content:
+    """Return the content of a cube map, cached. Raises SceneError for an unreadable image."""
     source = lamp.image, lamp.scale, look.spectral
-    by = version(lamp.image), *source[1:]
-    if isinstance(lamp, CubeMap):
-        return look.cache(_cube, *source, by=by)
-    ends = look.lo, look.hi, lamp.mis_compensation
-    return look.cache(_sphere, *source, *ends, by=(*by, *ends))
-
-
-def mean_radiance(image: Content) -> float:
-    """Return the mean over all directions of an image light's radiance."""
-    if len(image.corners) == 1:
-        cell = np.pi / (image.height - 1) * 2.0 * np.pi / image.width
-    else:
-        cell = image.width**-2.0
-    return image.grid.total * cell / (4.0 * np.pi)
+    return look.cache(_cube, *source, by=(version(lamp.image), *source[1:]))
 
 
 def _sphere(
@@ -312,23 +331,3 @@ def _cube_angles(n: int) -> NDArray[np.float64]:
     angles = (1.0 + at[None, :] ** 2 + at[:, None] ** 2) ** -1.5
     angles.flags.writeable = False
     return np.asarray(angles, np.float64)
-
-
-def lower_image(lamp: Envmap | CubeMap, encoder: Encoder) -> dict[str, ArrayLike]:
-    """Put an image light's texels and grid into the tables; return its members.
-
-    A spectral image has the member `bands`. Raises SceneError for an image that cannot be read, or
-    a transform that is no rotation.
-    """
-    axes, image = rotation(lamp), content(lamp, encoder.look)
-    encoder.warnings.update(image.notes)
-    members: dict[str, ArrayLike] = {name: axes[:, i] for i, name in enumerate("xyz")}
-    members |= {
-        "width": image.width,
-        "height": image.height,
-        "texels": encoder.store.append_floats("texels", image.texels),
-        **grid_members(image.corners, image.grid, encoder),
-    }
-    if image.number is not None:
-        members |= {"bands": image.bands, "number": encoder.spectra.row(image.number)}
-    return members

@@ -19,7 +19,8 @@ from clpt.render.lights.check import rotation
 from clpt.render.materials.encoder import Encoder
 from clpt.render.spectra.look import Look
 from clpt.render.textures.texels import bands, texels
-from clpt.scene.lights import Sky
+from clpt.scene.lights import Light, Sky
+from clpt.scene.params import fields_of
 from clpt.scene.roles import EMISSION
 from clpt.sky import dome
 from clpt.sky.dome import (
@@ -53,10 +54,37 @@ class Content(NamedTuple):
     sun_share: float
     strength: float
 
+    def extent(self, share: float) -> float:
+        """Return 0 if the sun's disc gets such a share of the samples, else 1."""
+        return 0.0 if self.sun_share >= share else 1.0
 
-def sun_share(lamp: Sky, look: Look) -> float:
-    """Return the share of a sky's samples at the sun's disc, 0 after sunset."""
-    return content(lamp, look).sun_share
+    def record(self, lamp: Light, encoder: Encoder) -> tuple[str, dict[str, ArrayLike]]:
+        """Append the texels and the grid; return the name and the members of the record.
+
+        Raises SceneError for a transform that is no rotation.
+        """
+        fields = fields_of(lamp)
+        x, y, z = rotation(lamp).T
+        turn, up = np.radians([fields[name] for name in ("sun_azimuth", "sun_elevation")])
+        members: dict[str, ArrayLike] = {
+            "x": np.cos(turn) * x - np.sin(turn) * z,
+            "y": y,
+            "z": np.sin(turn) * x + np.cos(turn) * z,
+            "width": COLUMNS,
+            "height": ROWS,
+            "texels": encoder.store.append_floats("texels", self.texels),
+            "sun_texels": encoder.store.append_floats("texels", self.sun),
+            **grid_members(self.corners, self.grid, encoder),
+            "horizon": horizon(fields["altitude"]),
+            "sun_cos": np.cos(up),
+            "sun_sin": np.sin(up),
+            "sun_radius": np.sin(SUN_RADIUS),
+            "sun_share": self.sun_share,
+        }
+        if self.number is None:
+            return "sky", members
+        members |= {"bands": self.texels.shape[1], "number": encoder.spectra.row(self.number)}
+        return "spectral_sky", members
 
 
 def content(lamp: Sky, look: Look) -> Content:
@@ -118,32 +146,3 @@ def _sun_power(bright: NDArray[Any]) -> float:
     column = np.sqrt(inside[keep]) * (SUN_COLUMNS - 1)
     radiance = bright[np.rint(row).astype(int), np.rint(column).astype(int)]
     return float(radiance.mean() * np.pi * np.sin(SUN_RADIUS) ** 2)
-
-
-def lower_sky(lamp: Sky, encoder: Encoder) -> tuple[str, dict[str, ArrayLike]]:
-    """Put a sky into the tables; return its record's name and its members.
-
-    Raises SceneError for a transform that is no rotation.
-    """
-    axes, sky = rotation(lamp), content(lamp, encoder.look)
-    x, y, z = axes.T
-    turn, up = np.radians(lamp.sun_azimuth), np.radians(lamp.sun_elevation)
-    members: dict[str, ArrayLike] = {
-        "x": np.cos(turn) * x - np.sin(turn) * z,
-        "y": y,
-        "z": np.sin(turn) * x + np.cos(turn) * z,
-        "width": COLUMNS,
-        "height": ROWS,
-        "texels": encoder.store.append_floats("texels", sky.texels),
-        "sun_texels": encoder.store.append_floats("texels", sky.sun),
-        **grid_members(sky.corners, sky.grid, encoder),
-        "horizon": horizon(lamp.altitude),
-        "sun_cos": np.cos(up),
-        "sun_sin": np.sin(up),
-        "sun_radius": np.sin(SUN_RADIUS),
-        "sun_share": sky.sun_share,
-    }
-    if sky.number is None:
-        return "sky", members
-    members |= {"bands": sky.texels.shape[1], "number": encoder.spectra.row(sky.number)}
-    return "spectral_sky", members

@@ -19,7 +19,7 @@ from clpt.render.lights.bounds import Bounds
 from clpt.render.lights.tree_nodes import Cones, Lobes, around, measure, merged, reach
 from clpt.render.records.lights import LINE, NODE, WIDTH
 
-BINS = 12  # along an axis, between which a node may be split
+BINS = 12  # along an axis; a node is split between two bins
 DEEPEST = 31  # levels below the root; half remain, with two bits of a trail each
 
 

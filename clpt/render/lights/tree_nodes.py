@@ -175,7 +175,7 @@ class Lobes:
 
 
 def reach(mean: Floats, cones: Cones) -> Floats:
-    """Return the cosine (n,) of the angle from `mean` (n, 3) up to which there is light.
+    """Return the cosine (n,) of the largest angle between `mean` (n, 3) and a direction with light.
 
     -1 where it is unknown, or more than a right angle.
     """

@@ -53,6 +53,9 @@ class Contents:
     began: str = field(default_factory=_now)
 
 
+Settle = Callable[[BaseException | None], Contents]  # ends a change; see `FilmOwner._change`
+
+
 class Change:
     """A change of a film, as a context manager; see `FilmOwner._change`."""
 
@@ -61,7 +64,7 @@ class Change:
         owner: FilmOwner,
         name: str,
         former: Contents,
-        finish: Callable[[BaseException], Contents] | None,
+        finish: Settle | None,
         heals: bool,
     ):
         self._owner, self._name, self.former = owner, name, former
@@ -76,7 +79,7 @@ class Change:
 
     @contextmanager
     def beginning_unless(self, *refusals: type[BaseException]) -> Iterator[None]:
-        """Begin, but not if one of these errors ends the block: then nothing has changed."""
+        """Begin, unless an error of these types ends the block: then nothing has changed."""
         self.begin()
         try:
             yield
@@ -170,7 +173,7 @@ class FilmOwner:
     def _change(
         self,
         name: str,
-        finish: Callable[[BaseException], Contents] | None = None,
+        finish: Settle | None = None,
         *,
         heals: bool = True,
     ) -> Change:
@@ -182,7 +185,7 @@ class FilmOwner:
         """
         return Change(self, name, self._settled, finish, heals)
 
-    def _healing(self, name: str, finish: Callable[[BaseException], Contents]) -> Change:
+    def _healing(self, name: str, finish: Settle) -> Change:
         """Return a change as `_change` does, also for a broken renderer."""
         now = self._contents
         former = now.former if isinstance(now, Change) else now

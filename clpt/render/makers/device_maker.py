@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 
 from clpt.errors import DeviceError, MemoryBudgetError
 from clpt.render.film.state import FilmState, Ranges
-from clpt.render.makers.contents import Contents
+from clpt.render.makers.contents import Contents, Settle
 from clpt.render.makers.device_film import DeviceFilm
-from clpt.render.makers.maker import Call, Discarded, Held, Maker, Settle
+from clpt.render.makers.maker import Call, Discarded, Held, Maker, Tick
 from clpt.render.wavefront.adaptive import Adaptive
 from clpt.render.wavefront.wavefront import Counts
 
@@ -58,7 +57,7 @@ class DeviceMaker(Maker):
 
         return settle
 
-    def run(self, call: Call, adaptive: Adaptive | None, tick: Callable[[], bool]) -> bool:
+    def run(self, call: Call, adaptive: Adaptive | None, tick: Tick) -> bool:
         """Add samples to the film; return whether all were added. Raises Discarded."""
 
         def on_batch(_: object) -> bool:

@@ -18,7 +18,7 @@ from clpt.errors import SceneError
 from clpt.render.edit.plan import Plan
 from clpt.render.film.state import FilmState, Ranges
 from clpt.render.makers import planning
-from clpt.render.makers.contents import Contents
+from clpt.render.makers.contents import Contents, Settle
 from clpt.render.makers.device_film import DeviceFilm
 from clpt.render.makers.planning import Changes
 from clpt.render.wavefront.adaptive import Adaptive
@@ -27,7 +27,7 @@ from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene
 from clpt.scene.fingerprint import Plain
 
-Settle = Callable[[BaseException | None], Contents]
+Tick = Callable[[], bool]  # returns whether a call goes on
 
 
 class Discarded(Exception):
@@ -119,7 +119,7 @@ class Maker(ABC):
         """
 
     @abstractmethod
-    def run(self, call: Call, adaptive: Adaptive | None, tick: Callable[[], bool]) -> bool:
+    def run(self, call: Call, adaptive: Adaptive | None, tick: Tick) -> bool:
         """Add samples to the film; return whether all were added.
 
         tick: called repeatedly; if it returns False the call ends soon.

@@ -31,7 +31,7 @@ def check_material(material: Material, film: Film) -> None:
 
 
 def _check_held(material: Material) -> None:
-    """Raise SceneError for a composite without one of its materials."""
+    """Raise SceneError for a composite that lacks a material."""
     values = fields_of(material)
     for field in dataclasses.fields(material):
         if field.type == "Material" and values[field.name] is None:

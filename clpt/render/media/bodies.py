@@ -1,6 +1,6 @@
 """Bodies that may overlap: rules, numbers and rows of `media`, see kernels/media/bodies.cl.
 
-A body's matter is its priority, material and interior medium. Bodies of the same matter have one
+A body's matter is its priority, material and interior medium. Bodies of the same matter share a
 number, and join where they overlap.
 """
 

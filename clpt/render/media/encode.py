@@ -1,4 +1,4 @@
-"""Media as words: the word by which a path knows its medium, see kernels/media/medium.cl."""
+"""Media as words: a path stores the word of its medium, see kernels/media/medium.cl."""
 
 from __future__ import annotations
 

@@ -32,15 +32,15 @@ INFINITY = 1e4  # radii of the scene: the distance of a point that stands for in
 CROSSES = "{} comes into another medium while the shutter is open"
 STRADDLES = "{} lies in more than one medium, or does not know its bounds"
 
-Around = tuple[Any, ...]  # media, or the matter of bodies; the first one counts
+Around = tuple[Any, ...]  # media, or the matter of bodies; the first counts
 
 
 class LightMedia(NamedTuple):
     """The media around the lights of a scene.
 
     around: for each lamp and each emitting shape the media around it and its number of rows;
-    refusal: why no path can start at some light, "" if paths can; extinction (n,): for each row
-    the extinction of the scattering medium around the light [1/m], 0 without one, nan where its
+    refusal: why no path can start at some light, "" if paths can; extinction (n,): for each row the
+    extinction of the scattering medium around the light [1/m], 0 without a medium, nan where its
     density is on a grid.
     """
 
@@ -218,7 +218,7 @@ class _Boundaries:
     ) -> Around | None:
         """Return the media or the bodies at a point (3,) [m] that moves by keys.
 
-        times: by default all at which motion is tested. None if the media change with the time.
+        times: by default all times of the test of motion. None if the media change with the time.
         """
         first: Around | None = None
         times = times or self.times

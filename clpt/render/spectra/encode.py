@@ -37,7 +37,7 @@ from clpt.spectra.spectrum import d65, gridded, primaries
 
 STEP = 1.0  # largest distance of nodes of tabulated spectra [nm]
 FEWEST = 100  # cells between nodes, however narrow the film's range is
-ONE = 1e4  # argument at which the sigmoid of a colour is 1 in float32
+ONE = 1e4  # argument of the sigmoid of a colour for a value of 1 in float32
 EVEN = 0.25  # share of the expected light that is equal at all wavelengths
 
 
@@ -237,13 +237,13 @@ class SpectraTable:
 
 
 def reradiation_nodes(low: float, high: float) -> Floats:
-    """Return the wavelengths [nm] between which a film's reradiation matrices are linear."""
+    """Return the wavelengths [nm] of the nodes of a film's reradiation matrices."""
     count = int(np.ceil((high - low) / RERADIATION_STEP - 1e-9)) + 1
     return np.asarray(low + RERADIATION_STEP * np.arange(count), np.float64)
 
 
 def expected_light(lights: Iterable[Spectrum], nodes: Floats) -> Floats:
-    """Return the expected light (n,) at nodes, mean about 1, by which wavelengths are sampled.
+    """Return the expected light (n,) at nodes, mean about 1, for sampling of wavelengths.
 
     All lights count equally, whatever their powers: surfaces may see any of them.
     """

@@ -1,4 +1,4 @@
-"""The density of sampled wavelengths, over the range to which the film responds.
+"""The density of sampled wavelengths, over the range of the film's response.
 
 Visible importance, in closed form, suits smooth lights and the sensor of an eye. For line spectra,
 sensors beyond the visible range and films with bands a density is tabulated from the sensor and the
@@ -31,7 +31,7 @@ from clpt.spectra.spectrum import d65, gridded
 
 STEP = 1.0  # largest distance of the nodes of a table [nm]
 LIGHTS, SENSOR = 0.5, 0.45  # shares of a table; the remaining share is even over the range
-WORTH = 2.2  # factor by which a table, which costs time, must lower the second moment
+WORTH = 2.2  # least ratio of second moments, without and with a table, that is worth its time
 GUIDES = DENSITY_SIZES["guides"]
 
 
@@ -63,7 +63,7 @@ class Density:
         """Return the table for kernels/spectra/wavelengths.cl: n, lo, step, sums, values, guide.
 
         The sums (n + 1) are the cumulative distribution at the nodes. The guide (GUIDES + 1) has
-        the cells in which equal shares begin, at which a search begins.
+        the first cell of each equal share; a search begins there.
         """
         if self.values is None:
             raise ValueError("visible importance has no table")
@@ -106,7 +106,7 @@ def density(index: SceneIndex) -> Density:
 
 
 def _support(film: Film) -> tuple[float, float]:
-    """Return the part of the film's range [nm] to which it responds, between whole steps."""
+    """Return the range [nm] of the film's response, in whole steps."""
     if film.bands:
         return film.lambda_min, film.lambda_max
     nodes = np.append(np.arange(film.lambda_min, film.lambda_max, STEP), film.lambda_max)
@@ -119,7 +119,7 @@ def _support(film: Film) -> tuple[float, float]:
 
 
 def _second_moment(density: Density, nodes: Floats, light: Floats) -> float:
-    """Return the second moment of an estimate of the integral of `light` from one wavelength.
+    """Return the second moment of an estimate of the integral of `light` from a single wavelength.
 
     light: (n,) at nodes (n,) [nm].
     """

@@ -175,7 +175,7 @@ def _guide(sums: Floats) -> Floats:
     """Return the cell's begin and end (..., n, 2) of n even shares of sums (..., n) in [0, 1]."""
     n = sums.shape[-1]
     flat = sums.reshape(-1, n)
-    offsets = 2.0 * np.arange(len(flat))[:, None]  # so that one call interpolates all rows
+    offsets = 2.0 * np.arange(len(flat))[:, None]  # so that a single call interpolates all rows
     shares, nodes = np.linspace(0.0, 1.0, n + 1), np.linspace(0.0, 1.0, n)
     nodes_at = np.interp(
         (shares + offsets).ravel(), (flat + offsets).ravel(), np.tile(nodes, len(flat))

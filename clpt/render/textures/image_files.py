@@ -1,4 +1,4 @@
-"""The versions of the files from which a scene's images were read.
+"""The versions of the image files of a scene.
 
 Such a file may change while a scene is rendered: all samples show the version that was read.
 """

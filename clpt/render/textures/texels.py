@@ -13,7 +13,7 @@ from clpt.images.spectral_exr import SpectralImage
 from clpt.scene.roles import REAL, REFLECTANCE, Role
 from clpt.spectra import Tabulated
 
-FAR = 1000.0  # bands by which the numbering goes on beyond the ends of a spectral image
+FAR = 1000.0  # bands of the numbering beyond each end of a spectral image
 
 
 def texels(image: Floats32, role: Role, spectral: bool) -> Floats32:

@@ -19,17 +19,14 @@ from clpt.geometry import analytic, shape_records, shapes, triangles
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
-from clpt.render.lights import images as image_lights
-from clpt.render.lights import sky as sky_light
 from clpt.render.lights.aims import is_sharp, sharp_pieces
-from clpt.render.lights.find import Sources
+from clpt.render.lights.find import Sources, environment_of
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
 from clpt.render.transport import guides
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Integrator, Path, Vcm, shared
-from clpt.scene.lights import CubeMap, Envmap, Sky
 from clpt.scene.shapes import Shape
 
 SMALL = 0.03  # share of the sphere of directions: a light that fills less is small
@@ -291,10 +288,9 @@ def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, flo
     lamps, share = lit.index.lights, sources.power / max(sources.power.sum(), 1e-300)
     for row, i in enumerate(sources.order):
         lamp = lamps[i]
-        if isinstance(lamp, (Envmap, CubeMap)):
-            small = image_lights.extent(lamp, lit.look, SUN) < SMALL
-        elif isinstance(lamp, Sky):
-            small = sky_light.sun_share(lamp, lit.look) >= SUN
+        environment = environment_of(lamp, lit.look)
+        if environment is not None:
+            small = environment.extent(SUN) < SMALL
         else:
             small = lamp.reach in ("placed", "distant") and lamp.falloff
         bounds, place = lamp.bounds(), None

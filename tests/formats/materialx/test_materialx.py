@@ -15,10 +15,19 @@ import clpt
 from clpt import images
 from clpt.errors import SceneError
 from clpt.formats import materialx
-from clpt.formats.materialx import document, noise
+from clpt.formats.materialx import document, noise, solids
 from clpt.formats.materialx.graph import Domain, Graph, category, width
 from clpt.formats.materialx.nodes import FUNCTIONS
-from clpt.scene.materials import BumpMap, GltfSurface, Mask, NormalMap, Openpbr, TwoSided, parts
+from clpt.scene.materials import (
+    Blend,
+    BumpMap,
+    GltfSurface,
+    Mask,
+    NormalMap,
+    Openpbr,
+    TwoSided,
+    parts,
+)
 from clpt.scene.textures import Bitmap
 from clpt.spectra import Cauchy
 
@@ -194,14 +203,62 @@ def test_a_pattern_becomes_an_image(tmp_path: Path) -> None:
     assert not image[..., 1:].any()
 
 
+def test_noise_in_space(tmp_path: Path) -> None:
+    """Noise of scaled places is ours in a texture's space; heights of it are a bump map."""
+    nodes = '<position name="Q" type="vector3"/><multiply name="V" type="vector3">'
+    nodes += (
+        _input("in1", "vector3", node="Q") + _input("in2", "vector3", "5, 4, 3") + "</multiply>"
+    )
+    nodes += '<fractal3d name="F" type="float">' + _input("position", "vector3", node="V")
+    nodes += _input("octaves", "integer", "2") + _input("diminish", "float", "0.4") + "</fractal3d>"
+    nodes += '<mix name="X" type="color3">' + _input("fg", "color3", "1, 0, 0")
+    nodes += _input("mix", "float", node="F") + "</mix>"
+    nodes += '<heighttonormal name="H" type="vector3">' + _input("in", "float", node="F")
+    nodes += '</heighttonormal><normalmap name="N" type="vector3">'
+    nodes += _input("in", "vector3", node="H") + _input("scale", "float", "0.01") + "</normalmap>"
+    shader = _input("base_color", "color3", node="X") + _input(
+        "geometry_normal", "vector3", node="N"
+    )
+    surface, warnings = _read(tmp_path, shader, nodes)
+    color = _leaf(surface).base_color
+    value = color.amount.amount
+    assert not warnings and (color.second.r, color.second.g) == (1.0, 0.0)
+    assert (value.octaves, value.roughness) == (2, 0.4)
+    assert np.array_equal(value.to_texture, np.diag([5.0, 4.0, 3.0, 1.0]))
+    bump = _leaf(surface, BumpMap)
+    assert bump.scale == 0.01 and bump.height.amount.octaves == 2
+
+
+def test_nodes_of_scattering(tmp_path: Path) -> None:
+    """As Blender writes a mixture of shaders, and as others write a gloss over a matt base."""
+    nodes = '<mix name="X" type="BSDF">' + _input("bg", "BSDF", node="G")
+    nodes += _input("fg", "BSDF", node="L") + _input("mix", "float", "0.25") + "</mix>"
+    nodes += '<dielectric_bsdf name="G" type="BSDF">' + _input("scatter_mode", "string", "RT")
+    nodes += _input("ior", "float", "1.4") + "</dielectric_bsdf>"
+    nodes += '<layer name="L" type="BSDF">' + _input("top", "BSDF", node="R")
+    nodes += _input("base", "BSDF", node="D") + "</layer>"
+    nodes += '<dielectric_bsdf name="R" type="BSDF">' + _input("roughness", "vector2", "0.04, 0.04")
+    nodes += '</dielectric_bsdf><oren_nayar_diffuse_bsdf name="D" type="BSDF">'
+    nodes += _input("color", "color3", "0.1, 0.2, 0.3") + "</oren_nayar_diffuse_bsdf>"
+    surface, warnings = _read(tmp_path, _input("bsdf", "BSDF", node="X"), nodes, kind="surface")
+    blend = surface.material
+    assert not warnings and isinstance(blend, Blend) and blend.weight == 0.25
+    glass, matt = blend.first, _leaf(materialx.Surface(blend.second))
+    assert isinstance(glass, Openpbr) and glass.transmits and glass.specular_ior.value == 1.4
+    assert (matt.base_color.g, matt.specular_weight) == (0.2, 1.0)
+    assert matt.specular_roughness == pytest.approx(0.2)
+    metal = '<conductor_bsdf name="X" type="BSDF"/>'
+    surface, _ = _read(tmp_path, _input("bsdf", "BSDF", node="X"), metal, kind="surface")
+    gold = _leaf(surface).base_color
+    np.testing.assert_allclose([gold.r, gold.g, gold.b], [0.944, 0.776, 0.373], atol=2e-3)
+
+
 def test_nodes_that_are_not_read_are_told_by_name(tmp_path: Path) -> None:
     nodes = '<multiply name="A" type="color3">' + _input("in1", "color3", node="V") + "</multiply>"
-    nodes += '<position name="Q" type="vector3"/><convert name="V" type="color3">'
+    nodes += '<normal name="Q" type="vector3"/><convert name="V" type="color3">'
     nodes += _input("in", "vector3", node="Q") + "</convert>"
     surface, warnings = _read(tmp_path, _input("base_color", "color3", node="A"), nodes)
-    assert (
-        len(warnings) == 1 and "ND_position_vector3" in warnings[0] and "base_color" in warnings[0]
-    )
+    assert len(warnings) == 1 and "ND_normal_vector3" in warnings[0] and "base_color" in warnings[0]
     assert _leaf(surface).base_color.r == 0.8
 
 
@@ -321,7 +378,7 @@ NODES: list[tuple[str, dict[str, Any], Any]] = [
 
 @pytest.mark.parametrize(("kind", "values", "expected"), NODES, ids=[row[0] for row in NODES])
 def test_nodes(kind: str, values: dict[str, Any], expected: Any) -> None:
-    graph = Graph(_Told(), FUNCTIONS, document.inner)
+    graph = Graph(_Told(), FUNCTIONS, document.inner, solids.texture)
     found = graph.output(_Shader(kind, values), "out", Domain(np.zeros((1, 1, 2))))
     np.testing.assert_allclose(found.reshape(-1), np.atleast_1d(expected), atol=1e-6)
 

@@ -7,7 +7,7 @@ import pytest
 
 from clpt.render.lights import encode as lights
 from clpt.render.lights import find as sources
-from clpt.render.lights.power import LEAST, triangle_means
+from clpt.render.lights.find import LEAST, triangle_means
 from clpt.render.materials.encoder import Encoder
 from clpt.render.spectra.look import Look
 from clpt.scene.lights import Area

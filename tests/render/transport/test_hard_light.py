@@ -13,7 +13,7 @@ import pytest
 
 from clpt import transforms as tf
 from clpt.render.flow.scene_to_tables import Lowered, lower
-from clpt.render.lights import images as image_lights
+from clpt.render.lights.find import environment_of
 from clpt.render.transport.hard_light import FEW, MANY, SOME
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
@@ -303,4 +303,4 @@ def test_the_extent_of_an_image() -> None:
     look = lower(scene_of(ROOM)).encoder.look
     for lamp in (Envmap(image=above), CubeMap(image=faces)):
         for share, part in ((0.5, 1 / 3), (0.75, 1 / 2), (1.0, 1.0)):
-            assert image_lights.extent(lamp, look, share) == pytest.approx(part, abs=0.01)
+            assert environment_of(lamp, look).extent(share) == pytest.approx(part, abs=0.01)
