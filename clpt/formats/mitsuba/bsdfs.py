@@ -45,6 +45,7 @@ Parameters = dict[str, Any]
 WITHOUT_DATA = ("Cu2O", "CuO", "HgTe", "Se", "Se-e", "SnTe", "Ta")
 GREY_METAL = 0.3  # what they reflect head-on
 PHONG = ("phong", "as")  # distributions of Mitsuba 0.6, of exponent 2 / alpha^2 - 2
+STAND_IN: Material = materials.Diffuse()  # stands for a material with an error
 MOST_PARTS = 32  # of a `mixturebsdf`
 TINY = 1e-30
 AIR = 1.000277  # the default of `ext_eta`: src/bsdfs/ior.h
@@ -52,8 +53,7 @@ AIR = 1.000277  # the default of `ext_eta`: src/bsdfs/ior.h
 
 def bsdf(element: Element, context: Context) -> Material:
     """Make the material that a <bsdf> describes, once for all references to it."""
-    grey: Material = materials.Diffuse()
-    return context.once(element, lambda _: attempt(lambda: _bsdf(element, context), grey))
+    return context.once(element, lambda _: attempt(lambda: _bsdf(element, context), STAND_IN))
 
 
 def _bsdf(element: Element, context: Context) -> Material:
