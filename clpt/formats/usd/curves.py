@@ -143,6 +143,7 @@ def points(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
     centers = document.array(prim, "points", 3)
     if centers is None or not len(centers):
         return []
+    budget.take(8 * centers.nbytes, "points", document.file)
     widths = _widths(document, prim, np.ones(len(centers), np.int64))[0]
     look = surface(document, material, prim, both=True)
     topology = Topology(np.zeros(0, np.int64), np.arange(len(centers)), len(centers))
@@ -154,7 +155,6 @@ def points(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
             usual if primvar is None else primvar.values[primvar.at_corners(topology)]
         )
     radii = np.maximum(0.5 * widths, 1e-9).astype(np.float32)
-    budget.take(8 * centers.nbytes, "points", document.file)
     return [
         Spheres(
             centers=centers, radii=radii, attributes=attributes, name=prim.GetName(),

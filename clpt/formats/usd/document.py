@@ -12,6 +12,7 @@ from pxr import Usd, UsdGeom
 
 from clpt.arrays import Matrix
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.scene.studio import Up
 
 MOST_TOLD = 4  # prims that a warning names
@@ -85,7 +86,11 @@ class Document:
     def array(self, prim: Usd.Prim, name: str, width: int, kind: type = np.float32) -> Any:
         """Return an attribute's rows, (n, width), or (n,) where width is 0; None for none."""
         value = self.value(prim, name)
-        return None if value is None else rows(value, width, kind)
+        if value is None:
+            return None
+        size = len(value) * max(width, 1) * np.dtype(kind).itemsize
+        budget.check(size, f"{name} of {prim.GetPath()}", self.file)
+        return rows(value, width, kind)
 
     def placement(self, prim: Usd.Prim) -> Matrix:
         """Return a prim's transform to the world, or of a prototype's prim to the prototype."""

@@ -40,6 +40,7 @@ class Content:
     shapes: list[tuple[Usd.Prim, Shape, Matrix]] = field(default_factory=list)
     lights: list[tuple[Usd.Prim, Matrix]] = field(default_factory=list)
     cameras: list[Usd.Prim] = field(default_factory=list)
+    volumes: list[Usd.Prim] = field(default_factory=list)
     copies: list[tuple[Content, Floats]] = field(default_factory=list)
 
     def flat(self) -> Content:
@@ -76,7 +77,9 @@ def content(
     if depth > DEEPEST:
         raise document.error("instances are nested too deeply", root.GetPath())
     prims = walk.shown(document, root, defined=base is None)
-    whole = Content(cameras=prims["cameras"])
+    whole = Content(cameras=prims["cameras"], volumes=prims["volumes"])
+    for prim in prims["volumes"] if base is not None else ():
+        document.warn("volumes of prototypes are left out", prim.GetPath())
 
     def placement(prim: Usd.Prim) -> Matrix:
         matrix = document.placement(prim)
@@ -85,18 +88,16 @@ def content(
     for prim, shapes in _shapes(document, prims["gprims"], inherited):
         whole.shapes += [(prim, shape, placement(prim)) for shape in shapes]
     whole.lights = [(prim, placement(prim)) for prim in prims["lights"]]
-    instances: dict[tuple[str, str], list[Usd.Prim]] = {}
-    bound = _bound(prims["instances"])
-    for prim, material in zip(prims["instances"], bound, strict=True):
+    alike: dict[tuple[str, str], list[tuple[Usd.Prim, UsdShade.Material | None]]] = {}
+    for prim, bound in zip(prims["instances"], _bound(prims["instances"]), strict=True):
+        material = bound or inherited
         key = str(prim.GetPrototype().GetPath()), str(material.GetPath()) if material else ""
-        instances.setdefault(key, []).append(prim)
-        document.memory["bound", key[1]] = material or inherited
-    for key, several in instances.items():
-        material = document.memory["bound", key[1]]
-        prototype = several[0].GetPrototype()
+        alike.setdefault(key, []).append((prim, material))
+    for key, several in alike.items():
+        prototype, material = several[0][0].GetPrototype(), several[0][1]
         make = partial(content, document, prototype, np.eye(4), material, depth + 1)
         inner = document.once(("content", document.code, *key), make)
-        whole.copies.append((inner, np.stack([placement(prim) for prim in several])))
+        whole.copies.append((inner, np.stack([placement(prim) for prim, _ in several])))
     for prim in prims["instancers"]:
         whole.copies += _instancer(document, prim, placement(prim), inherited, depth)
     return whole

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pxr import Usd, UsdShade
+from pxr import Sdf, Usd, UsdShade
 
 from clpt.formats.usd.document import Document
 
@@ -64,6 +64,11 @@ class Node:
             f"{name} is not {len(default)} finite numbers; {default} stands for it", self.path
         )
         return default
+
+    def layer(self, name: str) -> Sdf.Layer:
+        """Return the layer that an input's value stands in; paths are relative to it."""
+        stack = self.shader.GetInput(name).GetAttr().GetPropertyStack(self.document.time)
+        return stack[0].layer
 
     def _attribute(self, name: str) -> Usd.Attribute | None:
         port = self.shader.GetInput(name)

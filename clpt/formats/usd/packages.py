@@ -37,6 +37,8 @@ def file_of(document: Document, asset: Sdf.AssetPath) -> Path:
 
 def packed(document: Document, asset: Sdf.AssetPath) -> bytes:
     """Return the bytes of a file in a package. Raises SceneError."""
+    outer = Path(Ar.SplitPackageRelativePathOuter(asset.resolvedPath)[0])
+    input_files.named("usd", document.file.parent, outer)
     opened = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(asset.resolvedPath))
     if opened is None:
         raise SceneError(f"there is no file {asset.path!r}")

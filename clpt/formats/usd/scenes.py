@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from pxr import Gf, Tf, Usd, UsdUtils, Vt  # noqa: F401  all are loaded at one time
+from pxr import Ar, Gf, Sdf, Tf, Usd, UsdUtils, Vt  # noqa: F401  all are loaded at one time
 
 from clpt.errors import SceneError, nearest
-from clpt.files import input_files
+from clpt.files import budget, input_files
 from clpt.formats import framing
 from clpt.formats.gltf import animation
-from clpt.formats.usd import cameras, gprims, lights, render_settings
+from clpt.formats.usd import cameras, gprims, lights, render_settings, volumes
 from clpt.formats.usd.document import Document
 from clpt.scene import Scene
 from clpt.scene.lights import Constant, Light
@@ -139,15 +141,36 @@ def _opened(path: Path) -> Usd.Stage:
     """Return a file's stage. Raises SceneError."""
     input_files.checked(path)
     try:
-        stage = Usd.Stage.Open(str(path))
+        layers = _layers(path)
+        stage = Usd.Stage.Open(layers[0])
     except Tf.ErrorException as error:
         message = f"is no USD file that can be read{_reason(error, path)}"
         raise SceneError(message, file=path) from None
-    for layer in stage.GetUsedLayers():
-        layer.Reload()  # one that was read before, and has changed since
-        if layer.realPath and layer.realPath != str(path):
-            input_files.checked(input_files.named("usd", path.parent, Path(layer.realPath)))
     return stage
+
+
+def _layers(path: Path) -> list[Sdf.Layer]:
+    """Return the layers of a stage, its root first, read anew.
+
+    A stage would wait for ever for a pipe that a layer names, so all are asked for before. Raises
+    SceneError for what is no regular file, and OpenUSD's own error for a root that is broken.
+    """
+    layers = [Sdf.Layer.FindOrOpen(str(path))]
+    if layers[0] is None:
+        raise SceneError("is no USD file that can be read", file=path)
+    known = {str(path)}
+    for layer in layers:
+        layer.Reload()  # if its file has changed since this process has read it
+        budget.check_time(path)
+        for name in layer.GetCompositionAssetDependencies():
+            inner = layer.ComputeAbsolutePath(name)
+            if inner in known or Ar.IsPackageRelativePath(inner) or not os.path.exists(inner):
+                continue
+            known.add(inner)
+            input_files.checked(input_files.named("usd", path.parent, Path(inner)))
+            with suppress(Tf.ErrorException):  # the stage tells which prim names it
+                layers += filter(None, [Sdf.Layer.FindOrOpen(inner)])
+    return layers
 
 
 def _reason(error: Exception, path: Path) -> str:
@@ -163,6 +186,8 @@ def _scene(document: Document, variables: dict[str, Any]) -> Scene:
         lit = lights.light(document, prim, matrix)
         own_lights += lit.lights
         shapes += lit.shapes
+    for prim in world.volumes:
+        shapes += volumes.volume(document, prim, document.placement(prim))
     settings = render_settings.settings(document)
     chosen = _chosen(document, world.cameras, variables.get("camera", settings.camera))
     if not shapes:

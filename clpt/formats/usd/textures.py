@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf
+from pxr import Sdf, UsdShade
 
 from clpt import images
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.formats.usd import packages
 from clpt.formats.usd.document import Document
 from clpt.formats.usd.nodes import Node
@@ -27,6 +28,7 @@ WRAPS = {
 }  # fmt: skip
 SPACES = ("auto", "sRGB", "raw")
 READER, TRANSFORM, IMAGE = "UsdPrimvarReader_", "UsdTransform2d", "UsdUVTexture"
+UDIM, FIRST_TILE, LAST_TILE = "<UDIM>", 1001, 1100
 DEEPEST = 32  # of transforms, one after the other
 
 
@@ -134,10 +136,17 @@ def bitmap_of(node: Node, uses: Uses, *, channel: str | None, raw: bool = False)
     if space not in SPACES:
         node.document.warn(f"sourceColorSpace {space!r} is read as auto", node.path)
         space = "auto"
-    stored = read(node.document, node.value("file"), node.path)
+    values: dict[str, Any] = {**_wraps(node), **_coordinates(node, uses)}
+    asset = node.value("file")
+    if isinstance(asset, Sdf.AssetPath) and UDIM in asset.path:
+        stored, tiles = _tiled(node, asset)
+        shrink = np.diag([1.0 / tiles[0], 1.0 / tiles[1], 1.0])
+        values |= {"to_uv": shrink @ values.get("to_uv", np.eye(3)), "wrap": "zero"}
+        values.pop("wrap_v", None)
+    else:
+        stored = read(node.document, asset, node.path)
     if stored is None:
         return None
-    values: dict[str, Any] = {**_wraps(node), **_coordinates(node, uses)}
     if channel is not None:
         values["channel"] = channel
     return Bitmap(**_decoded(stored, "raw" if raw else space), **values)
@@ -178,6 +187,39 @@ def read(document: Document, asset: object, path: str) -> images.Stored | None:
             return None
 
     return document.once(("image", key), stored)
+
+
+def _tiled(node: Node, asset: Sdf.AssetPath) -> tuple[images.Stored | None, tuple[int, int]]:
+    """Return the tiles of a UDIM texture as one image, and how many there are along u and v.
+
+    Each is as large as the largest; there is black where a tile is not there.
+    """
+    document, parts = node.document, {}
+    layer = node.layer("file")
+    for path, tile in UsdShade.UdimUtils.ResolveUdimTilePaths(asset.path, layer):
+        number = int(tile) - FIRST_TILE
+        stored = read(document, Sdf.AssetPath(path, path), node.path)
+        if stored is not None and 0 <= number < LAST_TILE - FIRST_TILE + 1:
+            parts[number % 10, number // 10] = stored
+    if not parts:
+        document.warn(f"image {asset.path!r} has no tile; its fallback stands for it", node.path)
+        return None, (1, 1)
+    first = next(iter(parts.values()))
+    sizes = [part.values.shape for part in parts.values()]
+    height, width, depth = (max(sizes_) for sizes_ in zip(*sizes, strict=True))
+    across, up = (max(at[axis] for at in parts) + 1 for axis in (0, 1))
+    kind = first.values.dtype
+    budget.take(kind.itemsize * height * width * depth * across * up, "tiles", document.file)
+    whole = np.zeros((up * height, across * width, depth), kind)
+    for (u, v), part in parts.items():
+        if part.values.dtype != kind or part.encoded != first.encoded:
+            document.warn("a tile of another kind than the first is left out", node.path)
+            continue
+        y, x = (np.arange(n) * part.values.shape[i] // n for i, n in enumerate((height, width)))
+        top = (up - 1 - v) * height
+        tile_values = part.values[y[:, None], x]
+        whole[top : top + height, u * width : (u + 1) * width, : tile_values.shape[2]] = tile_values
+    return dataclasses.replace(first, values=whole), (across, up)
 
 
 def _wraps(node: Node) -> dict[str, str]:

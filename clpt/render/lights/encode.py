@@ -39,6 +39,7 @@ FEW_LIGHTS = 256  # up to this number a single random number chooses a light and
 
 
 
+
 @dataclass(frozen=True)
 class LightRows:
     """The table `lights`, and what features and settings need to know of it.
