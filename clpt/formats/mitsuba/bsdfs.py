@@ -12,12 +12,7 @@ from clpt.formats.colours import EVEN, GREY
 from clpt.formats.mitsuba.coating import KINDS as COATS
 from clpt.formats.mitsuba.coating import SMOOTHEST, Coat
 from clpt.formats.mitsuba.limits import within
-from clpt.formats.mitsuba.principled import (
-    fluorescent,
-    hair,
-    principled,
-    principled_thin,
-)
+from clpt.formats.mitsuba.principled import fluorescent, hair, principled, principled_thin
 from clpt.formats.mitsuba.properties import Context, PluginReader, Properties, numbers, unknown
 from clpt.formats.mitsuba.spectra import (
     coefficient,
@@ -144,10 +139,7 @@ def _old_metal(props: Properties, around: float) -> Parameters:
     else:
         with child.locating():
             eta, k = _named_metal(child, props.context)
-    return {
-        "eta": over(index(props, "eta", eta), around),
-        "k": over(index(props, "k", k), around),
-    }
+    return {"eta": over(index(props, "eta", eta), around), "k": over(index(props, "k", k), around)}
 
 
 def _around(props: Properties) -> float:
