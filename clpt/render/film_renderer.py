@@ -23,12 +23,12 @@ from clpt.render.edit.plan import Plan
 from clpt.render.edit.scene_edit import MaterialKey, ShapeKey
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
-from clpt.render.film.layer_channels import write_picture
-from clpt.render.film.pictures import PictureForm, Pictures
-from clpt.render.film.saved_film import (
+from clpt.render.film.film_file import (
     classes_text,
     other_devices,
 )
+from clpt.render.film.layer_channels import write_picture
+from clpt.render.film.pictures import PictureForm, Pictures
 from clpt.render.film.state import join_ranges
 from clpt.render.makers.contents import (
     Change,

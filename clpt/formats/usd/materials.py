@@ -18,9 +18,8 @@ from clpt.scene import gltf_material
 from clpt.scene.lights import Area
 from clpt.scene.materials import Blend, GltfSurface, Material, ThinDielectric, TwoSided
 from clpt.scene.params import Kind, fields_of
-from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap, MeshAttribute
-from clpt.scene.values import Textured
+from clpt.scene.values import Texture, Textured
 
 PREVIEW = "UsdPreviewSurface"
 GREY = (0.18, 0.18, 0.18)
