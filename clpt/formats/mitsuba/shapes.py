@@ -309,13 +309,8 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
         normals = transforms.transform_normals(to_world, whole.normals).astype(np.float32)
         if transforms.flips_handedness(to_world):
             faces = faces[:, ::-1].copy()  # the file's normals decide the front, not the winding
-    return {
-        "vertices": vertices,
-        "faces": faces,
-        "normals": normals,
-        "uvs": uvs,
-        "attributes": whole.attributes,
-    }
+    arrays = {"vertices": vertices, "faces": faces, "normals": normals, "uvs": uvs}
+    return {**arrays, "attributes": whole.attributes}
 
 
 def _bspline_curve(props: Properties) -> Parameters:
