@@ -307,4 +307,7 @@ def _shape(
         document.warn(note.partition(": ")[2], prim.GetPath())
     if not len(arrays["faces"]):
         return None
+    loop = document.value(prim, "subdivisionScheme") == "loop"
+    if loop and (polygons.topology.counts == 3).all():
+        arrays |= {"normals": None, "subdivision": 2 if document.level is None else document.level}
     return Mesh(name=prim.GetName(), material=look.material, emission=look.emission, **arrays)
