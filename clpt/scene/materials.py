@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
 from clpt.scene import insides, roles
-from clpt.scene.energy import check_reradiation
 from clpt.scene.params import (
     Kind,
     Shorthand,
@@ -33,10 +32,9 @@ from clpt.scene.params import (
     reradiation,
 )
 from clpt.scene.roles import ORDERS, Param
-from clpt.scene.scatterer import Scatterer
-from clpt.scene.texture_values import Texture
+from clpt.scene.scatterer import Scatterer, check_reradiation
 from clpt.scene.textures import Bitmap
-from clpt.scene.values import IndexLike, SpectrumLike, Textured, TexturedNumber
+from clpt.scene.values import IndexLike, SpectrumLike, Texture, Textured, TexturedNumber
 from clpt.spectra import Constant, Reradiation, Spectrum
 from clpt.spectra import metal as named_metal
 

@@ -44,7 +44,7 @@ from clpt.arrays import check_unmasked, in_memory
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.scene import roles
 from clpt.scene.roles import HostForm, Param
-from clpt.scene.shown import shown
+from clpt.spectra import Constant, Spectrum
 
 MOST_PARTS, MOST_NESTED = 1000, 64  # of a material, texture, light or medium
 
@@ -403,3 +403,20 @@ def _checked(value: object, param: Param, where: str) -> Any:
     for held in value.values() if isinstance(value, Mapping) else (value,):
         check_unmasked(held, where)
     return param.role.check(value, param, where)
+
+
+MATRIX = 16  # most numbers that an array shows; a larger array shows its shape
+LONGEST = 60  # characters of a spectrum
+
+
+def shown(value: Any) -> str:
+    """Return a value in short: an even spectrum as its number, a large array as its shape."""
+    if isinstance(value, np.ndarray):
+        few = value.size <= MATRIX
+        return str((value.round(5) + 0).tolist()) if few else f"<{value.dtype} {value.shape}>"
+    if isinstance(value, Constant):
+        return f"{value.value:g}"
+    text = repr(value)
+    if isinstance(value, Spectrum) and len(text) > LONGEST:
+        return f"<{type(value).__name__}>"
+    return text

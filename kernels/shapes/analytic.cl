@@ -99,3 +99,24 @@ inline vec3 spheres_way(Scene scene, ShapeRow shape, integer prim, mask active, 
     real grown = then.radius / now.radius - 1.0f;
     return madd3(sub3(p, now.center), grown, sub3(then.center, now.center));
 }
+
+/* Step hit: intersects the analytic shape of a row, equal in all lanes; shape_case is generated. */
+inline ShapeHit shape_hit(Scene scene, int prim, int row, vec3 o, vec3 d, real tmin, real tmax)
+{
+    return shape_case(scene, prim, scene.shapes + row * SHAPE_ROW_WORDS, o, d, tmin, tmax);
+}
+
+/* Step moving_hit: the same for shapes that move: the ray is transformed to the shape as it was lowered. */
+inline ShapeHit shape_hit(Scene scene, int prim, int row, vec3 o, vec3 d, real tmin, real tmax)
+{
+    global const uint *shape = scene.shapes + row * SHAPE_ROW_WORDS;
+    Motion motion = motion_of_shape(scene, (integer)((int)shape[SHAPE_ROW_NUMBER]));
+    real longer = motion_length_back(motion, d);
+    tmax = min_r(tmax * longer, (real)(FAR));
+    o = motion_point_back(motion, o);
+    d = scale3(motion_back(motion, d), 1.0f / longer);
+    ShapeHit h = shape_case(scene, prim, shape, o, d, tmin * longer, tmax);
+    h.t = sel(h.t < tmax, h.t / longer, (real)(FAR));
+    h.n = normalize3(motion_normal(motion, h.n));
+    return h;
+}

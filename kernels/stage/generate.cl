@@ -21,7 +21,7 @@
 #include "generated/sky.cl"
 #include "generated/path_covers.cl"
 #include "generated/first_ray.cl"
-#include "textures/cone.cl#first"
+#include "generated/first_cone.cl"
 #include "generated/layer_sums.cl"
 #include "transport/path_state.cl"
 #include "generated/scouts_begin.cl"

@@ -43,6 +43,7 @@ ALTERNATIVES = (  # files, of each row of which a program has one at most
     ("integrator/steps/met_weight*.cl",),
     ("spectra/wavelengths.cl#density", "spectra/wavelengths.cl#visible", "spectra/rgb.cl#read"),
     ("spectra/rgb.cl*", "spectra/spectral.cl*"),
+    ("shapes/analytic.cl#*hit",),
     ("shapes/triangle.cl#*_rows",),
     ("tracing/instances.cl#*",),
     ("tracing/shape_rows.cl#*",),

@@ -310,4 +310,10 @@ def _shape(
     loop = document.value(prim, "subdivisionScheme") == "loop"
     if loop and (polygons.topology.counts == 3).all():
         arrays |= {"normals": None, "subdivision": 2 if document.level is None else document.level}
-    return Mesh(name=prim.GetName(), material=look.material, emission=look.emission, **arrays)
+    return Mesh(
+        name=prim.GetName(),
+        material=look.material,
+        emission=look.emission,
+        interior=look.interior,
+        **arrays,
+    )

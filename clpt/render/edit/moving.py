@@ -22,6 +22,7 @@ from clpt.geometry.analytic import keeps_its_kind
 from clpt.records import SHAPE, SHAPE_BITS
 from clpt.render.edit.moving_parts import (
     Boxes,
+    BoxMove,
     CannotMove,
     Location,
     MovingInstances,
@@ -218,7 +219,7 @@ class Moving:
 
         return [move]
 
-    def _plan_single(self, ranges: _Ranges, shape: Shape) -> Callable[[Boxes], None]:
+    def _plan_single(self, ranges: _Ranges, shape: Shape) -> BoxMove:
         """Return the action that gives a sphere, disk or cylinder new parameters and a new box."""
         lowered, first_word = self.target.lowered, int(ranges.row["params"])
         words, box = analytic.row(shape), np.stack(analytic.bounds(shape))
@@ -234,7 +235,7 @@ class Moving:
 
         return act
 
-    def _plan_curves(self, ranges: _Ranges, shape: Curves) -> Callable[[Boxes], None]:
+    def _plan_curves(self, ranges: _Ranges, shape: Curves) -> BoxMove:
         """Return the action that gives curves other pieces, as many as before, and other boxes."""
         owners = self.target.lowered.owners
         lowered = next(owner for row, owner, _, _ in owners if row is ranges.row)

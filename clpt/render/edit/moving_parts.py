@@ -29,6 +29,7 @@ Location = tuple[cl.Buffer, int]  # a buffer, and the offset in it [words]
 Boxes = tuple[NDArray[np.float32], cl.Buffer]  # the boxes of a tree, on the host and the device
 # Indices of instances, their rows and their boxes.
 Transformed = tuple[NDArray[Any], NDArray[Any], NDArray[np.float32]]
+BoxMove = Callable[[Boxes], None]  # enqueues a move, and writes the boxes of a tree
 
 
 class CannotMove(Exception):
@@ -54,7 +55,7 @@ class MovingInstances:
 
     def plan(
         self, moved: Sequence[tuple[int, Shape]], matrices: Sequence[Location | None]
-    ) -> Callable[[Boxes], None]:
+    ) -> BoxMove:
         """Return a function of the boxes of all instances that enqueues a move.
 
         moved: indices of instances, and their new shapes; matrices: their transforms on the device,
@@ -145,9 +146,7 @@ class MovingSpheres:
         self._sources: dict[int, cl.Buffer] = {}
         self._common: dict[int, NDArray[np.uint32]] = {}  # by their first word in `geometry`
 
-    def plan(
-        self, row: NDArray[np.void], shape: Spheres, matrix: transforms.Matrix
-    ) -> Callable[[Boxes], None]:
+    def plan(self, row: NDArray[np.void], shape: Spheres, matrix: transforms.Matrix) -> BoxMove:
         """Return a function of the boxes of all shapes that enqueues a move of spheres.
 
         row: of the shape in `shapes`; shape: the new shape; matrix: its transform to the world.

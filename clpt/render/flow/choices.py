@@ -59,6 +59,9 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/front_motion.cl": lambda f, _: either(f.motion.camera, "cameras/motion.cl#front"),
     "generated/ghosts.cl": lambda f, _: either(f.transport.lit_ghosts, "cameras/ghosts.cl"),
+    "generated/first_cone.cl": lambda f, _: (
+        f"textures/cone.cl#{'unrelated' if f.camera.listed else 'first'}",
+    ),
     "generated/first_ray.cl": lambda f, _: (
         f"cameras/first_ray.cl{'#weighted' * f.camera.weighs}",
     ),

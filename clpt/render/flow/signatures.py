@@ -86,7 +86,7 @@ def scene_text(unused: Container[str] = (), features: Features | None = None) ->
             "} Scene;",
             *rows,
             f"#define SHAPE_ROW_WORDS {SHAPE.words}",
-            f"#define SHAPE_ROW_PRIM {next(m.word for m in SHAPE.members if m.name == 'prim')}",
+            *(f"#define SHAPE_ROW_{m.name.upper()} {m.word}" for m in SHAPE.members),
             f"#define INSTANCE_ROW_WORDS {INSTANCE.words}",
             f"#define LIGHT_ROW_WORDS {LIGHT.words}",
             *args_text("SCENE", SCENE_ARGS),

@@ -29,15 +29,10 @@ def camera_text(features: CameraFeatures, *, moves: bool = False) -> str:
     record = camera_records.RECORDS[kind]
     camera = f"(global const {record.name} *)(scene).camera"
     moving = '#include "cameras/motion.cl"\n' * moves
-    if kind in camera_records.WEIGHTED:
-        surface = camera_records.LENS_SURFACE
+    if features.weighs:
         return (
-            f"{record.uniform_text()}{surface.row_text()}{surface.spread_text()}"
-            f"#define LENS_SURFACE_WORDS {surface.words}\n"
-            f"#define LENS_GHOST_CELLS {camera_records.GHOST_CELLS}\n"
-            + '#include "materials/film_stack.cl"\n'
-            * losses
-            + f'#include "cameras/kinds/{kind}.cl"\n{moving}'
+            f"{record.uniform_text()}{_lens_text(losses) if kind == 'lens' else ''}"
+            f'#include "cameras/kinds/{kind}.cl"\n{moving}'
             "#define camera_weighted_ray(scene, film, lens, lambdas, weight) "
             f"{_moved(f'{kind}_ray(scene, {camera}, film, lens, lambdas, weight)', moves)}\n"
         )
@@ -48,6 +43,17 @@ def camera_text(features: CameraFeatures, *, moves: bool = False) -> str:
     return (
         f'{record.uniform_text()}#include "cameras/kinds/{kind}.cl"\n{moving}'
         f"#define camera_ray(scene, film, lens, lambdas) {_moved(ray, moves)}\n"
+    )
+
+
+def _lens_text(losses: bool) -> str:
+    """Return the rows of a lens's surfaces, and the waves in their films where light is lost."""
+    surface = camera_records.LENS_SURFACE
+    return (
+        f"{surface.row_text()}{surface.spread_text()}"
+        f"#define LENS_SURFACE_WORDS {surface.words}\n"
+        f"#define LENS_GHOST_CELLS {camera_records.GHOST_CELLS}\n"
+        + '#include "materials/film_stack.cl"\n' * losses
     )
 
 

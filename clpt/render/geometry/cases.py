@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from clpt.geometry.shape_records import ANALYTIC, ONE_OF, ROWS, VALUES
-from clpt.records import SHAPE
 from clpt.render.records import Features
 from clpt.render.records.dispatch import Case, Function, active, function
 
@@ -27,65 +26,39 @@ def virtual_files(features: Features) -> dict[str, str]:
 
 
 def hit_text(features: Features) -> str:
-    """Return `shape_hit`, which intersects an analytic shape, the same for all lanes."""
-    if not features.geometry.analytic:
+    """Return `shape_hit` of kernels/shapes/analytic.cl, with `shape_case`, a hit by its kind."""
+    analytic, moves = features.geometry.analytic, features.motion.shapes
+    if not analytic:
         return ""
-    word = {member.name: member.word for member in SHAPE.members}
-    moves = features.motion.shapes
-    answer = "none =" if moves else "return"
-    none = "ShapeHit none = {FAR, {0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}};"
-    to_rest = _at_rest(word["number"], none) if moves else []
-    back = _in_motion() if moves else [none]
-    curves = "curves" in features.geometry.analytic
-    number = f"(integer)((int)shape[{word['number']}])"
+    curves = "curves" in analytic
     piece = f"scene.spheres + (int)gather_i(scene.geometry, params + {_FIRST}) + CURVE_WORDS * prim"
     beside = f"if (kind == {_number('curves')} && curve_beside_one({piece}, o, d)) return none;"
-    cases = [beside] * curves + [
-        f"if (kind == {_number(kind)}) {answer} {ONE_OF.get(kind, kind)}_intersect("
+    number = "(integer)((int)shape[SHAPE_ROW_NUMBER])"
+    cases = [
+        f"if (kind == {_number(kind)}) return {ONE_OF.get(kind, kind)}_intersect("
         f"{_row_text(features, kind, 'params', number)}, o, d, tmin, tmax);"
-        for kind in features.geometry.analytic
+        for kind in analytic
     ]
-    many = len(ONE_OF.keys() & set(features.geometry.analytic))
-    # An intersection with a shape that moves separately needs the shape's row.
-    rows = ("single", "many", "mixed")[2 if many and (moves or _keyed(features)) else many]
-    signature = (
-        "ShapeHit shape_hit(Scene scene, int prim, int row, vec3 o, vec3 d, real tmin, real tmax)"
-    )
     body = [
-        "global const uint *shape = scene.shapes + row * SHAPE_ROW_WORDS;",
-        f"int kind = (int)shape[{word['kind']}];",
-        f"integer params = (int)shape[{word['params']}];",
-        *([none] if curves and not moves else []),
-        *to_rest,
+        "int kind = (int)shape[SHAPE_ROW_KIND];",
+        "integer params = (int)shape[SHAPE_ROW_PARAMS];",
+        "ShapeHit none = {FAR, {0.0f, 0.0f, 1.0f}, {0.0f, 0.0f}};",
+        *([beside] * curves),
         *cases,
-        *back[curves and not moves :],
         "return none;",
     ]
+    many = len(ONE_OF.keys() & set(analytic))
+    # An intersection with a shape that moves separately needs the shape's row.
+    rows = ("single", "many", "mixed")[2 if many and (moves or _keyed(features)) else many]
     files = '#include "generated/motion.cl"\n' * moves
     files += '#include "tracing/curves.cl"\n' * curves
     files += f'#include "tracing/shape_rows.cl#{rows}"\n'
-    return _includes(features) + files + function(signature, *body)
-
-
-def _at_rest(number: int, none: str) -> list[str]:
-    """Return statements that take the ray to the place where a moving shape was lowered."""
-    return [
-        none,
-        f"Motion motion = motion_of_shape(scene, (integer)((int)shape[{number}]));",
-        "real longer = motion_length_back(motion, d);",
-        "o = motion_point_back(motion, o);",
-        "d = scale3(motion_back(motion, d), 1.0f / longer);",
-        "tmin *= longer;",
-        "tmax = min_r(tmax * longer, (real)(FAR));",
-    ]
-
-
-def _in_motion() -> list[str]:
-    """Return statements that take a hit back to the world."""
-    return [
-        "none.t = sel(none.t < tmax, none.t / longer, (real)(FAR));",
-        "none.n = normalize3(motion_normal(motion, none.n));",
-    ]
+    arguments = (
+        "Scene scene, int prim, global const uint *shape, vec3 o, vec3 d, real tmin, real tmax"
+    )
+    case = function(f"ShapeHit shape_case({arguments})", *body)
+    hit = f'#include "shapes/analytic.cl#{"moving_hit" if moves else "hit"}"\n'
+    return _includes(features) + files + case + hit
 
 
 def points_text(features: Features) -> str:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Words, on_host
 from clpt.records import BRICK_SIZES
-from clpt.render.lights.bricks import POINTS, Windows, brick_counts, parts_of, to_lattice
+from clpt.render.lights.bodies import POINTS, Windows, brick_counts, parts_of, to_lattice
 from clpt.render.materials.encoder import Encoder
 from clpt.render.records.tables import TableStore, as_words
 from clpt.scene.media import ON_POINTS, Lattice, Medium

@@ -22,7 +22,6 @@ from clpt.render.textures.programs import program
 from clpt.render.textures.texels import bands
 from clpt.scene.params import params
 from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role, Spectral
-from clpt.scene.texture_values import is_texture, separated
 from clpt.scene.textures import (
     MAPPINGS,
     PATTERNS,
@@ -39,6 +38,7 @@ from clpt.scene.textures import (
     Solid,
     Texture,
 )
+from clpt.scene.values import is_texture, separated
 from clpt.spectra import RGB, luminance
 
 LARGEST = 2**31 - 1  # floats in `texels` that an index reaches

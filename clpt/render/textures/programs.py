@@ -18,7 +18,7 @@ from clpt.render.records.tables import TableStore
 from clpt.render.records.textures import END, OPERANDS, OPERATIONS
 from clpt.render.spectra.encode import SpectraTable
 from clpt.scene.roles import EMISSION, FACTOR, INDEX, REAL, REFLECTANCE, Role, Spectral
-from clpt.scene.texture_values import Operation, Texture, Use, constant_number, is_texture
+from clpt.scene.values import Operation, Texture, Use, constant_number, is_texture
 from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded
 
 Code = list[tuple[int, int]]
