@@ -184,7 +184,7 @@ def _scene(document: Document, variables: dict[str, Any]) -> Scene:
         shapes += lit.shapes
     for prim in world.volumes:
         shapes += volumes.volume(document, prim, document.placement(prim))
-    settings = render_settings.settings(document)
+    settings = render_settings.settings(document, world.settings)
     chosen = _chosen(document, world.cameras, variables.get("camera", settings.camera))
     if not shapes:
         document.warn("holds no shapes", "/")
