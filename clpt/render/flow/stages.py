@@ -53,7 +53,8 @@ def _lens_text(losses: bool) -> str:
         f"{surface.row_text()}{surface.spread_text()}"
         f"#define LENS_SURFACE_WORDS {surface.words}\n"
         f"#define LENS_GHOST_CELLS {camera_records.GHOST_CELLS}\n"
-        + '#include "materials/film_stack.cl"\n' * losses
+        + '#include "materials/film_stack.cl"\n'
+        * losses
     )
 
 
