@@ -463,7 +463,7 @@ class FilmRenderer(FilmOwner, Pictures):
     def close(self) -> None:
         """Give the device's memory back; the renderer is of no use afterwards.
 
-        It waits for a `run` of another thread, not for what was enqueued. An array that the caller
+        It waits for a `run` of another thread, not for enqueued commands. An array that the caller
         still holds, such as `film`, keeps its memory. Dropping a renderer does the same.
         """
         with self._lock:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from clpt.errors import SceneError
 from clpt.formats.materialx import document, scattering, solids
 from clpt.formats.materialx.graph import Graph, Host, Node, category
 from clpt.formats.materialx.nodes import FUNCTIONS
@@ -48,11 +49,15 @@ def surface(node: Node, host: Host, name: str = "", *, walk: bool = True) -> Sur
 
     node: of a document, or what a reader of stages has for a shader. walk: light goes into bodies
     with subsurface scattering; else it is scattered where it enters. What is left out is told to
-    the host once. Raises SceneError where a node asks for the library and it is not installed.
+    the host once.
     """
     kind = category(node.kind)
     if kind in document.TRANSLATED:
-        node, kind = document.Translated(node), "open_pbr_surface"
+        try:
+            document.standard()
+            node, kind = document.Translated(node), "open_pbr_surface"
+        except SceneError as error:
+            host.warn(error.message, node.path)
     if kind not in READERS:
         named = node.kind or "a shader without a kind"
         host.warn(f"{named} is not read; grey stands for it", node.path)

@@ -307,4 +307,10 @@ def _shape(
         document.warn(note.partition(": ")[2], prim.GetPath())
     if not len(arrays["faces"]):
         return None
-    return Mesh(name=prim.GetName(), material=look.material, emission=look.emission, **arrays)
+    return Mesh(
+        name=prim.GetName(),
+        material=look.material,
+        emission=look.emission,
+        interior=look.interior,
+        **arrays,
+    )

@@ -28,7 +28,7 @@ from clpt.scene.materials import (
     TwoSided,
     parts,
 )
-from clpt.scene.textures import Bitmap
+from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.spectra import Cauchy
 
 HEAD = '<?xml version="1.0"?><materialx version="1.39" colorspace="lin_rec709">'
@@ -285,6 +285,13 @@ def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setitem(__import__("sys").modules, "MaterialX", None)
     with pytest.raises(SceneError, match=r"clpt\[materialx\]"):
         materialx.load_materials(path)
+    document.standard.cache_clear()
+    host = _Told()
+    materialx.surface(_Shader("ND_standard_surface_surfaceshader"), host)
+    tint = {"base_color": _Shader("ND_saturate_color3", {"in": (1, 0, 0), "amount": 0})}
+    leaf = _leaf(materialx.surface(_Shader("ND_open_pbr_surface_surfaceshader", {}, tint), host))
+    assert len(host.told) == 3 and all("clpt[materialx]" in told for told in host.told[::2])
+    assert leaf.base_color.r == 0.8
 
 
 @dataclass
@@ -298,6 +305,9 @@ class _Told:
 
     def image(self, asset: Any, path: str) -> images.Stored | None:
         return images.Stored(np.full((2, 2, 3), 0.25, np.float32), encoded=False)
+
+    def attribute(self, name: str, count: int) -> MeshAttribute:
+        return MeshAttribute(name=f"vertex_{name}")
 
     def uv_mapping(self, name: str) -> str:
         return "uv1" if name == "lightmap" else "uv"
