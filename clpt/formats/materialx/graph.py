@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from clpt import images
 from clpt.arrays import Floats
-from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap
+from clpt.scene.values import Texture
 
 LEAST, MOST = 256, 2048  # pixels along a side of a baked image
 PATTERN = 1024  # of a baked pattern without images

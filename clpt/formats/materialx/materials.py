@@ -13,8 +13,8 @@ from clpt.formats import framing
 from clpt.formats.materialx import document
 from clpt.formats.materialx.surfaces import Surface, surface
 from clpt.scene import Scene, shapes
-from clpt.scene.texture_values import Texture
 from clpt.scene.textures import MeshAttribute
+from clpt.scene.values import Texture
 
 
 @dataclass

@@ -34,7 +34,7 @@ from clpt.scene import Scene
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Curves, Shape, Spheres
 
-_ROOT = "stage/place_vertices.cl"
+_ROOT = "stage/place.cl#vertices"
 _NORMALS = SHAPE_BITS["normals"]
 _MOVABLE = {"to_world", "vertices", "normals", "centers"}  # fields that may change
 REBUILD_EVERY = 16  # moves of analytic shapes, which move independently

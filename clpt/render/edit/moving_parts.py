@@ -23,7 +23,7 @@ from clpt.render.records.device_arrays import as_array
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene.shapes import Shape, Spheres
 
-_ROOT, _SPHERES = "stage/place_vertices.cl", "stage/place_spheres.cl"
+_ROOT, _SPHERES = "stage/place.cl#vertices", "stage/place.cl#spheres"
 
 Location = tuple[cl.Buffer, int]  # a buffer, and the offset in it [words]
 Boxes = tuple[NDArray[np.float32], cl.Buffer]  # the boxes of a tree, on the host and the device

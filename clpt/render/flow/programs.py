@@ -30,15 +30,15 @@ from clpt.render.records import Features, custom_materials
 from clpt.render.textures import cases as textures
 from clpt.scene.scatterer import Scatterer
 
-BOTH = tuple(f"integrator/{name}.cl" for name in ("path", "particle_tracer", "both"))
+BOTH = ("integrator/particle_tracer.cl", "integrator/path.cl#both")
 
 Files = dict[str, str | device.Part | tuple[str, ...]]
 
 # Replacements of kernel files for work-items that shade a single path.
 _ALONE: device.Virtual = {
     **bvh.ALONE,
-    "core/spectrum_at_once.cl": ("core/spectrum_in_turn.cl",),
-    "core/texels_between.cl": ("core/texels_in_turn.cl",),
+    "core/spectrum.cl#at_once": ("core/spectrum.cl#in_turn",),
+    "core/grid.cl#texels_at_once": ("core/grid.cl#texels_in_turn",),
     "materials/film_stack.cl#at_once": ("materials/film_stack.cl#in_turn",),
 }
 # The fewest registers of a work-item of a GPU, by program, as limits that are tried by

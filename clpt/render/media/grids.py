@@ -31,7 +31,7 @@ GLOW_WORDS = 6  # behind the row of a grid, see kernels/media/medium_grid_light.
 
 @dataclass(frozen=True, eq=False)
 class CloudDensity:
-    """The density of a cloud at points; numbers: see kernels/stage/cloud_density.cl, float32."""
+    """The density of a cloud at points; numbers: see kernels/stage/density.cl, float32."""
 
     shape: tuple[int, ...]
     numbers: NDArray[np.float32]
