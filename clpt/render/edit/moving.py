@@ -223,7 +223,7 @@ class Moving:
         shape: Shape,
         matrix: transforms.Matrix,
         common: NDArray[np.uint32],
-        source: Any,
+        source: object,
     ) -> None:
         """Enqueue a move of spheres, see `MovingSpheres.plan`."""
         ranges.shape = shape

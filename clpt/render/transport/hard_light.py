@@ -140,12 +140,10 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
         return without, "the longest path is too short for a caustic"
     if (in_fog := _in_fog(lit)) is not None:
         return in_fog
-    clear = _by_material(shape for shape in index.shapes if not _hides(shape))
-    sharp = next((shape for shape in clear if is_sharp(shape.material)), None)
+    sharp = _first_sharp(index.shapes)
     if sharp is None:
         return without, "nothing is specular"
-    dark = _by_material(shape for shape in index.shapes if shape.emission is None)
-    if not any(_is_diffuse(shape.material) for shape in dark):
+    if not _has_diffuse(index.shapes):
         return without, "there is nothing dull for a caustic to be seen on"
     small = list(_small_lights(lit))
     if not small:
@@ -264,6 +262,18 @@ def _by_material(all_: Iterable[Shape]) -> Iterable[Shape]:
     for shape in all_:
         first.setdefault(id(shape.material), shape)
     return first.values()
+
+
+def _first_sharp(all_: Iterable[Shape]) -> Shape | None:
+    """Return the first shape that is specular and makes caustics."""
+    clear = _by_material(shape for shape in all_ if not _hides(shape))
+    return next((shape for shape in clear if is_sharp(shape.material)), None)
+
+
+def _has_diffuse(all_: Iterable[Shape]) -> bool:
+    """Return whether a diffuse surface that emits no light can show caustics."""
+    dark = _by_material(shape for shape in all_ if shape.emission is None)
+    return any(_is_diffuse(shape.material) for shape in dark)
 
 
 def _is_diffuse(material: mt.Material) -> bool:
