@@ -26,8 +26,9 @@ def _middle(inside: Homogeneous | None) -> tuple[np.ndarray, np.ndarray]:
         lights=[lights.Constant(radiance=1.0)],
         film=Film(width=16, height=16, mode="rgb"),
         integrator=integrators.Path(max_depth=2000),
+        seed=3,
     )
-    pixels = np.asarray(clpt.render(scene, spp=64, seed=3))[..., :3].reshape(-1, 3)
+    pixels = np.asarray(clpt.render(scene, spp=64))[..., :3].reshape(-1, 3)
     return pixels.mean(axis=0), pixels.std(axis=0) / np.sqrt(len(pixels))
 
 
