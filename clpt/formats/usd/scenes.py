@@ -60,11 +60,7 @@ def load(path: Path, /, **variables: Any) -> Scene:
 
 
 def _number(
-    path: Path,
-    variables: dict[str, Any],
-    name: str,
-    low: float = -1e9,
-    high: float = 1e9,
+    path: Path, variables: dict[str, Any], name: str, low: float = -1e9, high: float = 1e9
 ) -> float:
     """Return a variable that is a number within its limits. Raises SceneError for another."""
     try:
