@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from clpt.images.spectral_exr import SpectralImage
     from clpt.images.spectral_exr import read as read_spectral
     from clpt.images.spectral_exr import write as write_spectral
+    from clpt.instruments import Measurement, measure
     from clpt.rays import Accel, AllHits, Hits, InstancedAccel
     from clpt.render.film.denoised_picture import DenoisedPicture
     from clpt.render.film.layer_channels import write_layers
@@ -72,6 +73,8 @@ _HOMES = {  # the module of each name, and what it is called there
     "read_image": ("images", "read"),
     "write_image": ("images", "write"),
     "render": ("render.one_call", "render"),
+    "measure": ("instruments", "measure"),
+    "Measurement": ("instruments", "Measurement"),
     "Accel": ("rays", "Accel"),
     "AllHits": ("rays", "AllHits"),
     "Hits": ("rays", "Hits"),
@@ -165,6 +168,7 @@ __all__ = [
     "Hits",
     "InstancedAccel",
     "KernelBuildError",
+    "Measurement",
     "MemoryBudgetError",
     "MultiRenderer",
     "Progress",
@@ -181,6 +185,7 @@ __all__ = [
     "kernel_source",
     "load",
     "load_dict",
+    "measure",
     "read_image",
     "read_spectral",
     "render",

@@ -19,6 +19,10 @@ LAYERS = (
     "shape_id", "primitive_id", "material_id", "denoising_albedo", "denoising_normal", "direct",
     "indirect", "light_groups", "crypto_object", "crypto_material", "samples", "variance",
 )  # fmt: skip
+QUANTITIES = (
+    "irradiance", "spectral_irradiance", "scalar_irradiance", "illuminance", "scalar_illuminance",
+    "photon_flux_density", "radiance", "spectral_radiance", "luminance",
+)  # of light, to be measured
 OBSERVERS = ("cie1931", "cie1964")
 SPACES = ("rec709", "rec2020", "display_p3", "aces2065_1", "acescg", "xyz")
 LAYOUTS = ("brute", "binary", "wide8", "compact")  # of triangles, for rays

@@ -43,10 +43,12 @@ MAY_IMPORT = {
     "formats": BASE | {"lenses", "geometry", "scene"},
     "mie": BASE | {"scene"},
     "testing": BASE | {"scene", "device", "render"},
+    "instruments": RENDERS,
     "view": RENDERS,
     "cluster": RENDERS,
     "bench": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},
-    "cli": RENDERS | {"lenses", "geometry", "mie", "bvh", "view", "cluster", "bench"},
+    "cli": RENDERS
+    | {"lenses", "geometry", "mie", "bvh", "view", "cluster", "bench", "instruments"},
     "__main__": {"cli"},
 }
 OPENCL = {"device", "bvh", "denoise", "rays", "render"}  # only these import pyopencl

@@ -24,6 +24,7 @@ COMMANDS = {  # with the first words of their help: the list of commands imports
     "devices": "List the OpenCL devices, and the choice among them.",
     "scenes": "List the scenes that come with clpt: path, size in pixels, what each shows.",
     "info": "Show what the file or folder SCENE holds, without rendering it.",
+    "measure": "Measure light in SCENE at points or along rays, with standard errors.",
     "inspect": "Show what the image or film FILE holds, and the values of its pixels.",
     "convert": "Write the image or film SOURCE as TARGET, in another format or for a screen.",
     "compare": "Measure how the image or film A differs from B.",

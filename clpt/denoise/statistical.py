@@ -1,7 +1,7 @@
 """A denoiser without anything learned: averages over pixels that see the same light, by statistics.
 
 It runs on any OpenCL device. Two halves of a picture's samples tell the noise of each pixel; which
-pixels are alike, and how that decides, is in kernels/film/likeness.cl. It averages twice: the
+pixels are alike, and how that decides, is in kernels/stage/denoise.cl. It averages twice: the
 averages of the first time, which have less noise, decide the second time. The halves then tell the
 error of both averages, and the picture is what has the least of the averages and the noisy one: so
 it is not worse than that where errors can be told.

@@ -15,10 +15,10 @@ from clpt.choices import Missing
 from clpt.errors import LONGEST_WARNING, SceneError, nearest, one_line
 from clpt.files import budget as budgets
 from clpt.files.budget import Budget
-from clpt.formats import own_scenes, reading
-from clpt.formats.reading import Progress
+from clpt.formats import own_scenes
 
 if TYPE_CHECKING:  # a name of a file is looked up without the kinds of scenes
+    from clpt.formats.reading import Progress
     from clpt.scene import Scene
     from clpt.scene.materials import Material
 
@@ -145,7 +145,9 @@ def errors_of(path: str | Path, /, **variables: Any) -> list[SceneError]:
     path: a scene of any format; of Mitsuba's and PBRT's, each material, texture, shape, light and
     parameter can add an error. variables: see `load`.
     """
-    with reading.collecting() as errors:
+    from clpt.formats.reading import collecting  # which imports numpy
+
+    with collecting() as errors:
         try:
             load(path, **variables)
         except SceneError as error:

@@ -136,7 +136,7 @@ def false_colours(share: NDArray[Any]) -> Bytes:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Codes of colours over a cube, for kernels/film/table.cl.
+    """Codes of colours over a cube, for kernels/film/tone.cl.
 
     values: (n, n, n, 4) float32, by blue, green and red, the last is 0; bounds: asinh(v / NEAR) at
     the ends of an axis, NEAR, and 0.

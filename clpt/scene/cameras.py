@@ -115,6 +115,13 @@ class Camera(Kind):
         """
         raise NotImplementedError
 
+    def record_tables(self) -> dict[str, NDArray[np.float32]]:
+        """Return tables (n, words) float32 behind its record, by the member that finds each.
+
+        Raises SceneError for values that cannot be used.
+        """
+        return {}
+
     def checked_members(self, width: int, height: int) -> dict[str, Any]:
         """Return `record_members`; raise SceneError for a value beyond float32."""
         members = self.record_members(width, height)
@@ -499,5 +506,64 @@ class Matrix(Camera):
         return near[:3] / near[3]
 
 
-KINDS = (Perspective, ThinLens, Lens, Orthographic, Spherical, Matrix)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rays(Camera):
+    """A list of rays: pixel i of the film, row by row, is the radiance along ray i mod n.
+
+    A film of several times n pixels measures each ray as often, independently. Only a `box` filter
+    keeps pixels apart; with a radius of 0.25 even the last bit of a position on the film does.
+    `to_world` and `motion` move all rays. The camera's medium is that around their mean origin.
+    """
+
+    shorthands = ()
+
+    origins: ArrayLike = host(((0.0, 0.0, 0.0),), "(n, 3), where rays begin", "m", form="rows3")
+    directions: ArrayLike = host(((0.0, 0.0, 1.0),), "(n, 3), or a row for all", form="rows3")
+    weights: ArrayLike = host(1.0, "(n,) factors, or one for all", form="number_or_list")
+
+    def _rows(self, name: str, values: ArrayLike) -> NDArray[np.float64]:
+        """Return rows (n, 3) of finite numbers. Raises SceneError."""
+        where = f"rays.{name}"
+        try:
+            rows = np.asarray(values, np.float64)
+        except (TypeError, ValueError):
+            rows = np.zeros(0)
+        if rows.ndim < 2 or rows.shape[-1] != 3 or rows.size == 0:
+            raise SceneError("must be rows of x, y and z, (n, 3)", where=where)
+        rows = rows.reshape(-1, 3)
+        bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+        if bad.size:
+            raise SceneError(f"row {bad[0]} is not finite: {rows[bad[0]]}", where=where)
+        return rows
+
+    def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
+        """Return the film's size and the count of rays."""
+        return {"columns": width, "rows": height, "count": len(self._rows("origins", self.origins))}
+
+    def record_tables(self) -> dict[str, NDArray[np.float32]]:
+        """Return rows of origin, unit direction and weight in the world. Raises SceneError."""
+        matrix, origins = self.affine_matrix(), self._rows("origins", self.origins)
+        directions = self._rows("directions", self.directions)
+        if len(directions) not in (1, len(origins)):
+            message = f"{len(directions)} rows for {len(origins)} origins"
+            raise SceneError(message, where="rays.directions")
+        directions = directions @ matrix[:3, :3].T
+        lengths = np.linalg.norm(directions, axis=1, keepdims=True)
+        if not lengths.all():
+            raise SceneError(f"row {np.argmin(lengths)} is 0, 0, 0", where="rays.directions")
+        weights = np.asarray(self.weights, np.float64).reshape(-1, 1)
+        if len(weights) not in (1, len(origins)) or not np.isfinite(weights).all():
+            message = f"must be a finite number, or one for each of {len(origins)} rays"
+            raise SceneError(message, where="rays.weights")
+        parts = transforms.transform_points(matrix, origins), directions / lengths, weights
+        rows = [np.broadcast_to(part, (len(origins), part.shape[1])) for part in parts]
+        return {"list": np.hstack(rows).astype(np.float32)}
+
+    def view_point(self, width: int, height: int) -> NDArray[np.float64]:
+        """Return the mean origin (3,) [m]."""
+        mean = self._rows("origins", self.origins).mean(axis=0)
+        return np.asarray(transforms.transform_points(self.affine_matrix(), mean), np.float64)
+
+
+KINDS = (Perspective, ThinLens, Lens, Orthographic, Spherical, Matrix, Rays)
 CONNECTED = tuple(camera.kind for camera in KINDS if camera.connects)

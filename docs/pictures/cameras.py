@@ -45,6 +45,20 @@ def cabinet() -> cameras.Matrix:
     return cameras.Matrix(view=view, projection=box @ np.linalg.inv(away) @ shear @ away)
 
 
+def disc() -> cameras.Rays:
+    """Rays whose directions turn with the distance from the middle, as of a fisheye lens."""
+    y, x = np.mgrid[0:180, 0:180] / 90.0 - 1.0 + 1.0 / 180.0
+    angle, radius = np.arctan2(y, x), np.hypot(x, y)
+    theta = np.minimum(radius, 1.0) * np.radians(80.0)
+    rows = [-np.sin(theta) * np.cos(angle), -np.sin(theta) * np.sin(angle), np.cos(theta)]
+    return cameras.Rays(
+        origins=np.zeros((180 * 180, 3)),
+        directions=np.stack(rows, axis=-1).reshape(-1, 3),
+        weights=(radius < 1.0).astype(float).reshape(-1),
+        to_world=look_at([0.5, 1.3, 2.2], [-0.1, 0.7, 0.0], UP),
+    )
+
+
 CAMERAS = {
     "perspective": seen("What is far is small.", cameras.Perspective(to_world=EYE, fov=50)),
     "thin_lens": seen(
@@ -73,4 +87,7 @@ CAMERAS = {
         size=(264, 132),
     ),
     "matrix": seen("A cabinet projection, which no other camera has.", cabinet()),
+    "rays": seen(
+        "A fisheye of 160 degrees, ray by ray: a list makes any camera.", disc(), (180, 180)
+    ),
 }

@@ -23,7 +23,7 @@
  * has a step `connect`, see film/connect.cl.
  *
  * film: position on the film, x and y in [0, 1], y down; lens: a point of the unit square;
- * index: of the glass at the hero's wavelength, for which alone the ray then holds.
+ * index: of the glass at the hero's wavelength; the ray then holds for this wavelength alone.
  * The struct is a uniform Record in clpt/render/records/camera.py.
  */
 typedef struct {

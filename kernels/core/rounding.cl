@@ -1,4 +1,4 @@
-/* The error of surface points in float32, and so the distance from the surface at which rays begin and end.
+/* The error of surface points in float32, and so the distance between a surface and the ends of its rays.
  *
  * The rounding error of a surface point is proportional to its coordinates; the error of a hit distance is
  * proportional to the primitive's size. Measured over random triangles, near and far from the origin and thin: with

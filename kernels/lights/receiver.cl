@@ -5,7 +5,7 @@
  * al. 2019, "Adaptive BRDF-Oriented Multiple Importance Sampling of Many Lights", and Tokuyoshi et al. 2024,
  * "Hierarchical Light Sampling with Accurate Spherical Gaussian Lighting", use other lobes. The half vector keeps the
  * shape of the lobe at grazing angles, and costs a single division. */
-#include "core/octahedral.cl"
+#include "core/warp.cl"
 
 #define RECEIVER_SPREAD 0.1f /* share of a node's squared sine that is added to the squared roughness */
 #define RECEIVER_MOST 0.95f  /* of the share, as it is an estimate: other light must be sampled, too */

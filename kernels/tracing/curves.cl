@@ -55,7 +55,7 @@ inline ShapeHit curve_others(Scene scene, integer prim, mask active, vec3 o, vec
 /* Step interleaved: a work-item's rays in scenes with curves, triangles and few other shapes. Rays step in turn from
  * node to node of the tree over pieces, with prefetches, until each reaches a piece that it does not pass beside, or
  * ends. Then these pieces are tested in lanes. Triangles are traced before, ray by ray. Hits equal the hits of
- * tracing/trace.cl's step `one` to the bit. */
+ * tracing/trace.cl's step `single` to the bit. */
 #include "tracing/trace.cl"
 #include "generated/layout.cl"
 #include "generated/trace_args.cl"

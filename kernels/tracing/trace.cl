@@ -50,7 +50,7 @@ inline mask trace_occluded(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, mask
     return met;
 }
 
-/* Step one: a ray a work-item: triangles through LAYOUT(verb), analytic shapes through bvh/shapes.cl. */
+/* Step single: a ray a work-item: triangles through LAYOUT(verb), analytic shapes through bvh/shapes.cl. */
 #include "generated/layout.cl"
 #include "generated/trace_args.cl"
 #include "generated/shape_tree.cl"

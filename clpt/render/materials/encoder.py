@@ -29,7 +29,7 @@ from clpt.scene.params import (
     place_of,
 )
 from clpt.scene.roles import Param, Role, Spectral
-from clpt.scene.texture_values import is_texture
+from clpt.scene.values import is_texture
 from clpt.spectra import RGB, Constant, Sensor, Tabulated
 
 BLACK = (Constant(0.0), RGB(0.0, 0.0, 0.0))

@@ -21,7 +21,7 @@ _PINHOLE = {
     "far": _FAR,
 }
 
-WEIGHTED = ("lens",)  # cameras whose rays have weights
+WEIGHTED = ("lens", "rays")  # cameras whose rays have weights
 GHOST_CELLS = 1024  # of equal probability; a cell gives a pair of reflecting surfaces
 
 RECORDS: dict[str, Record] = {
@@ -74,6 +74,14 @@ RECORDS: dict[str, Record] = {
         near_x=("spectrum", "what it gains per x"),
         near_y=("spectrum", "and per y"),
     ),
+    "rays": Record(
+        "RaysCamera",
+        "A list of rays, which follows.",
+        columns=("integer", "of the film"),
+        rows=("integer", "of the film"),
+        count=("integer", "of rays"),
+        list=("integer", "the list's first word, from columns on"),
+    ),
 }
 
 LENS_SURFACE = Record(
@@ -108,3 +116,8 @@ class CameraFeatures:
     def weighs(self) -> bool:
         """Whether its rays have weights."""
         return self.kind in WEIGHTED
+
+    @property
+    def listed(self) -> bool:
+        """Whether its pixels are entries of a list, and so no neighbours."""
+        return self.kind == "rays"

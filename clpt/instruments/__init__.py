@@ -1,0 +1,6 @@
+"""Instruments: light as numbers with units and standard errors, at points and along rays."""
+
+from clpt.instruments.measuring import Measurement, measure, photometer
+from clpt.instruments.quantities import QUANTITIES
+
+__all__ = ["QUANTITIES", "Measurement", "measure", "photometer"]

@@ -1,0 +1,238 @@
+"""Light at points and along rays of a scene, with its standard error.
+
+A point becomes a receiver: a white, matt, one-sided triangle of a tenth of a millimetre, just above
+the point; or a white ball, where all directions count alike. A white surface of irradiance E has
+the radiance E / pi, so a ray onto it measures E by every integrator. Each entry has REPLICAS
+pixels, which are independent: their mean is the value, and their scatter its standard error.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clpt import device as dev
+from clpt.arrays import Floats, Image
+from clpt.errors import SceneError, UnknownKindError
+from clpt.instruments.quantities import QUANTITIES, Quantity
+from clpt.render.options import check_scene
+from clpt.render.renderer import Renderer
+from clpt.scene import Scene, shapes
+from clpt.scene.cameras import Rays
+from clpt.scene.integrators import Box, Film
+from clpt.scene.materials import Diffuse
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from clpt.render.options import RenderOptions
+
+REPLICAS = 16  # pixels of an entry, whose scatter is its standard error
+LONGEST_ROW = 4096  # pixels of the film
+LIFT = 1e-4  # [m] of a receiver above its point, and its radius
+FIRST_SAMPLES = 16  # of a pixel, before its error is looked at
+AXES = np.concatenate([np.eye(3), -np.eye(3)])  # the sides of a cube
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Values of a quantity of light, and their standard errors.
+
+    values, errors: (...) as the points or directions are, float64; spectral quantities have an axis
+    of bands behind. unit: of both. wavelengths: middles of the bands (bands,) [nm], or None.
+    samples: paths of each entry.
+    """
+
+    quantity: str
+    unit: str
+    values: Floats
+    errors: Floats
+    samples: int
+    wavelengths: Floats | None = None
+
+    @property
+    def relative_error(self) -> float:
+        """The largest standard error of entries with light, over the value."""
+        lit = self.values > 0.0
+        return float((self.errors[lit] / self.values[lit]).max()) if lit.any() else 0.0
+
+
+def measure(
+    scene: Scene,
+    quantity: str,
+    at: ArrayLike,
+    directions: ArrayLike = (0.0, 1.0, 0.0),
+    *,
+    samples: int = 4096,
+    error: float | None = None,
+    bands: int = 47,
+    device: dev.Device | str | int | None = None,
+    **options: Unpack[RenderOptions],
+) -> Measurement:
+    """Measure light in a scene.
+
+    quantity: a name in `QUANTITIES`. at: points (..., 3) [m]. directions: the points' normals, or
+    those in which rays go from them; (..., 3), or one for all. samples: paths of each entry, at
+    most. error: stop when each standard error is at most this share of its value. bands: of
+    spectral quantities. device, options: see `clpt.Renderer`. The scene's camera is not used; its
+    film has the range of wavelengths.
+
+    Raises UnknownKindError for a quantity, SceneError for points that cannot be used, and as
+    `clpt.Renderer` does.
+    """
+    check_scene(scene)
+    if quantity not in QUANTITIES:
+        raise UnknownKindError("quantity", quantity, QUANTITIES)
+    if error is not None and not error > 0.0:
+        raise SceneError(f"must be above 0, not {error!r}", where="error")
+    points = _rows(at, "at")
+    toward = np.broadcast_to(_rows(directions, "directions"), points.shape)
+    rows = points.reshape(-1, 3), toward.reshape(-1, 3)
+    instrument = photometer(scene, QUANTITIES[quantity], *rows, bands=bands)
+    with Renderer(instrument, device, **options) as renderer:
+        return _read(renderer, quantity, points.shape[:-1], samples, error)
+
+
+def _read(
+    renderer: Renderer, quantity: str, shape: tuple[int, ...], samples: int, error: float | None
+) -> Measurement:
+    """Add samples until the errors are small enough, and return what an instrument measures."""
+    count = math.prod(shape)
+    turns = len(AXES) if QUANTITIES[quantity].everywhere else 1
+    most = max(1, math.ceil(samples / (REPLICAS * turns)))
+    step = most if error is None else min(most, FIRST_SAMPLES)
+    while True:
+        renderer.run(step)
+        pixels = _pixels(renderer.image(), turns, count)
+        measured = _measured(quantity, pixels, renderer.scene.film, shape)
+        measured = dataclasses.replace(measured, samples=renderer.samples * REPLICAS * turns)
+        step = min(renderer.samples, most - renderer.samples)
+        if step <= 0 or (error is not None and measured.relative_error <= error):
+            return measured
+
+
+def _pixels(image: Image, turns: int, count: int) -> Floats:
+    """Return pixels (REPLICAS, turns, count, channels) of an instrument's film."""
+    pixels = image.astype(np.float64).reshape(-1, image.shape[-1])
+    return pixels[: REPLICAS * turns * count].reshape(REPLICAS, turns, count, -1)
+
+
+def _measured(quantity: str, pixels: Floats, film: Film, shape: tuple[int, ...]) -> Measurement:
+    """Return what the pixels (REPLICAS, turns, count, channels) of a film measure."""
+    kind = QUANTITIES[quantity]
+    replicas = kind.value(pixels.sum(axis=1) / (1.5 if kind.everywhere else 1.0), film)
+    shape = (*shape, *replicas.shape[2:])
+    return Measurement(
+        quantity,
+        kind.unit,
+        replicas.mean(axis=0).reshape(shape),
+        (replicas.std(axis=0, ddof=1) / math.sqrt(REPLICAS)).reshape(shape),
+        samples=0,
+        wavelengths=film.band_centres if kind.spectral else None,
+    )
+
+
+def photometer(
+    scene: Scene,
+    quantity: Quantity,
+    points: Floats,
+    directions: Floats,
+    *,
+    bands: int = 47,
+    lift: float = LIFT,
+) -> Scene:
+    """Return the scene with a camera that measures: `measure` renders it, and so can others.
+
+    points (n, 3) [m]; directions (n, 3); bands: see `measure`; lift: of receivers above their
+    points [m]: walls must be farther away. Pixel i, row by row, is of
+    entry i modulo n; of a quantity without a normal, of orientation i // n modulo 6 of it.
+
+    Raises SceneError for directions of length 0.
+    """
+    lengths = np.linalg.norm(directions, axis=1, keepdims=True)
+    if not lengths.all():
+        raise SceneError(f"row {np.argmin(lengths)} is 0, 0, 0", where="directions")
+    directions = directions / lengths
+    added: list[shapes.Shape] = []
+    if quantity.at == "rays":
+        camera = Rays(origins=points, directions=directions)
+    else:
+        camera, receivers = (
+            _balls(points, lift, scene.seed)
+            if quantity.everywhere
+            else _discs(points, directions, lift)
+        )
+        added = [receivers]
+    count = REPLICAS * len(points) * (len(AXES) if quantity.everywhere else 1)
+    width = min(np.shape(camera.origins)[0], LONGEST_ROW)
+    height = math.ceil(count / width)
+    film = dataclasses.replace(
+        scene.film, width=width, height=height, crop=None, filter=Box(radius=0.25)
+    )
+    return dataclasses.replace(
+        scene,
+        camera=camera,
+        film=quantity.film(film, bands),
+        shapes=[*scene.shapes, *added],
+        noise=None,
+    )
+
+
+def _discs(points: Floats, normals: Floats, lift: float) -> tuple[Rays, shapes.Shape]:
+    """Return rays onto white triangles above points (n, 3), and the mesh of these."""
+    first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(normals, first)
+    turns = 2.0 * np.pi * np.arange(3)[:, None] / 3.0
+    around = np.cos(turns) * first[:, None] + np.sin(turns) * second[:, None]
+    corners = (points + lift * normals)[:, None] + lift * around
+    mesh = shapes.Mesh(
+        vertices=corners.reshape(-1, 3).astype(np.float32),
+        faces=np.arange(3 * len(points), dtype=np.uint32).reshape(-1, 3),
+        material=Diffuse(reflectance=1.0),
+    )
+    origins = points + 2.0 * lift * normals
+    return Rays(origins=origins, directions=-normals, weights=np.pi), mesh
+
+
+def _balls(points: Floats, lift: float, seed: int) -> tuple[Rays, shapes.Shape]:
+    """Return rays onto white balls at points (n, 3), and the balls.
+
+    Each replica of a point has six rays, against the axes of a frame that is turned at random. By
+    the mean of |cos| over directions, 1/2, their irradiances sum to 3/2 of the scalar irradiance.
+    """
+    frames = _random_frames(REPLICAS * len(points), seed).reshape(REPLICAS, -1, 3, 3)
+    normals = np.einsum("rnij,tj->rtni", frames, AXES).reshape(-1, 3)
+    origins = np.tile(points, (REPLICAS * len(AXES), 1)) + 2.0 * lift * normals
+    balls = shapes.Spheres(
+        centers=points.astype(np.float32), radii=lift, material=Diffuse(reflectance=1.0)
+    )
+    return Rays(origins=origins, directions=-normals, weights=np.pi), balls
+
+
+def _random_frames(count: int, seed: int) -> Floats:
+    """Return rotations (count, 3, 3), even over all (Shoemake 1992)."""
+    q = np.random.default_rng(seed).normal(size=(count, 4))
+    w, x, y, z = (q / np.linalg.norm(q, axis=1, keepdims=True)).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def _rows(values: ArrayLike, where: str) -> Floats:
+    """Return rows (..., 3) of finite numbers. Raises SceneError."""
+    rows = np.atleast_2d(np.asarray(values, np.float64))
+    if rows.shape[-1] != 3 or rows.size == 0:
+        raise SceneError(f"must be rows of x, y and z, not of shape {rows.shape}", where=where)
+    bad = np.flatnonzero(~np.isfinite(rows.reshape(-1, 3)).all(axis=1))
+    if bad.size:
+        raise SceneError(f"row {bad[0]} is not finite", where=where)
+    return rows
