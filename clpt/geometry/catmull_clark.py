@@ -84,6 +84,8 @@ def normals(cage: Cage, points: Floats) -> tuple[Floats, Integers]:
     points: (n, 3) of a cage of quadrilaterals.
     """
     edges, quads = _edges(cage), cage.corners.reshape(-1, 4)
+    if not ((edges.sharp >= 1.0) & (edges.faces == 2)).any():
+        return _smooth(points, quads), cage.corners
     label = np.arange(len(cage.corners))
     following = np.roll(label.reshape(-1, 4), -1, axis=1).ravel()
     order = np.argsort(edges.of, kind="stable")
@@ -108,9 +110,13 @@ def normals(cage: Cage, points: Floats) -> tuple[Floats, Integers]:
     corner = corner.reshape(-1)
     at = np.zeros((int(corner.max()) + 1, 3))
     at[corner] = points[cage.corners]
-    own = corner.reshape(quads.shape)
-    triangles = np.concatenate([own[:, [0, 1, 2]], own[:, [0, 2, 3]]])
-    return smooth_normals(at, triangles).astype(np.float64), corner
+    return _smooth(at, corner.reshape(quads.shape)), corner
+
+
+def _smooth(points: Floats, quads: Integers) -> Floats:
+    """Return smooth normals of the vertices of quadrilaterals, (n, 3)."""
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return smooth_normals(points, triangles).astype(np.float64)
 
 
 def _edges(cage: Cage) -> _Edges:

@@ -291,9 +291,12 @@ class Kind(metaclass=KindType):
 
     def __post_init__(self) -> None:
         parts, depth, textured = 1, 0, False
+        valid = _valid_defaults(type(self))
         for name, param in params(type(self)).items():
-            value = _checked(getattr(self, name), param, f"{self.kind}.{name}")
-            object.__setattr__(self, name, value)
+            value = getattr(self, name)
+            if valid.get(name, valid) is not value:
+                value = _checked(value, param, f"{self.kind}.{name}")
+                object.__setattr__(self, name, value)
             for inner in value if isinstance(value, tuple) else (value,):
                 if isinstance(inner, Kind):
                     seen = param.role.place != "host"  # by kernels
@@ -319,7 +322,6 @@ class Kind(metaclass=KindType):
         return f"{type(self).__name__}({', '.join(changed)})"
 
 
-@cache
 @cache  # thousands of objects ask
 def _declared(cls: type[Kind]) -> Mapping[str, Param]:
     fields = dataclasses.fields(cls)
@@ -360,6 +362,13 @@ def _usual(cls: type[Kind]) -> Mapping[str, Any]:
     """Return the checked defaults of a kind, without its required parameters."""
     declared = {name: v for name, v in defaults(cls).items() if v is not dataclasses.MISSING}
     return {name: _checked(v, _declared(cls)[name], cls.kind) for name, v in declared.items()}
+
+
+@cache
+def _valid_defaults(cls: type[Kind]) -> Mapping[str, Any]:
+    """Return the defaults of a kind that its checks return as they are."""
+    declared, checked = defaults(cls), _usual(cls)
+    return {name: value for name, value in checked.items() if declared[name] is value}
 
 
 def fields_of(kind: Kind) -> dict[str, Any]:

@@ -370,6 +370,8 @@ def _cut(plain: Bytes, lines: _Lines, rows: Integers) -> bytes:
     """Return the text of some lines."""
     start, stop = lines.start[rows], lines.stop[rows]
     breaks = np.flatnonzero(start[1:] != stop[:-1])
+    if not len(breaks):
+        return plain[start[0] : stop[-1]].tobytes()
     begins, ends = start[np.r_[0, breaks + 1]].tolist(), stop[np.r_[breaks, len(rows) - 1]].tolist()
     view = plain.data
     return b"".join([view[a:b] for a, b in zip(begins, ends, strict=True)])
@@ -412,9 +414,11 @@ def _fields(cut: bytes) -> tuple[NDArray[np.int8], Integers]:
     fields = slash.astype(np.int8)
     if slash.any():
         twice = slash & (letters[starts - 2] == SLASH)
-        after = np.r_[False, slash[:-1] & ~twice[:-1]]  # a number behind a single slash precedes
+        after = np.zeros_like(slash)  # a number behind a single slash precedes
+        after[1:] = slash[:-1] & ~twice[:-1]
         fields[twice | (slash & after)] = 2
-        before = np.r_[np.int8(0), fields[:-1]]
+        before = np.zeros_like(fields)
+        before[1:] = fields[:-1]
         fields[(slash & (before == 2)) | (twice & (before != 0))] = -1
     if b"///" in cut or b" /" in cut or b"\t/" in cut:
         fields[:1] = -1

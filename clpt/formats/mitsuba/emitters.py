@@ -91,10 +91,7 @@ def area(element: Element, context: Context) -> Light | None:
 
 
 def _make(
-    element: Element,
-    context: Context,
-    cls: type[Light],
-    read: PluginReader[Parameters],
+    element: Element, context: Context, cls: type[Light], read: PluginReader[Parameters]
 ) -> Light:
     props = Properties(element, context)
     props.ignore("sampling_weight")

@@ -26,13 +26,7 @@ class Document:
     level: of subdivision, None for that which suits each mesh. left_out: prim paths by message.
     """
 
-    def __init__(
-        self,
-        file: Path,
-        stage: Usd.Stage,
-        time: float,
-        level: int | None = None,
-    ):
+    def __init__(self, file: Path, stage: Usd.Stage, time: float, level: int | None = None):
         self.file, self.stage, self.level = file, stage, level
         self.metres = float(UsdGeom.GetStageMetersPerUnit(stage))
         self.up: Up = "z" if UsdGeom.GetStageUpAxis(stage) == "Z" else "y"
