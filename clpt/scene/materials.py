@@ -694,6 +694,7 @@ class Openpbr(Material):
     refracts = True
     chromatic = True
     needs_wavelengths = True
+    turning_lobe = "anisotropy_rotation"
 
     base_weight: TexturedNumber = _share(1.0, "factor on the base's colour")
     base_color: Textured = reflectance(0.8, "colour of the base, and of metal head-on")
@@ -709,6 +710,15 @@ class Openpbr(Material):
     specular_roughness: TexturedNumber = _share(0.3, "of facets; its square is their alpha")
     specular_roughness_anisotropy: TexturedNumber = _share(
         0.0, "how much rougher the tangent's direction is", lobe=True
+    )
+    anisotropy_rotation: TexturedNumber = real(
+        0.0,
+        "from u to the tangent, on the side of v; an image's own u and v",
+        "degrees",
+        -360.0,
+        360.0,
+        textured=True,
+        lobe=True,
     )
     specular_ior: IndexLike = index(1.5, "index of the dielectric")
     transmission_weight: TexturedNumber = _share(
@@ -754,6 +764,10 @@ class Openpbr(Material):
     def transmits(self) -> bool:
         below = self.thin_walled or self.subsurface_inside
         return self.transmission_weight != 0.0 or (below and self.subsurface_weight != 0.0)
+
+    @property
+    def directing(self) -> tuple[object, ...]:
+        return None, self.anisotropy_rotation
 
     @property
     def uses_tangents(self) -> bool:

@@ -61,6 +61,8 @@ class Scatterer(Kind):
         """
         return None
 
+    turning_lobe: ClassVar[str] = "anisotropy"  # the parameter whose lobe a rotation turns
+
     @property
     def directing(self) -> tuple[object, ...]:
         """The values or textures of a coat's normals, and of directions along the surface."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -97,6 +98,8 @@ def _openpbr(graph: Graph, node: Node, name: str, walk: bool) -> Surface:
     values |= {key: _color(graph, node, key, usual.get(key, 1.0)) for key in COLORS}
     values["thin_walled"] = thin = bool(_one(graph, node, "geometry_thin_walled", 0.0))
     values["thin_film_ior"] = min(max(_one(graph, node, "thin_film_ior", 1.4), 1.0), 5.0)
+    if values["specular_roughness_anisotropy"] != 0.0:
+        values["anisotropy_rotation"] = _turn(graph, node)
     ior = max(_one(graph, node, "specular_ior", 1.5), 0.1)
     scale = _one(graph, node, "transmission_dispersion_scale", 0.0)
     abbe = _one(graph, node, "transmission_dispersion_abbe_number", 20.0)
@@ -112,6 +115,15 @@ def _openpbr(graph: Graph, node: Node, name: str, walk: bool) -> Surface:
     share = graph.texture(node, "geometry_opacity", 1.0, wide=False)
     emission = _emission(graph, node, "emission_color", "emission_luminance", values)
     return _finished(graph, node, "geometry_normal", inner, share, emission, interior)
+
+
+def _turn(graph: Graph, node: Node) -> float:
+    """Return how far a tangent is turned about the normal [degrees]."""
+    source, turn = node.source("geometry_tangent"), 0.0
+    while source is not None and (kind := category(source[0].kind)) in ("normalize", "rotate3d"):
+        turn += _one(graph, source[0], "amount", 0.0) if kind == "rotate3d" else 0.0
+        source = source[0].source("in")
+    return math.remainder(turn, 180.0)
 
 
 def _transmission(graph: Graph, node: Node, values: dict[str, Any]) -> Homogeneous | None:

@@ -345,7 +345,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         *either(
             flags.has_lobe(f, cls, "clearcoat_apart"), "materials/shading_frame.cl#coat_normal"
         ),
-        *either(flags.has_lobe(f, cls, "anisotropy"), "materials/shading_frame.cl#anisotropy"),
+        *either(flags.has_lobe(f, cls, cls.turning_lobe), "materials/shading_frame.cl#anisotropy"),
     ),
 }
 

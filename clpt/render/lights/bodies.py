@@ -19,6 +19,7 @@ from clpt.render.geometry.surroundings import every
 from clpt.render.lights.bounds import Bounds, all_around
 from clpt.render.materials.encoder import Encoder
 from clpt.render.records.lights import BODY, BRICK, RECORDS
+from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.scene_index import SceneIndex, leaves_of
 from clpt.render.spectra.look import Look
 from clpt.scene.media import Grid, Lattice, Medium
@@ -31,8 +32,6 @@ from clpt.spectra.spectrum import gridded
 SOLID = Sphere | Cube | Mesh | SdfGrid
 WALLS = Cylinder | Disk | Rectangle  # which may enclose something together
 FILLED = 0.1  # least share of a box that bodies must fill, else rays to the box are wasted
-
-Cached = Callable[..., Any] | None
 
 
 @dataclass(frozen=True)
@@ -155,7 +154,7 @@ def _encloses(shape: Shape) -> bool:
     )
 
 
-def _place(shape: Shape, cached: Cached) -> tuple[NDArray[np.float64], bool]:
+def _place(shape: Shape, cached: LoweringCache) -> tuple[NDArray[np.float64], bool]:
     """Return axes and middle (3, 4) of a ball or box around a shape, and whether it is a ball."""
     if isinstance(shape, Sphere) and keeps_its_kind(shape):
         members = analytic.members_of(shape)

@@ -203,6 +203,18 @@ def test_a_pattern_becomes_an_image(tmp_path: Path) -> None:
     assert not image[..., 1:].any()
 
 
+def test_a_tangent_is_turned(tmp_path: Path) -> None:
+    """As Blender writes it, for metal that is brushed."""
+    nodes = '<tangent name="T" type="vector3"/><normal name="N" type="vector3"/>'
+    nodes += '<rotate3d name="R" type="vector3">' + _input("in", "vector3", node="T")
+    nodes += _input("amount", "float", "-60") + _input("axis", "vector3", node="N") + "</rotate3d>"
+    shader = _input("geometry_tangent", "vector3", node="R")
+    assert _leaf(_read(tmp_path, shader, nodes)[0]).anisotropy_rotation == 0.0
+    brushed = shader + _input("specular_roughness_anisotropy", "float", "0.5")
+    surface, warnings = _read(tmp_path, brushed, nodes)
+    assert not warnings and _leaf(surface).anisotropy_rotation == -60.0
+
+
 def test_noise_in_space(tmp_path: Path) -> None:
     """Noise of scaled places is ours in a texture's space; heights of it are a bump map."""
     nodes = '<position name="Q" type="vector3"/><multiply name="V" type="vector3">'
