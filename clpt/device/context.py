@@ -144,7 +144,7 @@ class Builds:
 
 
 class Device:
-    """A context with a queue on one device.
+    """A context with a queue on a device.
 
     clpt enqueues every command through a Device. `Device.adopt` wraps a caller's queue; its context
     then holds every buffer and program.
