@@ -38,8 +38,7 @@ inline Fixed fixed_of(real v)
 inline Fixed fixed_of_small(real v)
 {
     natural middle = to_natural(v * 0x1p16f), low = to_natural((v - to_real(middle) * 0x1p-16f) * 0x1p48f);
-    Fixed f = {low, middle, (natural)(0u)};
-    return f;
+    return (Fixed){low, middle, (natural)(0u)};
 }
 
 /* Whether this function accepts all three values; false for values that are not finite. */

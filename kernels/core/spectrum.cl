@@ -1,46 +1,20 @@
-/* Arithmetic of spectra in both modes, component by component. FOURTH(value) is the last element of a list, in spectral
- * mode only; SPECTRUM_EACH(F) expands F(x) F(y) F(z) and, in that mode, F(w). */
-inline Spectrum spectrum_of(real v) { Spectrum r = {v, v, v FOURTH(v)}; return r; }
-inline Spectrum spectrum_add(Spectrum a, Spectrum b)
-{
-    Spectrum r = {a.x + b.x, a.y + b.y, a.z + b.z FOURTH(a.w + b.w)};
-    return r;
-}
-inline Spectrum spectrum_sub(Spectrum a, Spectrum b)
-{
-    Spectrum r = {a.x - b.x, a.y - b.y, a.z - b.z FOURTH(a.w - b.w)};
-    return r;
-}
-inline Spectrum spectrum_mul(Spectrum a, Spectrum b)
-{
-    Spectrum r = {a.x * b.x, a.y * b.y, a.z * b.z FOURTH(a.w * b.w)};
-    return r;
-}
-inline Spectrum spectrum_div(Spectrum a, Spectrum b)
-{
-    Spectrum r = {a.x / b.x, a.y / b.y, a.z / b.z FOURTH(a.w / b.w)};
-    return r;
-}
-inline Spectrum spectrum_scale(Spectrum a, real s)
-{
-    Spectrum r = {a.x * s, a.y * s, a.z * s FOURTH(a.w * s)};
-    return r;
-}
+/* Arithmetic of spectra in both modes, component by component. SPECTRUM(x, y, z, w) has the component w in
+ * spectral mode only; SPECTRUM_EACH(F) expands F(x) F(y) F(z) and, in that mode, F(w). */
+inline Spectrum spectrum_of(real v) { return SPECTRUM(v, v, v, v); }
+inline Spectrum spectrum_add(Spectrum a, Spectrum b) { return SPECTRUM(a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w); }
+inline Spectrum spectrum_sub(Spectrum a, Spectrum b) { return SPECTRUM(a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w); }
+inline Spectrum spectrum_mul(Spectrum a, Spectrum b) { return SPECTRUM(a.x * b.x, a.y * b.y, a.z * b.z, a.w * b.w); }
+inline Spectrum spectrum_div(Spectrum a, Spectrum b) { return SPECTRUM(a.x / b.x, a.y / b.y, a.z / b.z, a.w / b.w); }
+inline Spectrum spectrum_scale(Spectrum a, real s) { return SPECTRUM(a.x * s, a.y * s, a.z * s, a.w * s); }
 inline Spectrum spectrum_madd(Spectrum a, real s, Spectrum b) /* a s + b */
 {
-    Spectrum r = {a.x * s + b.x, a.y * s + b.y, a.z * s + b.z FOURTH(a.w * s + b.w)};
-    return r;
+    return SPECTRUM(a.x * s + b.x, a.y * s + b.y, a.z * s + b.z, a.w * s + b.w);
 }
 inline Spectrum spectrum_sel(mask m, Spectrum a, Spectrum b)
 {
-    Spectrum r = {sel(m, a.x, b.x), sel(m, a.y, b.y), sel(m, a.z, b.z) FOURTH(sel(m, a.w, b.w))};
-    return r;
+    return SPECTRUM(sel(m, a.x, b.x), sel(m, a.y, b.y), sel(m, a.z, b.z), sel(m, a.w, b.w));
 }
-inline Spectrum spectrum_exp(Spectrum a)
-{
-    Spectrum r = {exp_r(a.x), exp_r(a.y), exp_r(a.z) FOURTH(exp_r(a.w))};
-    return r;
-}
+inline Spectrum spectrum_exp(Spectrum a) { return SPECTRUM(exp_r(a.x), exp_r(a.y), exp_r(a.z), exp_r(a.w)); }
 inline Spectrum spectrum_clamped(Spectrum a) /* to [0, 1] */
 {
     Spectrum r;

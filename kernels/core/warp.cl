@@ -3,8 +3,7 @@ inline vec2 disk_of(vec2 u) /* concentric in the radius only: r = sqrt(u.x), ang
 {
     real s, c, r = sqrt_r(u.x);
     sincos_2pi(u.y, &s, &c);
-    vec2 p = {r * c, r * s};
-    return p;
+    return (vec2){r * c, r * s};
 }
 /* The unit square onto the unit disk, rings to rings (Shirley and Chiu 1997). */
 inline vec2 concentric_disk(vec2 u)
@@ -14,8 +13,7 @@ inline vec2 concentric_disk(vec2 u)
     real r = sel(upright, y, x), turn = 0.125f * safe_div(sel(upright, x, y), r), s, c;
     turn = sel(upright, 0.25f - turn, turn);
     sincos_2pi(turn - floor(turn), &s, &c);
-    vec2 p = {r * c, r * s};
-    return p;
+    return (vec2){r * c, r * s};
 }
 
 inline vec3 cosine_hemisphere(vec2 u) /* Malley: a point of the disk, raised to the hemisphere */
@@ -42,8 +40,7 @@ inline vec3 uniform_cone(vec2 u, real one_minus_cos)
 inline vec2 uniform_triangle(vec2 u)
 {
     real r = sqrt_r(u.x);
-    vec2 b = {1.0f - r, u.y * r};
-    return b;
+    return (vec2){1.0f - r, u.y * r};
 }
 /* From area to solid angle: the pdf of a point at distance t whose normal leans by cos to wi. */
 inline real solid_angle_pdf(real pdf_area, real t, real cos_t)

@@ -33,14 +33,12 @@ inline vec2 pixel_of_index(global const Settings *settings, integer pixel_index)
 {
     integer x, y;
     pixel_place(settings, pixel_index, &x, &y);
-    vec2 p = {to_real(x), to_real(y)};
-    return p;
+    return (vec2){to_real(x), to_real(y)};
 }
 
 /* A point of the whole film, 0 to 1: `offset` [pixels] from the centre of a pixel of the picture. */
 inline vec2 film_position(global const Settings *settings, vec2 pixel, vec2 offset)
 {
-    vec2 p = {(pixel.x + (settings->crop_x + 0.5f) + offset.x) / (float)settings->film_width,
-              (pixel.y + (settings->crop_y + 0.5f) + offset.y) / (float)settings->film_height};
-    return p;
+    return (vec2){(pixel.x + (settings->crop_x + 0.5f) + offset.x) / (float)settings->film_width,
+                  (pixel.y + (settings->crop_y + 0.5f) + offset.y) / (float)settings->film_height};
 }

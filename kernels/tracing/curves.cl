@@ -87,8 +87,7 @@ inline CurveTree curve_tree(global const float *nodes, global const uint *indice
 {
     ShapeRow row = shape_row_row(scene.shapes, curve_row_first(scene));
     TraceInteger first = {curve_row(scene.geometry, row.params).first};
-    CurveTree tree = {nodes, indices, scene.spheres + first.at[0]};
-    return tree;
+    return (CurveTree){nodes, indices, scene.spheres + first.at[0]};
 }
 
 /* Move a ray to a node or a leaf, and fetch its memory. */

@@ -11,9 +11,6 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from clpt.formats.mitsuba.principled import at_yellow
 from clpt.formats.mitsuba.properties import Context
 from clpt.formats.mitsuba.xml import Element
@@ -108,7 +105,9 @@ class Coat:
         if self.depth in (0.0, Constant(0.0)):
             return albedo
         self._warn("'sigma_a' absorbs alike in all directions: the mean of even light")
-        share = map_values(self.depth, lambda depth: transmitted_twice(self._ratio, depth))
+        share = map_values(
+            self.depth, lambda depth: scattering.transmitted(self._ratio, depth) ** 2
+        )
         share = share.value if isinstance(share, Constant) else share
         if isinstance(share, float):
             return map_values(albedo, lambda r: r * share)
@@ -116,13 +115,3 @@ class Coat:
             numbers = albedo.to_rgb() * share.to_rgb()
             return tuple(numbers.tolist())
         return Product(first=albedo, second=share, rgb=True)
-
-
-def transmitted_twice(ior: float, depth: ArrayLike) -> Any:
-    """Return the square of the mean transmittance of even light that is refracted into a layer.
-
-    ior: relative index; depth: optical depths along the normal, any shape, which is returned.
-    """
-    refracted = scattering.EVEN * (1.0 - scattering.internal_fresnel(ior))
-    passes = np.exp(-np.multiply.outer(np.asarray(depth, np.float64), 1.0 / scattering.COSINES))
-    return (passes @ refracted / refracted.sum()) ** 2

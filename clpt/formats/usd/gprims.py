@@ -98,7 +98,8 @@ def content(
         prototype, material = several[0][0].GetPrototype(), several[0][1]
         make = partial(content, document, prototype, np.eye(4), material, depth + 1)
         inner = document.once(("content", document.code, *key), make)
-        whole.copies.append((inner, np.stack([placement(prim) for prim, _ in several])))
+        matrices = document.placements([prim for prim, _ in several])
+        whole.copies.append((inner, matrices if base is None else base @ matrices))
     for prim in prims["instancers"]:
         whole.copies += _instancer(document, prim, placement(prim), inherited, depth)
     return whole

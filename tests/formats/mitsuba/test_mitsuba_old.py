@@ -13,8 +13,7 @@ from clpt import spectra
 from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.formats.mitsuba import old_words, sensors
-from clpt.formats.mitsuba.coating import transmitted_twice
-from clpt.formats.pbrt.scattering import EVEN, internal_fresnel
+from clpt.formats.pbrt.scattering import EVEN, internal_fresnel, transmitted
 from clpt.scene import integrators, lights, materials, textures
 from clpt.spectra import RGB, Blackbody, Constant, RGBIlluminant, RGBUnbounded
 
@@ -352,7 +351,7 @@ def test_coats_that_absorb(angle, error):
     even = 2.0 * cos_in * (1.0 - internal(cos_in, ior))
     seen = np.sqrt(1.0 - (np.sin(np.radians(angle)) / ior) ** 2)
     exact = np.exp(-depth / seen) * (even * np.exp(-depth / cos_in)).mean()
-    ours = transmitted_twice(ior, depth) * even.mean()
+    ours = transmitted(ior, depth) ** 2 * even.mean()
     assert ours / exact - 1.0 == pytest.approx(error, abs=1e-3)
 
 
@@ -373,7 +372,7 @@ def test_the_depth_of_a_coat_is_its_thickness_times_sigma_a(material):
     even = material(coat.format("float", 0.25)).diffuse_reflectance
     ratio = 1.5046 / 1.000277  # bk7 in air
     inside = float(EVEN @ internal_fresnel(ratio))
-    expected = 0.5 * transmitted_twice(ratio, 0.5)
+    expected = 0.5 * transmitted(ratio, 0.5) ** 2
     assert level(even) == pytest.approx(expected / (1.0 + inside * expected), rel=1e-3)
     coloured = material(coat.format("rgb", "0, 0.25, 2")).diffuse_reflectance
     assert coloured.g == pytest.approx(level(even), rel=1e-3)
