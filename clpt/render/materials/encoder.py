@@ -29,7 +29,7 @@ from clpt.scene.params import (
     place_of,
 )
 from clpt.scene.roles import Param, Role, Spectral
-from clpt.scene.values import constant_number, is_texture
+from clpt.scene.values import is_texture
 from clpt.spectra import RGB, Constant, Sensor, Tabulated
 
 BLACK = (Constant(0.0), RGB(0.0, 0.0, 0.0))
@@ -208,7 +208,7 @@ def _number(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[
 
 
 def _real(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:
-    number = constant_number(value, roles.REAL)
+    number = value.value if isinstance(value, Constant) else value
     return np.array([as_words([number])[0], 0], np.uint32), "constant"
 
 
