@@ -23,7 +23,7 @@ SILENT = ("", "data", "unknown")  # names that state no colours
 
 @dataclass(frozen=True)
 class Encoding:
-    """What a name states: see `clpt.images.stored.Stored`."""
+    """The colours that a name states: see `clpt.images.stored.Stored`."""
 
     encoded: bool
     gamma: float | None
