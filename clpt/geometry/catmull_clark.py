@@ -16,16 +16,16 @@ from clpt.arrays import Floats, Integers
 from clpt.geometry.polygons import smooth_normals
 
 INFINITE = 10.0  # sharpness that no level wears off
-LINKS = 64  # rounds in which corners around a vertex find each other
+LINKS = 64  # most rounds of the search for corners around a vertex
 
 
 @dataclass(frozen=True)
 class Cage:
-    """Polygons of a surface: counts (f,) and vertex of each corner (c,), with what is sharp.
+    """Polygons of a surface: counts (f,) and vertex of each corner (c,), with its creases.
 
     edges (e, 2), crease (e,): vertices and sharpness of creases. corner (n,): that of vertices.
-    smooth: how edges of one face go: "edgeOnly" and "edgeAndCorner" as curves, which do not stop
-    at corners of one face or do; "linear": as straight lines. "bilinear": nothing is smooth.
+    smooth: rule for boundary edges: "edgeOnly" makes them curves, "edgeAndCorner" curves that stop
+    at corners of a single face, "linear" straight lines. "bilinear": nothing is smooth.
     """
 
     counts: Integers
@@ -140,7 +140,7 @@ def _edges(cage: Cage) -> _Edges:
 
 
 def _once(cage: Cage, values: Floats) -> tuple[Cage, Floats]:
-    """Return a cage and its values after one level."""
+    """Return a cage and its values after a level of subdivision."""
     edges, count = _edges(cage), len(values)
     face = np.repeat(np.arange(len(cage.counts)), cage.counts)
     middles = _added(len(cage.counts), face, values[cage.corners]) / cage.counts[:, None]
@@ -173,7 +173,7 @@ def _once(cage: Cage, values: Floats) -> tuple[Cage, Floats]:
 
 
 def _vertices(cage: Cage, edges: _Edges, values: Floats, middles: Floats) -> Floats:
-    """Return where the vertices of a cage go in one level."""
+    """Return the positions of a cage's vertices after a level of subdivision."""
     count = len(values)
     face = np.repeat(np.arange(len(cage.counts)), cage.counts)
     valence = np.bincount(edges.ends.ravel(), minlength=count)[:, None]

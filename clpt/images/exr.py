@@ -1,14 +1,15 @@
 """OpenEXR files as pictures, by the meaning of their attributes.
 
 Attributes as in "Technical Introduction to OpenEXR" and "OpenEXR File Layout": a picture is its
-display window; pixels outside of the data window are zero. Colours are of the primaries and the
-white in `chromaticities`, else of Rec. 709. Colours are multiplied by alpha, and stay so.
+display window; pixels outside of the data window are zero. Colours are as `colorInteropID` says,
+else linear, of the primaries and the white in `chromaticities`, else of Rec. 709. Colours are
+multiplied by alpha, and stay so.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats32, Matrix
 from clpt.errors import SceneError
-from clpt.images import exr_files
+from clpt.images import exr_files, interop
 from clpt.images.checks import check_there, reading
 from clpt.images.exr_files import Header, Window, window
+from clpt.images.interop import Encoding
 from clpt.images.stored import Stored
 from clpt.spectra import spaces
 
@@ -138,10 +140,12 @@ def read(path: Path) -> Stored:
     values = np.empty((y1 - y0, x1 - x0, len(names)), np.float32)
     for index, name in enumerate(names):
         values[..., index] = placed(_whole(read_[name], window(header, "dataWindow")), header)
-    matrix, notes = _matrix(header, choice)
+    stated, notes = _encoding(header, choice)
     if choice.form == "chroma":
         values[..., :3] = _from_chroma(values[..., :3], _weights(header))
-    return Stored(values, False, matrix=matrix, notes=_notes(header, choice), colour_notes=notes)
+    return Stored(
+        values, stated.encoded, stated.gamma, stated.matrix, _notes(header, choice), notes
+    )
 
 
 def placed(plane: NDArray[Any], header: Header) -> NDArray[Any]:
@@ -201,16 +205,26 @@ def write(
     exr_files.write_channels(path, metadata, channels)
 
 
-def _matrix(header: Header, choice: Choice) -> tuple[Matrix | None, tuple[str, ...]]:
-    """Return the matrix from a picture's colours to Rec. 709, and notes on attributes left out."""
+def _encoding(header: Header, choice: Choice) -> tuple[Encoding, tuple[str, ...]]:
+    """Return how a picture's colours are encoded, and notes on attributes left out.
+
+    `colorInteropID` comes before `chromaticities`.
+    """
     if choice.form == "xyz":
-        return spaces.from_xyz("rec709"), ()
-    if choice.form not in ("rgb", "chroma"):
-        return None, ()
-    try:
-        return matrix_of(header), ()
-    except SceneError as error:
-        return None, (f"{error.message}: left out, its colours are taken as Rec. 709",)
+        return Encoding(False, None, spaces.from_xyz("rec709")), ()
+    name, notes = str(header.get("colorInteropID", "")), list[str]()
+    if choice.form in ("rgb", "grey") and name not in interop.SILENT:
+        stated = interop.encoding(name)
+        if stated is not None:
+            return stated if choice.form == "rgb" else replace(stated, matrix=None), ()
+        notes.append(f"its colorInteropID {name!r} is left out: its colours are taken as linear")
+    matrix = None
+    if choice.form in ("rgb", "chroma"):
+        try:
+            matrix = matrix_of(header)
+        except SceneError as error:
+            notes.append(f"{error.message}: left out, its colours are taken as Rec. 709")
+    return Encoding(False, None, matrix), tuple(notes)
 
 
 def _notes(header: Header, choice: Choice) -> tuple[str, ...]:
