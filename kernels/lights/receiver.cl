@@ -58,11 +58,7 @@ inline real receiver_reflects(Receiver r, vec3 wi, real sine, real cosine)
 /* Twin, where no light is sampled by gloss. */
 typedef struct { vec3 hemisphere; } Receiver;
 
-inline Receiver receiver_at(Scene scene, integer row, vec3 hemisphere, vec3 away)
-{
-    Receiver r = {hemisphere};
-    return r;
-}
+inline Receiver receiver_at(Scene scene, integer row, vec3 hemisphere, vec3 away) { return (Receiver){hemisphere}; }
 inline real receiver_reflects(Receiver r, vec3 wi, real sine, real cosine) { return cosine; }
 
 /* Step kept: the receiver where a ray was sampled: next-event estimation chose lights by it. */

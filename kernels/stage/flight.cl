@@ -5,7 +5,6 @@
  * media/equiangular.cl; both ways to choose are weighed by their sum. */
 #include "stage/stage.cl"
 #include "generated/sampler.cl"
-#include "transport/path_state.cl"
 #include "generated/scouts.cl"
 #include "generated/textures.cl"
 #include "generated/medium.cl"

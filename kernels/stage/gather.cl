@@ -4,7 +4,6 @@
 #include "generated/merge_args.cl"
 #include "generated/gather_args.cl"
 #include "generated/sampler.cl"
-#include "transport/path_state.cl"
 #include "generated/scouts.cl"
 #include "shapes/surface.cl#flags"
 #include "generated/textures.cl"

@@ -22,7 +22,6 @@
 #include "generated/first_ray.cl"
 #include "generated/first_cone.cl"
 #include "generated/layer_sums.cl"
-#include "transport/path_state.cl"
 #include "generated/scouts_begin.cl"
 
 /* The beginning of a sample. */
