@@ -160,34 +160,41 @@ CORE = (min(os.sched_getaffinity(0)),) if hasattr(os, "sched_getaffinity") else 
 
 def measure(contenders: list[Contender], seconds: float, seeds: int) -> list[Row]:
     """Return a row for each contender. Raises RuntimeError if the renderers have other pictures."""
-    for one in contenders:  # compiles
-        one.render(1, 1)
-    start = {one.name: min(one.render(1, seed)[0] for seed in (2, 3)) for one in contenders}
+    for contender in contenders:  # compiles
+        contender.render(1, 1)
+    start = {
+        contender.name: min(contender.render(1, seed)[0] for seed in (2, 3))
+        for contender in contenders
+    }
     if "clpt:guiding" in start:  # which learns before its first sample
         start["clpt:guiding"] = start["clpt:path"]
     each = {}
-    for one in contenders:
-        plain = one.render(1, 4)[0]
-        each[one.name] = max(one.render(1 + PILOT, 5)[0] - plain, 0.01) / PILOT
+    for contender in contenders:
+        plain = contender.render(1, 4)[0]
+        each[contender.name] = max(contender.render(1 + PILOT, 5)[0] - plain, 0.01) / PILOT
     rows: list[Row] = [
-        {"renderer": one.name, "spp": max(1, round(seconds / each[one.name]))} for one in contenders
+        {"renderer": contender.name, "spp": max(1, round(seconds / each[contender.name]))}
+        for contender in contenders
     ]
     shots: list[list[tuple[float, Image]]] = [[] for _ in contenders]
     for seed in range(11, 11 + seeds):
-        for one, row, taken in zip(contenders, rows, shots, strict=True):
-            taken.append(one.render(row["spp"], seed))
+        for contender, row, taken in zip(contenders, rows, shots, strict=True):
+            taken.append(contender.render(row["spp"], seed))
     images = [np.array([image for _, image in taken]) for taken in shots]
-    ours = [one.python is None for one in contenders]
+    ours = [contender.python is None for contender in contenders]
     means = [
-        np.mean([i.mean(0) for i, own in zip(images, ours, strict=True) if own is which], axis=0)
+        np.mean(
+            [i.mean(0) for i, pictures in zip(images, ours, strict=True) if pictures is which],
+            axis=0,
+        )
         for which in (True, False)
     ]
     apart, middle = agreement(*means), (means[0] + means[1]) / 2
-    for one, row, taken, own in zip(contenders, rows, shots, images, strict=True):
-        cpu = float(np.mean([shot[0] for shot in taken])) - start[one.name]
+    for contender, row, taken, pictures in zip(contenders, rows, shots, images, strict=True):
+        cpu = float(np.mean([shot[0] for shot in taken])) - start[contender.name]
         error = float(np.mean([
             relative_mse(middle + (a - b) / np.sqrt(2), middle)
-            for a, b in itertools.combinations(own, 2)
+            for a, b in itertools.combinations(pictures, 2)
         ]))  # fmt: skip
         row |= {"cpu": round(cpu, 2), "relmse": round(error, 5)}
         row |= {"efficiency": round(1 / (error * cpu), 4), **apart}

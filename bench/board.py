@@ -73,12 +73,12 @@ class Entry:
 
     def picture(self, name: str, size: str) -> Row | None:
         """Return the record of a picture."""
-        found = [
+        rows = [
             row
             for row in self.figures.values()
             if (row["bench"], row["figure"], row.get("size")) == (pictures.PART, name, size)
         ]
-        return max(found, key=lambda row: row.get("benchmark_version", 0), default=None)
+        return max(rows, key=lambda row: row.get("benchmark_version", 0), default=None)
 
     def score(self, size: str) -> float:
         """Return the geometric mean of the pictures' points; 0 if a picture is wrong or missing."""
@@ -87,7 +87,7 @@ class Entry:
 
     def best(self, part: str, scene: str, pattern: str) -> Row | None:
         """Return the best record of a part and scene whose figure's name matches."""
-        found = [
+        rows = [
             row
             for row in self.figures.values()
             if (row["bench"], row.get("scene", "")) == (part, scene)
@@ -95,7 +95,7 @@ class Entry:
             and re.fullmatch(pattern, row["figure"])
         ]
         sign = -1.0 if part == "start" else 1.0
-        return max(found, key=lambda row: sign * float(row["value"]), default=None)
+        return max(rows, key=lambda row: sign * float(row["value"]), default=None)
 
 
 def points(row: Row | None) -> float:
@@ -116,15 +116,15 @@ def read(path: Path) -> list[Row]:
 
 def entries(rows: Iterable[Row]) -> list[Entry]:
     """Return an entry for each device, driver and clpt; records of other things are left out."""
-    found: dict[tuple[str, ...], Entry] = {}
+    by_machine: dict[tuple[str, ...], Entry] = {}
     for row in sorted(rows, key=lambda row: str(row.get("date", ""))):
         if "device" in row and {"figure", "value", "bench"} <= row.keys():
             who = {name: row.get(name, "") for name in WHO}
-            entry = found.setdefault(tuple(map(str, who.values())), Entry(who))
+            entry = by_machine.setdefault(tuple(map(str, who.values())), Entry(who))
             entry.who |= {"date": row.get("date", ""), "load": row.get("load")}
             entry.who["cores"] = row.get("cores")
             entry.figures[records.key(row)] = row
-    return list(found.values())
+    return list(by_machine.values())
 
 
 def page(listed: Sequence[Entry]) -> str:
@@ -139,9 +139,11 @@ def page(listed: Sequence[Entry]) -> str:
         "More is better. A wrong picture has no points.</p>",
     ]
     for size in SIZES:
-        own = [one for one in listed if any(one.picture(name, size) for name in PICTURES)]
-        if own:
-            parts += _ranking(sorted(own, key=lambda one: -one.score(size)), size)
+        with_pictures = [
+            entry for entry in listed if any(entry.picture(name, size) for name in PICTURES)
+        ]
+        if with_pictures:
+            parts += _ranking(sorted(with_pictures, key=lambda entry: -entry.score(size)), size)
     return "\n".join([*parts, *_subscores(listed), *_faults(listed), "</html>\n"])
 
 
@@ -151,14 +153,16 @@ def _ranking(listed: Sequence[Entry], size: str) -> Iterator[str]:
     yield f"<h2>Points, {size}: {side} x {side} pixels, {samples} samples</h2>"
     yield '<div class="wide"><table><tr><th>device</th><th>all</th>'
     yield "".join(f"<th>{name}</th>" for name in PICTURES) + "</tr>"
-    most = {name: max(points(one.picture(name, size)) for one in listed) for name in PICTURES}
-    for one in listed:
-        score = one.score(size)
-        wrong = any((row := one.picture(n, size)) and row["value"] is None for n in PICTURES)
+    most = {name: max(points(entry.picture(name, size)) for entry in listed) for name in PICTURES}
+    for entry in listed:
+        score = entry.score(size)
+        wrong = any((row := entry.picture(n, size)) and row["value"] is None for n in PICTURES)
         none = '<span class="wrong">no score</span>' if wrong else ""
         cells = [f"<b>{score:,.0f}</b>" if score else none]
-        cells += [_bar(one, name, size, most[name]) for name in PICTURES]
-        yield f"<tr><td>{_who(one)}</td>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+        cells += [_bar(entry, name, size, most[name]) for name in PICTURES]
+        yield (
+            f"<tr><td>{_who(entry)}</td>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+        )
     yield "</table></div>"
 
 
@@ -169,9 +173,9 @@ def _bar(entry: Entry, name: str, size: str, most: float) -> str:
         return ""
     if row["value"] is None:
         return '<span class="wrong">wrong</span>'
-    own = points(row)
-    width = 100 * own / most if most else 0
-    return f'{own:,.0f}<div class="bar" style="width:{width:.0f}%"></div>'
+    row_points = points(row)
+    width = 100 * row_points / most if most else 0
+    return f'{row_points:,.0f}<div class="bar" style="width:{width:.0f}%"></div>'
 
 
 def _subscores(listed: Sequence[Entry]) -> Iterator[str]:
@@ -181,15 +185,15 @@ def _subscores(listed: Sequence[Entry]) -> Iterator[str]:
     for name, (*_, meaning) in SUBSCORES.items():
         yield f'<th title="{escape(meaning)}">{name}</th>'
     yield "</tr>"
-    for one in listed:
+    for entry in listed:
         cells = []
         for *which, _ in SUBSCORES.values():
-            row = one.best(*which)
+            row = entry.best(*which)
             unit = escape(str(row["unit"])) if row else ""
             shown = f'{_short(row["value"])} <span class="faint">{unit}</span>' if row else ""
             cells.append(f"<td>{shown}</td>")
         if any(cell != "<td></td>" for cell in cells):
-            yield f"<tr><td>{_who(one)}</td>{''.join(cells)}</tr>"
+            yield f"<tr><td>{_who(entry)}</td>{''.join(cells)}</tr>"
     yield "</table></div>"
     meanings = (f"{name}: {meaning}" for name, (*_, meaning) in SUBSCORES.items())
     yield f"<p>{escape('; '.join(meanings))}. Of several layouts of trees the best.</p>"
@@ -202,18 +206,20 @@ def _short(value: float) -> str:
 
 def _faults(listed: Sequence[Entry]) -> Iterator[str]:
     """Yield the table of refused figures."""
-    rows = [(one, row) for one in listed for row in one.figures.values() if row.get("refused")]
+    rows = [
+        (entry, row) for entry in listed for row in entry.figures.values() if row.get("refused")
+    ]
     yield "<h2>What was wrong</h2>"
     if not rows:
         yield "<p>Nothing.</p>"
         return
     yield '<div class="wide"><table><tr><th>device</th><th>figure</th>'
     yield '<th class="words">why</th></tr>'
-    for one, row in rows:
+    for entry, row in rows:
         scene = f" of {row['scene']}" if row.get("scene") else ""
         named = escape(f"{row['bench']}{scene}: {row['figure']}")
         why = f'<td class="words wrong">{escape(str(row["refused"]))}</td>'
-        yield f"<tr><td>{_who(one)}</td><td>{named}</td>{why}</tr>"
+        yield f"<tr><td>{_who(entry)}</td><td>{named}</td>{why}</tr>"
     yield "</table></div>"
 
 
@@ -223,7 +229,7 @@ def _who(entry: Entry) -> str:
     more = [f"driver {who['driver']}", who["processor"], f"clpt {who['clpt']} {who['commit']}"]
     more.append(str(who["date"])[:10])
     busy = who["load"] is not None and who["cores"] and who["load"] > 1.5 * who["cores"]
-    text = escape(", ".join(str(one).strip() for one in more))
+    text = escape(", ".join(str(part).strip() for part in more))
     text += ', <span class="wrong">the machine did other work too</span>' if busy else ""
     return f'{escape(str(who["device"]))}<div class="faint">{text}</div>'
 

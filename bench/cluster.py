@@ -62,15 +62,15 @@ def together(scene: Any, client: Any, samples: int) -> tuple[float, float]:
 
 def noisy(scene: Any, client: Any, started: Any, noise: float) -> float:
     """Return processor time of a process over a cluster's, at the same noise."""
-    with clpt.Renderer(scene, threads=WORKERS) as one, ClusterRenderer(scene, client) as several:
-        for renderer in (one, several):
+    with clpt.Renderer(scene, threads=WORKERS) as single, ClusterRenderer(scene, client) as several:
+        for renderer in (single, several):
             renderer.run(1)
         before = processor_time(started)
-        one.run(MOST, noise=noise)
+        single.run(MOST, noise=noise)
         between = processor_time(started)
         several.run(MOST, noise=noise)
         after = processor_time(started)
-        films = [tasks.film_digest(renderer.film_state()) for renderer in (one, several)]
+        films = [tasks.film_digest(renderer.film_state()) for renderer in (single, several)]
     if films[0] != films[1]:
         raise SystemExit("the cluster's film differs from that of one process")
     return (between - before) / (after - between)
@@ -78,7 +78,7 @@ def noisy(scene: Any, client: Any, started: Any, noise: float) -> float:
 
 def processor_time(processes: Any) -> float:
     """Return the processor time of these processes and this process so far [s]."""
-    times = [psutil.Process(one.pid).cpu_times() for one in processes]
+    times = [psutil.Process(process.pid).cpu_times() for process in processes]
     return time.process_time() + sum(t.user + t.system for t in times)
 
 
@@ -119,7 +119,7 @@ def main() -> None:
         "cpu": round(statistics.median(r["cpu"] for r in rounds), 3),
         "first": round(statistics.median(r["first"] for r in rounds), 2),
         **({"noise": args.noise} if args.noise else {}),
-        "rounds": [{name: round(value, 3) for name, value in one.items()} for one in rounds],
+        "rounds": [{name: round(value, 3) for name, value in r.items()} for r in rounds],
     }))  # fmt: skip
 
 

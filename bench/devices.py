@@ -31,10 +31,10 @@ def parts(cores: int) -> list[dev.Device]:
     """Parts of a CPU with so many cores each."""
     info = dev.choose().info
     counts = [cl.device_partition_property.BY_COUNTS, *[cores] * (info.compute_units // cores), 0]
-    found = info.cl_device.create_sub_devices(counts)
+    sub_devices = info.cl_device.create_sub_devices(counts)
     return [
         dev.Device.open(dataclasses.replace(info, cl_device=part, compute_units=cores))
-        for part in found
+        for part in sub_devices
     ]
 
 
@@ -53,23 +53,25 @@ def measure(path: Path, devices: list[dev.Device], seconds: float, rounds: int, 
     for renderer in (*alone, together):
         renderer.run(4 * len(devices))
     lengths = [max(1, round(seconds * 8 / timed(renderer, 8)[0])) for renderer in alone]
-    found: dict[str, list[float]] = {"alone": [], "together": [], "efficiency": [], "by_cpu": []}
+    figures: dict[str, list[float]] = {"alone": [], "together": [], "efficiency": [], "by_cpu": []}
     for _ in range(rounds):
         times = [timed(*pair) for pair in zip(alone, lengths, strict=True)]
         both = timed(together, sum(lengths))
-        rates = [length / own[0] for length, own in zip(lengths, times, strict=True)]
-        cpu = sum(own[1] for own in times)
-        found["alone"].append(sum(rates))
-        found["together"].append(sum(lengths) / both[0])
-        found["efficiency"].append(found["together"][-1] / found["alone"][-1])
-        found["by_cpu"].append(cpu / both[1])
+        rates = [
+            length / wall_and_cpu[0] for length, wall_and_cpu in zip(lengths, times, strict=True)
+        ]
+        cpu = sum(wall_and_cpu[1] for wall_and_cpu in times)
+        figures["alone"].append(sum(rates))
+        figures["together"].append(sum(lengths) / both[0])
+        figures["efficiency"].append(figures["together"][-1] / figures["alone"][-1])
+        figures["by_cpu"].append(cpu / both[1])
     began = time.perf_counter()
     together.image()
     picture = time.perf_counter() - began
     shares = [round(share.share, 3) for share in together.shares]
     for renderer in (*alone, together):
         renderer.close()
-    medians = {name: statistics.median(values) for name, values in found.items()}
+    medians = {name: statistics.median(values) for name, values in figures.items()}
     return {
         "scene": path.stem, "devices": len(devices), "size": size, "seconds": seconds,
         **medians, "picture_ms": 1e3 * picture, "shares": shares,

@@ -119,8 +119,8 @@ class Contender:
         if self.options is None:
             variant = f"llvm_ad_{self.mode}"
             return ["-c", MITSUBA, variant, str(self.file), str(spp), str(seed), str(out)]
-        given = ["--mode", self.mode, "--spp", str(spp), "--seed", str(seed), "-o", str(out)]
-        return ["-m", "clpt", "render", str(self.file), *self.options, *given, "--quiet"]
+        options = ["--mode", self.mode, "--spp", str(spp), "--seed", str(seed), "-o", str(out)]
+        return ["-m", "clpt", "render", str(self.file), *self.options, *options, "--quiet"]
 
 
 def watched(command: Sequence[str], cores: Sequence[int], caches: Path) -> tuple[float, float, int]:
@@ -129,12 +129,12 @@ def watched(command: Sequence[str], cores: Sequence[int], caches: Path) -> tuple
     folders = {name: str(caches / name) for name in ("XDG_CACHE_HOME", "POCL_CACHE_DIR")}
     for folder in folders.values():
         os.makedirs(folder, exist_ok=True)
-    given = {**os.environ, **folders, "POCL_MAX_PTHREAD_COUNT": str(len(cores))}
+    environment = {**os.environ, **folders, "POCL_MAX_PTHREAD_COUNT": str(len(cores))}
     report = caches / "report.json"
     watch = [sys.executable, "-I", "-S", "-c", WATCH, str(report)]
     held = ["taskset", "-c", ",".join(map(str, cores)), *watch, *command]
     with tempfile.TemporaryFile("w+") as words:
-        done = subprocess.run(held, cwd=machine.ROOT, env=given, stdout=words, stderr=words)
+        done = subprocess.run(held, cwd=machine.ROOT, env=environment, stdout=words, stderr=words)
         if done.returncode:
             words.seek(0)
             last = (words.read().strip().splitlines() or [f"status {done.returncode}"])[-1]
@@ -175,11 +175,11 @@ def with_film(
     width, as_file = settings.width, settings.as_file
     tree = ET.parse(scene)
     root = tree.getroot()
-    given = {e.get("name", ""): e.get("value", "") for e in root.iter("default")}
+    values = {e.get("name", ""): e.get("value", "") for e in root.iter("default")}
 
     def value(element: ET.Element) -> str:
         text = element.get("value", "")
-        return given.get(text[1:], text) if text.startswith("$") else text
+        return values.get(text[1:], text) if text.startswith("$") else text
 
     (film, *_) = root.iter("film")
     old = {e.get("name"): int(value(e)) for e in film if e.get("name") in ("width", "height")}
@@ -200,7 +200,7 @@ def with_film(
         for_spectra(root)
     for integrator in root.iter("integrator"):
         name = integrator.get("type", "")
-        if name.startswith("$") and name[1:] not in given:
+        if name.startswith("$") and name[1:] not in values:
             integrator.set("type", "path")
     folder.mkdir()
     for beside in scene.resolve().parent.iterdir():
@@ -257,8 +257,8 @@ def in_mode(scene: Path, mode: str, settings: Settings) -> list[Row]:
             "means": [round(mean, 6) for mean in means],
         }
         for number in settings.threads:
-            found = figures(contenders(number), settings.spp, long)
-            rows += [{**about, "threads": number, **pair} for pair in pairs(found)]
+            measured = figures(contenders(number), settings.spp, long)
+            rows += [{**about, "threads": number, **pair} for pair in pairs(measured)]
     return rows
 
 
@@ -294,28 +294,28 @@ def figures(
         for samples in (1, spp)
     )
     reference = (long[0] + long[1]) / 2
-    own = relative_mse(long[0], reference)  # which is that of the reference
-    pixels, found = reference.shape[0] * reference.shape[1], {}
+    reference_error = relative_mse(long[0], reference)  # which is that of the reference
+    pixels, figures_of_names = reference.shape[0] * reference.shape[1], {}
     for name in contenders:
         start = min(run["path" if name == "guiding" else name].cpu for run in warm)
         cpu = min(run[name].cpu for run in full) - start
         errors = [relative_mse(run[name].image, reference) for run in full]
-        found[name] = {
+        figures_of_names[name] = {
             "msamples": round(pixels * (spp - 1) / cpu / 1e6, 4),
-            "relmse": round(float(np.mean(errors)) - own, 6),
+            "relmse": round(float(np.mean(errors)) - reference_error, 6),
             "busy": round(max(run[name].cpu / run[name].seconds for run in full), 2),
             "first_warm": round(min(run[name].cpu for run in warm), 2),
             "peak_mib": round(max(run[name].peak for run in full) / 2**20),
         }
-    return found
+    return figures_of_names
 
 
-def pairs(found: dict[str, Row]) -> list[Row]:
+def pairs(figures_by_name: dict[str, Row]) -> list[Row]:
     """Return a row for each way of clpt beside each sampler of Mitsuba; clpt first in lists."""
     rows = []
-    for way in (name for name in found if name in WAYS):
+    for way in (name for name in figures_by_name if name in WAYS):
         for sampler in SAMPLERS:
-            ours, theirs = found[way], found[f"mitsuba {sampler}"]
+            ours, theirs = figures_by_name[way], figures_by_name[f"mitsuba {sampler}"]
             rate = ours["msamples"] / theirs["msamples"]
             rows.append({
                 "way": way,
@@ -377,13 +377,17 @@ way_option = click.option(
 @click.option("--long", default=512, show_default=True, help="samples a pixel of the references")
 @click.option("--as-file", is_flag=True, help="with each file's own pixel filter")
 @click.option("--json", "json_file", type=click.Path(), help="append the figures as JSON lines")
-def main(scenes: tuple[str, ...], assets: Path | None, json_file: str | None, **given: Any) -> None:
+def main(
+    scenes: tuple[str, ...], assets: Path | None, json_file: str | None, **options: Any
+) -> None:
     find_llvm()
     every = list(scenes) or list(SCENES)
     if assets is not None:
         every += [str(path) for path in sorted(assets.glob("mitsuba/*/*.xml"))]
     usual = {"modes": ("rgb", "spectral"), "threads": (1, 2)}
-    settings = Settings(**{name: value or usual.get(name, value) for name, value in given.items()})
+    settings = Settings(
+        **{name: value or usual.get(name, value) for name, value in options.items()}
+    )
     table = Table(*HEADINGS, title=f"{machine.processor()}; clpt / Mitsuba")
     with tempfile.TemporaryDirectory() as folder:
         for name in every:

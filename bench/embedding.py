@@ -74,9 +74,9 @@ def measure(call: Callable[[int], cl.Event], rounds: int) -> tuple[float, float]
     """Medians of the thread's time [us] and of the time until it is done [ms]."""
     python, done = [], []
     for i in range(rounds + 2):
-        start, own = time.perf_counter(), time.thread_time()
+        start, thread_seconds = time.perf_counter(), time.thread_time()
         event = call(i)
-        python.append(time.thread_time() - own)
+        python.append(time.thread_time() - thread_seconds)
         event.wait()
         done.append(time.perf_counter() - start)
     return 1e6 * statistics.median(python[2:]), 1e3 * statistics.median(done[2:])
@@ -86,13 +86,13 @@ def measure(call: Callable[[int], cl.Event], rounds: int) -> tuple[float, float]
 @click.option("--rounds", default=300, show_default=True)
 @click.option("--json", "json_file", type=click.Path(), help="append the figures as JSON lines")
 def main(rounds: int, json_file: str | None) -> None:
-    own = device.choose()
+    chosen = device.choose()
     table = Table("call", "python [us]", "done [ms]", title=machine.processor())
-    renderer = clpt.Renderer(scene(), queue=own.queue)
+    renderer = clpt.Renderer(scene(), queue=chosen.queue)
     for name, call in calls(renderer).items():
         python, done = measure(call, rounds)
         table.add_row(name, f"{python:.0f}", f"{done:.2f}")
-        row = {"device": own.info.label, "query": name, "python_us": python, "done_ms": done}
+        row = {"device": chosen.info.label, "query": name, "python_us": python, "done_ms": done}
         machine.append(json_file, "embedding", [row])
     machine.console().print(table)
 

@@ -41,7 +41,7 @@ class Figure:
 
 def figures(root: Path = ROOT) -> list[Figure]:
     """Measure a checkout."""
-    return [found for measure in MEASURES for found in measure(root)]
+    return [figure for measure in MEASURES for figure in measure(root)]
 
 
 def functions(root: Path) -> Iterator[Figure]:
@@ -95,9 +95,9 @@ def types(root: Path) -> Iterator[Figure]:
     for name, pattern in (("getattr(", r"getattr\("), (": Any", r": Any\b")):
         yield _sum(name, ((len(re.findall(pattern, file.text)), place) for place, file in files))
     aliases = [
-        (1, f"{place}:{file.line_of(found.start())} {found[1]}")
+        (1, f"{place}:{file.line_of(match.start())} {match[1]}")
         for place, file in files
-        for found in python_files.ARRAY.finditer(file.text)
+        for match in python_files.ARRAY.finditer(file.text)
         if place != "clpt/arrays.py"
     ]
     yield _sum("aliases of array types outside clpt/arrays.py", aliases)
@@ -113,31 +113,31 @@ def sizes(root: Path) -> Iterator[Figure]:
 
 def circles(root: Path) -> Iterator[Figure]:
     """Yield rooms in circles of imports; see bench.imports.rooms."""
-    found = [
+    circles_of_rooms = [
         (len(circle), ", ".join(circle))
         for links in imports.rooms(root).values()
         for circle in imports.circles(links)
     ]
-    yield _sum("rooms in circles of imports", found)
+    yield _sum("rooms in circles of imports", circles_of_rooms)
 
 
 def ways(root: Path) -> Iterator[Figure]:
     """Functions that see a whole scene between `clpt.render` and the tables; see bench.walks."""
-    found = walks.stays(root)
-    yield Figure("stays of a scene from render() to the tables", len(found), tuple(found))
-    rooms = tuple(dict.fromkeys(place.partition(" ")[0] for place in found))
+    stays = walks.stays(root)
+    yield Figure("stays of a scene from render() to the tables", len(stays), tuple(stays))
+    rooms = tuple(dict.fromkeys(place.partition(" ")[0] for place in stays))
     yield Figure("rooms of these stays", len(rooms), rooms)
 
 
 def words(root: Path) -> Iterator[Figure]:
     """Docstrings that cannot be understood alone."""
-    found = [
+    dependent = [
         (1, f"{place}:{docstring.line} {docstring.name}: {docstring.text.splitlines()[0]}")
         for place, file in _python(root)
         for docstring in file.docstrings
         if python_files.DEPENDENT.match(docstring.text)
     ]
-    yield _sum("docstrings that begin with What, Of, How, Those, The same", found)
+    yield _sum("docstrings that begin with What, Of, How, Those, The same", dependent)
 
 
 def programs(root: Path) -> Iterator[Figure]:
@@ -171,9 +171,9 @@ def _lines(text: str) -> int:
 
 def _listed(counted: Counted) -> tuple[str, ...]:
     """The places that count, the worst first, each with its figure where they differ."""
-    found = sorted((entry for entry in counted if entry[0]), key=lambda entry: -entry[0])
-    alike = len({count for count, _ in found}) == 1
-    return tuple(where if alike else f"{where}: {count}" for count, where in found)
+    ordered = sorted((entry for entry in counted if entry[0]), key=lambda entry: -entry[0])
+    alike = len({count for count, _ in ordered}) == 1
+    return tuple(where if alike else f"{where}: {count}" for count, where in ordered)
 
 
 def _over(name: str, counted: Counted, limit: int) -> Figure:
@@ -184,14 +184,14 @@ def _over(name: str, counted: Counted, limit: int) -> Figure:
 
 def _most(name: str, counted: Counted) -> Figure:
     """The largest of some."""
-    found = list(counted)
-    return Figure(name, max((count for count, _ in found), default=0), _listed(found)[:10])
+    counts = list(counted)
+    return Figure(name, max((count for count, _ in counts), default=0), _listed(counts)[:10])
 
 
 def _sum(name: str, counted: Counted) -> Figure:
     """The sum of some."""
-    found = list(counted)
-    return Figure(name, sum(count for count, _ in found), _listed(found))
+    counts = list(counted)
+    return Figure(name, sum(count for count, _ in counts), _listed(counts))
 
 
 @click.command()
@@ -200,11 +200,11 @@ def _sum(name: str, counted: Counted) -> Figure:
 @click.option("--bounds", is_flag=True, help="Print the table of tests/test_house.py.")
 def main(where: bool, as_json: bool, bounds: bool) -> None:
     """Measure this checkout."""
-    found = figures()
+    measured = figures()
     if as_json:
-        click.echo(json.dumps({figure.name: figure.value for figure in found}))
+        click.echo(json.dumps({figure.name: figure.value for figure in measured}))
         return
-    for figure in found:
+    for figure in measured:
         if bounds:
             rounded = -(-figure.value // SPARE) * SPARE if figure.name in SIZES else figure.value
             click.echo(f'    "{figure.name}": {rounded:_},')

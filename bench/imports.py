@@ -19,9 +19,9 @@ Graph = dict[str, set[str]]
 def imports(path: Path, root: Path = ROOT) -> dict[str, int]:
     """Return the full names of imports of a file, and of their attributes, with lines."""
     return {
-        name: found.line
-        for found in read(path, root).imports
-        for name in (found.module, *(f"{found.module}.{part}" for part in found.names))
+        name: statement.line
+        for statement in read(path, root).imports
+        for name in (statement.module, *(f"{statement.module}.{part}" for part in statement.names))
     }
 
 
@@ -37,7 +37,11 @@ def graph(root: Path = ROOT, by_name: bool = True) -> Graph:
     links: Graph = {}
     for name, path in known.items():
         file = read(path, root)
-        taken = [(found.module, part) for found in file.imports for part in found.names or [""]]
+        taken = [
+            (statement.module, part)
+            for statement in file.imports
+            for part in statement.names or [""]
+        ]
         targets = {f"{m}.{part}" if f"{m}.{part}" in known else m for m, part in taken}
         for pattern in file.loaded if by_name else ():
             targets |= {other for other in known if re.fullmatch(pattern, other)}
@@ -63,9 +67,11 @@ def rooms(root: Path = ROOT) -> dict[str, Graph]:
             for name, full in inside.items()
             if full.startswith(f"{house}.")
         }
-        houses[house] = {own: set() for own in room.values()}
-        for name, own in room.items():
-            houses[house][own] |= {room[other] for other in links[name] if other in room} - {own}
+        houses[house] = {module_room: set() for module_room in room.values()}
+        for name, module_room in room.items():
+            houses[house][module_room] |= {
+                room[other] for other in links[name] if other in room
+            } - {module_room}
     return houses
 
 
@@ -91,12 +97,12 @@ def circle(links: Mapping[str, set[str]]) -> list[str]:
 def circles(links: Mapping[str, set[str]]) -> list[list[str]]:
     """The sets of two nodes or more that all reach each other, each as large as can be."""
     reached = {node: _reached(links, node) for node in links}
-    found: list[list[str]] = []
+    groups: list[list[str]] = []
     for node in links:
-        own = sorted({other for other in reached[node] if node in reached[other]} | {node})
-        if len(own) > 1 and own not in found:
-            found.append(own)
-    return found
+        group = sorted({other for other in reached[node] if node in reached[other]} | {node})
+        if len(group) > 1 and group not in groups:
+            groups.append(group)
+    return groups
 
 
 def _reached(links: Mapping[str, set[str]], start: str) -> set[str]:

@@ -67,8 +67,8 @@ def read(path: Path, root: Path) -> PythonFile:
     name = full_name(path, root)
     functions, docstrings, imports = [], [], []
     fields: dict[str, int] = {}
-    if found := _docstring(tree, "the module"):
-        docstrings.append(found)
+    if dependent := _docstring(tree, "the module"):
+        docstrings.append(dependent)
     for node in _statements(tree):
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             functions.append(_function(node))
@@ -82,9 +82,9 @@ def read(path: Path, root: Path) -> PythonFile:
             module = ".".join(part for part in (package, node.module or "") if part)
             imports.append(Import(node.lineno, module, tuple(a.name for a in node.names)))
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)) and (
-            found := _docstring(node, node.name)
+            dependent := _docstring(node, node.name)
         ):
-            docstrings.append(found)
+            docstrings.append(dependent)
     loaded, prints = [], []
     if re.search(r"\b(import_module|__import__|print)\(", text):  # else no call needs a look
         for called, call in _calls(tree):

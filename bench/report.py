@@ -68,8 +68,10 @@ def renders(rows: Sequence[Row]) -> str:
 
 def stages(rows: Sequence[Row]) -> str:
     """Where clpt's time goes, milliseconds per million closest-hit rays."""
-    found = [row for row in rows if "stages" in row]
-    names = list(dict.fromkeys(name for row in found for name in row["stages"]["milliseconds"]))
+    with_stages = [row for row in rows if "stages" in row]
+    names = list(
+        dict.fromkeys(name for row in with_stages for name in row["stages"]["milliseconds"])
+    )
 
     def cells(row: Row) -> list[str]:
         taken = row["stages"]["milliseconds"]
@@ -78,7 +80,7 @@ def stages(rows: Sequence[Row]) -> str:
         return [row["scene"], row["mode"], row["stages"]["layout"], *each]
 
     text = "Milliseconds per million closest-hit rays, by the device's clock:\n\n"
-    return text + table(["scene", "mode", "layout", *names], map(cells, found))
+    return text + table(["scene", "mode", "layout", *names], map(cells, with_stages))
 
 
 def starting(rows: Sequence[Row]) -> str:
@@ -139,8 +141,8 @@ def efficiency(rows: Sequence[Row]) -> str:
     """Scenes as their files are, clpt's figure before Mitsuba's; seconds of processor time."""
     best = best_ways(rows)
 
-    def cells(found: Sequence[Row]) -> list[str]:
-        row, *others = found
+    def cells(pair: Sequence[Row]) -> list[str]:
+        row, *others = pair
         pairs = ("msamples", "relmse", "busy", "first_warm", "peak_mib")
         return [
             *(str(row[name]) for name in ("scene", "mode", "threads")),
@@ -149,7 +151,7 @@ def efficiency(rows: Sequence[Row]) -> str:
             "the file's" if sampler_of(row) == "file" else "multijitter",
             row.get("way", "file"),
             *(f"**{row[name]:.2f}**" for name in ("efficiency_ratio", "rate_ratio")),
-            ", ".join(f"{one['way']} {one['efficiency_ratio']:.2f}" for one in others),
+            ", ".join(f"{row['way']} {row['efficiency_ratio']:.2f}" for row in others),
             *(" / ".join(f"{v:g}" for v in row.get(name, ())) for name in pairs),
         ]
 
@@ -190,16 +192,19 @@ def hard_light(rows: Sequence[Row]) -> str:
     """Caustics: errors after equal processor time, and the light that was found."""
 
     def cells(row: Row) -> list[str]:
-        own = [str(row[name]) for name in ("scene", "renderer", "cpu", "samples", "seeds")]
+        texts = [str(row[name]) for name in ("scene", "renderer", "cpu", "samples", "seeds")]
         for part in ("direct", "sharp"):
-            found = row.get(part)
-            assert found is None or isinstance(found, dict)
-            own += (
-                [f"{found['relmse']:.2g}", f"{found['light']:.3f} ({found['light_kept']:.3f})"]
-                if found
+            part_figures = row.get(part)
+            assert part_figures is None or isinstance(part_figures, dict)
+            texts += (
+                [
+                    f"{part_figures['relmse']:.2g}",
+                    f"{part_figures['light']:.3f} ({part_figures['light_kept']:.3f})",
+                ]
+                if part_figures
                 else ["", ""]
             )
-        return own
+        return texts
 
     headings = ["scene", "method", "seconds", "samples", "seeds", "relMSE, direct", "light"]
     return table([*headings, "relMSE, sharp", "light"], map(cells, rows))
@@ -232,9 +237,9 @@ def geometric_means(rows: Sequence[Row]) -> str:
     lines = [
         f"- {mode}, {threads} thread(s), {runtime}, {'the file' if as_file else 'box'}'s filter, "
         f"Mitsuba's {'best sampler' if sampler == 'best' else 'sampler by the file'}: "
-        f"geometric mean {np.exp(np.mean(np.log(found))):.2f}, least {min(found):.2f}, "
-        f"of {len(found)} scenes"
-        for (mode, threads, runtime, as_file, sampler), found in groups.items()
+        f"geometric mean {np.exp(np.mean(np.log(ratios))):.2f}, least {min(ratios):.2f}, "
+        f"of {len(ratios)} scenes"
+        for (mode, threads, runtime, as_file, sampler), ratios in groups.items()
     ]
     return "\n".join(["Efficiency over Mitsuba's:", "", *lines, ""])
 
@@ -337,12 +342,14 @@ def page(machines: dict[str, list[Row]]) -> str:
 
 def machines() -> dict[str, list[Row]]:
     """All records, by their processor and its cores."""
-    found: dict[str, list[Row]] = {}
+    by_machine: dict[str, list[Row]] = {}
     for file in sorted(RESULTS.glob("2*.jsonl")):
         for line in file.read_text(encoding="utf-8").splitlines():
             record = json.loads(line)
-            found.setdefault(f"{record['processor']}, {record['cores']} cores", []).append(record)
-    return found
+            by_machine.setdefault(f"{record['processor']}, {record['cores']} cores", []).append(
+                record
+            )
+    return by_machine
 
 
 def write() -> Path:

@@ -45,18 +45,20 @@ def texts(lowered: Lowered) -> str:
     """The hash of all programs that a scene can ask for."""
     hashed = hashlib.sha256()
     for layout in LAYOUTS:
-        made = {}
-        for number, own in enumerate(lowered.features.passes):
+        by_name = {}
+        for number, pass_features in enumerate(lowered.features.passes):
             for lanes in LANES:
                 for interleaved in (False, True):
                     asked = {"queued": lanes == 1, "interleaved": interleaved}
-                    given = programs.sources(own, layout, lanes, **asked)
-                    made |= {f"{number} {lanes} {interleaved} {k}": v for k, v in given.items()}
+                    sources = programs.sources(pass_features, layout, lanes, **asked)
+                    by_name |= {
+                        f"{number} {lanes} {interleaved} {k}": v for k, v in sources.items()
+                    }
         looped = programs.loop_sources(lowered.features, layout, 8, True)
-        made |= {f"loop {name}": source for name, source in looped.items()}
+        by_name |= {f"loop {name}": source for name, source in looped.items()}
         for make in (programs.film_sources, programs.noise_sources):
-            made |= make(lowered.features, layout)
-        for name, source in sorted(made.items()):
+            by_name |= make(lowered.features, layout)
+        for name, source in sorted(by_name.items()):
             hashed.update(f"{layout} {name}\n{source.text}\n".encode())
     return hashed.hexdigest()
 
@@ -89,22 +91,22 @@ def hashes(scene: Scene) -> tuple[str, str]:
 @click.option("--only", default="", help="Part of the names of the scenes to lower.")
 def main(compare: Path | None, only: str) -> None:
     """Print the hashes as JSON, or their differences from former hashes."""
-    made: dict[str, str] = {}
+    digests: dict[str, str] = {}
     for name, scene in cases(only):
         if only in name:
-            made[f"{name}: texts"], made[f"{name}: tables"] = hashes(scene)
+            digests[f"{name}: texts"], digests[f"{name}: tables"] = hashes(scene)
     for mode in picture_hashes.MODES:
         for cls in materials.LEAVES:
             if not only:
                 text = stages.functions_text(cls, mode)
-                made[f"functions {cls.kind} {mode}"] = hashlib.sha256(text.encode()).hexdigest()
+                digests[f"functions {cls.kind} {mode}"] = hashlib.sha256(text.encode()).hexdigest()
     if compare is None:
-        click.echo(json.dumps(made, indent=1))
+        click.echo(json.dumps(digests, indent=1))
         return
     former = json.loads(compare.read_text("utf-8"))
-    differ = [name for name in {**former, **made} if former.get(name) != made.get(name)]
+    differ = [name for name in {**former, **digests} if former.get(name) != digests.get(name)]
     differ = [name for name in differ if only in name]
-    click.echo("\n".join([*differ, f"{len(made) - len(differ)} of {len(made)} are equal"]))
+    click.echo("\n".join([*differ, f"{len(digests) - len(differ)} of {len(digests)} are equal"]))
     raise SystemExit(bool(differ))
 
 

@@ -70,9 +70,9 @@ def first_of_render(scene: Path, size: str, out: Path) -> float:
     process = subprocess.run(
         [sys.executable, "-c", FIRST_SAMPLE, "render", *options], stdout=subprocess.PIPE, text=True
     )
-    found = re.search(r"FIRST (\S+)", process.stdout)
-    assert found, process.stdout
-    return float(found[1]) - start
+    match = re.search(r"FIRST (\S+)", process.stdout)
+    assert match, process.stdout
+    return float(match[1]) - start
 
 
 class Client:
@@ -91,9 +91,9 @@ class Client:
         with urllib.request.urlopen(address) as answer:
             cookie = answer.headers["Set-Cookie"].split(";")[0]
         room = address.partition("?")[0].removeprefix("http://")
-        own = room.split("/")[0]
+        host = room.split("/")[0]
         self.stack = contextlib.ExitStack()
-        origin: Any = f"http://{own}"
+        origin: Any = f"http://{host}"
         headers, free = {"Cookie": cookie}, {"compression": None, "max_size": None}
         opened = connect(f"ws://{room}socket", origin=origin, additional_headers=headers, **free)
         self.socket: ClientConnection = self.stack.enter_context(opened)
@@ -156,21 +156,21 @@ def cold(scene: Path, size: str) -> dict[str, float]:
         for name in caches.values():
             os.makedirs(name)
         client = Client(scene, size, caches)
-        first, own = first_pictures(client)
+        first, first_own = first_pictures(client)
         client.close()
-    return {"cold_first": first, "cold_own": own}
+    return {"cold_first": first, "cold_own": first_own}
 
 
 def drags(client: Client, rounds: int) -> dict[str, float]:
     """Return seconds from drags to their pictures; the whole picture continues between drags."""
     while client.frame()["divider"] > 1:
         pass
-    taken, own = [], []
+    taken, latencies = [], []
     for _ in range(rounds):
         client.read_for(PAUSE)
         seconds, header = client.drag()
         taken.append(seconds)
-        own.append(seconds - header["waited"] - header["rendered"])
+        latencies.append(seconds - header["waited"] - header["rendered"])
     client.read_for(PAUSE)
     start, frames = time.monotonic(), 0
     while time.monotonic() < start + 2.0:
@@ -178,7 +178,7 @@ def drags(client: Client, rounds: int) -> dict[str, float]:
         frames += client.read_for(1 / 30)
     return {
         "drag_ms": 1e3 * statistics.median(taken),
-        "own_ms": 1e3 * statistics.median(own),
+        "own_ms": 1e3 * statistics.median(latencies),
         "divider": header["divider"],
         "per_second": frames / (time.monotonic() - start),
     }

@@ -33,10 +33,10 @@ class _Function:
         """Whether it sees the scene."""
         signature = self.code.args
         types = [
-            one.annotation
-            for one in (*signature.posonlyargs, *signature.args, *signature.kwonlyargs)
+            argument.annotation
+            for argument in (*signature.posonlyargs, *signature.args, *signature.kwonlyargs)
         ]
-        if any(one is not None and SCENE.search(ast.unparse(one)) for one in types):
+        if any(kind is not None and SCENE.search(ast.unparse(kind)) for kind in types):
             return True
         return any(
             isinstance(node, ast.Attribute)
@@ -61,13 +61,16 @@ def stays(root: Path, start: str = START) -> list[str]:
         if name in functions and name not in seen:
             seen.add(name)
             open_ += _called(functions[name])
-    found = [functions[name] for name in sorted(seen) if functions[name].stays]
-    return [f"{known[one.module].relative_to(root).as_posix()} {one.code.name}" for one in found]
+    staying = [functions[name] for name in sorted(seen) if functions[name].stays]
+    return [
+        f"{known[function.module].relative_to(root).as_posix()} {function.code.name}"
+        for function in staying
+    ]
 
 
 def _functions(known: dict[str, Path]) -> tuple[dict[str, _Function], dict[str, dict[str, str]]]:
     """The functions of all modules by their full names, and what names mean in each module."""
-    found: dict[str, _Function] = {}
+    functions: dict[str, _Function] = {}
     everywhere = {}
     for module, path in known.items():
         tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -77,7 +80,9 @@ def _functions(known: dict[str, Path]) -> tuple[dict[str, _Function], dict[str, 
                 inside = module.split(".") + ["__init__"] * (path.name == "__init__.py")
                 package = ".".join(inside[: len(inside) - node.level]) if node.level else ""
                 source = ".".join(part for part in (package, node.module or "") if part)
-                names |= {one.asname or one.name: f"{source}.{one.name}" for one in node.names}
+                names |= {
+                    alias.asname or alias.name: f"{source}.{alias.name}" for alias in node.names
+                }
         names |= {
             node.name: f"{module}.{node.name}"
             for node in tree.body
@@ -85,26 +90,28 @@ def _functions(known: dict[str, Path]) -> tuple[dict[str, _Function], dict[str, 
         }
         for node in tree.body:
             if isinstance(node, ast.FunctionDef):
-                found[f"{module}.{node.name}"] = _Function(module, "", names, node)
+                functions[f"{module}.{node.name}"] = _Function(module, "", names, node)
             for part in node.body if isinstance(node, ast.ClassDef) else ():
                 if isinstance(part, ast.FunctionDef):
-                    own = f"{module}.{node.name}"
-                    found[f"{own}.{part.name}"] = _Function(module, own, names, part)
-    return found, everywhere
+                    full_name = f"{module}.{node.name}"
+                    functions[f"{full_name}.{part.name}"] = _Function(
+                        module, full_name, names, part
+                    )
+    return functions, everywhere
 
 
-def _called(one: _Function) -> list[str]:
+def _called(function: _Function) -> list[str]:
     """Return the full names of functions that a function names."""
     types = {
         id(part)
-        for node in ast.walk(one.code)
+        for node in ast.walk(function.code)
         if isinstance(node, (ast.AnnAssign, ast.arg)) and node.annotation is not None
         for part in ast.walk(node.annotation)
     }
-    found = []
-    for node in ast.walk(one.code):
+    names = []
+    for node in ast.walk(function.code):
         if isinstance(node, (ast.Name, ast.Attribute)) and id(node) not in types:
             first, *attributes = ast.unparse(node).split(".")
-            name = ".".join([one.names.get(first, first), *attributes])
-            found += [name, f"{one.owner}.{'.'.join(attributes)}"]
-    return found
+            name = ".".join([function.names.get(first, first), *attributes])
+            names += [name, f"{function.owner}.{'.'.join(attributes)}"]
+    return names

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from clpt.scene import Film, Scene
     from clpt.version import VERSION as __version__
 
-_Cleaning = importlib.import_module("clpt.clean_logs").Cleaning
+_Cleaning = importlib.import_module("clpt.errors").Cleaning
 logging.getLogger("clpt").addHandler(_Cleaning())  # quiet until the program asks
 
 _HOMES = {  # the module of each name, and what it is called there

@@ -10,11 +10,15 @@ ClptError
 └── ClusterError            a RuntimeError: workers that cannot go on, or that disagree
 
 All of them can be pickled, with their attributes: an error of a worker reaches its parent whole.
+
+Messages of the log "clpt", and tracebacks, are cleaned of characters that control a terminal.
 """
 
 from __future__ import annotations
 
 import difflib
+import logging
+import traceback
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -171,3 +175,38 @@ class KernelBuildError(ClptError, RuntimeError):
 
 class ClusterError(ClptError, RuntimeError):
     """A render on several devices or machines that cannot go on; what was done is kept."""
+
+
+class Cleaning(logging.NullHandler):
+    """Cleans each message before the handlers of the program get it; prints nothing.
+
+    It is a handler of the logger "clpt". Python calls the handlers of parent loggers later.
+    """
+
+    def handle(self, record: logging.LogRecord) -> bool:
+        clean(record)
+        return True
+
+
+def clean(record: logging.LogRecord) -> None:
+    """Reduce a message to a line of at most LONGEST_WARNING characters.
+
+    Messages for debugging keep their lines, such as the log of a compiler.
+    """
+    try:
+        text = record.getMessage()
+    except Exception:  # the program's handlers tell of it
+        return
+    debug = record.levelno <= logging.DEBUG
+    record.msg = lines(text).replace("\n", "\n    ") if debug else one_line(text, LONGEST_WARNING)
+    record.args = ()
+    if record.exc_info and record.exc_info[1] is not None:
+        record.exc_text = traceback_of(record.exc_info[1])
+
+
+def traceback_of(error: BaseException) -> str:
+    """Return the traceback of an error, with the error's message on a single line."""
+    parts = traceback.format_exception(error)
+    of_python = (" ", "\n", "Traceback")  # other parts are the error's message
+    rows = [lines(part) if part.startswith(of_python) else one_line(part) + "\n" for part in parts]
+    return "".join(rows).rstrip("\n")

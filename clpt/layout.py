@@ -4,7 +4,7 @@ Every member consists of 4-byte words, so that no compiler pads anything; a test
 with the device. Four forms of text are made of a record:
 
 - `uniform_text`: a struct of scalars in memory, the same for all lanes (settings, cameras);
-- `row_text`: a lane struct and a loader that gathers one row per lane from a table of words;
+- `row_text`: a lane struct and a loader that gathers a row per lane from a table of words;
 - `slab_text`: a load and a store per member for slabs, where a word of all slots, or of a block of
   them, stands side by side (kernels/core/slab.cl);
 - `select_text`: a lane struct that is never in memory, its value of nothing and the choice of two.
@@ -283,7 +283,7 @@ class Record:
 def row_words(table: str, at: str, count: int, many: bool = False) -> tuple[list[str], list[str]]:
     """Return statements that read `count` words from `at` on, per lane, and each word's name.
 
-    Four at a time, see kernels/core/rows.cl; the last four may be some of those before. many: lanes
+    Four at a time, see kernels/core/rows.cl; the last four may repeat earlier words. many: lanes
     mostly read different rows, so that asking whether they read the same row costs more than it
     saves.
     """

@@ -27,7 +27,7 @@ PATH = Record(
         "vec3",
         "normal of the hemisphere that d was chosen from; 0: the whole sphere",
     ),
-    sampled_wo=("natural", "to where that surface sends light, see kernels/core/octahedral.cl"),
+    sampled_wo=("natural", "to where that surface sends light, see kernels/core/warp.cl"),
     sampled_gloss=("natural", "its gloss, see kernels/lights/receiver.cl"),
     null_distance=(
         "real",
@@ -109,7 +109,7 @@ SHADOW = Record(
     ),
 )
 
-# layers of the first samples of a pixel, as kernels/film/layers_record.cl puts them
+# layers of the first samples of a pixel, as kernels/film/layers.cl puts them
 LAYER_PLACES = (
     "albedo", "shading_normal", "geometric_normal", "depth", "z", "position", "uv", "motion",
     "shape_id", "primitive_id", "material_id", "denoising_albedo", "denoising_normal",
@@ -258,7 +258,7 @@ PHOTON = Record(
     p=("vec3", "where [m]"),
     power=("spectrum", "light that it stands for [W nm^-1]"),
     ratio=("spectrum", "density of the path at each wavelength, over the mean of the four"),
-    to_light=("natural", "direction to where it came from, see kernels/core/octahedral.cl"),
+    to_light=("natural", "direction to where it came from, see kernels/core/warp.cl"),
     normal=("natural", "geometric normal, likewise; in a medium its name"),
     mis_ratio=(
         "real",

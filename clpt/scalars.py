@@ -14,7 +14,7 @@ import numpy as np
 
 from clpt.errors import SceneError
 
-LARGEST = float(np.finfo(np.float32).max)  # number of a parameter: kernels have no larger ones
+LARGEST = float(np.finfo(np.float32).max)  # number of a parameter, as kernels have float32
 
 
 _PYTHON = {"b": bool, "i": int, "u": int, "f": float}  # by the kinds of NumPy's types

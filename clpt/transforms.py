@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Matrix as Matrix
 from clpt.errors import SceneError
@@ -151,6 +151,14 @@ def is_singular(matrix: ArrayLike) -> bool:
     if not lengths.all() or not (matrix[3].any()):
         return True
     return bool(abs(np.linalg.det(linear / lengths)) < SINGULAR_BELOW)
+
+
+def are_singular(matrices: ArrayLike) -> NDArray[np.bool_]:
+    """Return which affine matrices (n, 4, 4) flatten space, (n,), as `is_singular` says."""
+    linear = np.asarray(matrices, np.float64)[:, :3, :3]
+    lengths = np.linalg.norm(linear, axis=1, keepdims=True)
+    unit = linear / np.where(lengths > 0.0, lengths, 1.0)
+    return np.abs(np.linalg.det(unit)) < SINGULAR_BELOW
 
 
 def rigid(matrix: ArrayLike) -> Matrix:

@@ -61,9 +61,9 @@ def of_scenes(paths: Iterable[FilePath], modes: Iterable[str] = MODES) -> list[P
         except SceneError as error:
             click.echo(f"{path.name} is left out: {error}", err=True)
             continue
-        for one, mode in itertools.product(_ways(scene, path.name), modes):
+        for variant, mode in itertools.product(_ways(scene, path.name), modes):
             film = dataclasses.replace(scene.film, mode=mode)
-            features = lower(dataclasses.replace(one, film=film)).features
+            features = lower(dataclasses.replace(variant, film=film)).features
             for layout in LAYOUTS:
                 for stage, source in _sources(features, layout):
                     program = Program(source.text, stage, path.name, mode, source.registers)
@@ -82,9 +82,9 @@ def _ways(scene: Scene, name: str) -> list[Scene]:
 def longest(candidates: Iterable[Program], count: int) -> list[Program]:
     """Of each stage and mode the longest texts: what asks for most."""
     groups: dict[tuple[str, str], list[Program]] = {}
-    for program in sorted(candidates, key=lambda one: -len(one.text)):
+    for program in sorted(candidates, key=lambda candidate: -len(candidate.text)):
         groups.setdefault((program.stage, program.mode), []).append(program)
-    return [program for own in groups.values() for program in own[:count]]
+    return [program for programs in groups.values() for program in programs[:count]]
 
 
 def _sources(features: Features, layout: str) -> Iterator[tuple[str, device.Source]]:
@@ -94,8 +94,8 @@ def _sources(features: Features, layout: str) -> Iterator[tuple[str, device.Sour
         ("photons", "transport/photons/sort.cl"),
     ):
         yield name, device.assemble(root)
-    for own in features.passes:
-        yield from programs.sources(own, layout, 1, queued=True).items()
+    for pass_features in features.passes:
+        yield from programs.sources(pass_features, layout, 1, queued=True).items()
     yield from programs.film_sources(features, layout).items()
     yield from programs.noise_sources(features, layout).items()
 

@@ -47,19 +47,21 @@ def of_stages(rows: Iterable[Row]) -> list[Row]:
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         groups.setdefault((row["device"], row["stage"]), []).append(row)
-    found = []
-    for (device, stage), own in sorted(groups.items()):
-        built = [row for row in own if "error" not in row]
-        failed = {"failed": len(own) - len(built)} if len(own) > len(built) else {}
-        row = {"device": device, "stage": stage, "programs": len(own), **failed}
+    summaries = []
+    for (device, stage), rows_of_stage in sorted(groups.items()):
+        built = [row for row in rows_of_stage if "error" not in row]
+        failed = (
+            {"failed": len(rows_of_stage) - len(built)} if len(rows_of_stage) > len(built) else {}
+        )
+        row = {"device": device, "stage": stage, "programs": len(rows_of_stage), **failed}
         if built:
-            worst = max(built, key=lambda one: one["registers"])
+            worst = max(built, key=lambda kernel: kernel["registers"])
             row |= {name: worst[name] for name in ("scene", "mode", "registers")}
-            row["least"] = min(one["registers"] for one in built)
-            row["occupancy"] = min(one["occupancy"] for one in built)
-            row |= {name: max(one[name] for one in built) for name in LARGEST}
-        found.append(row)
-    return found
+            row["least"] = min(kernel["registers"] for kernel in built)
+            row["occupancy"] = min(kernel["occupancy"] for kernel in built)
+            row |= {name: max(kernel[name] for kernel in built) for name in LARGEST}
+        summaries.append(row)
+    return summaries
 
 
 def page(rows: list[Row], longest: int | None = None) -> str:
@@ -74,9 +76,9 @@ def page(rows: list[Row], longest: int | None = None) -> str:
     parts = [HEAD.replace("WHICH", some if longest else every)]
     for vendor in VENDORS:
         for device in vendor.devices:
-            own = [row for row in rows if row["device"] == device]
-            if own:
-                parts.append(_table(f"{vendor.name} {device}", own))
+            rows_of_device = [row for row in rows if row["device"] == device]
+            if rows_of_device:
+                parts.append(_table(f"{vendor.name} {device}", rows_of_device))
     return "\n".join(parts)
 
 
@@ -119,9 +121,11 @@ def plot(rows: list[Row], path: Path) -> None:
     figure = Figure(figsize=(8, 0.28 * len(stages) + 1))
     axes = figure.subplots()
     for number, device in enumerate(devices):
-        own = {row["stage"]: row for row in rows if row["device"] == device}
-        places = [i + 0.35 * number for i, stage in enumerate(stages) if stage in own]
-        lengths = [own[stage].get("registers", 0) for stage in stages if stage in own]
+        rows_by_stage = {row["stage"]: row for row in rows if row["device"] == device}
+        places = [i + 0.35 * number for i, stage in enumerate(stages) if stage in rows_by_stage]
+        lengths = [
+            rows_by_stage[stage].get("registers", 0) for stage in stages if stage in rows_by_stage
+        ]
         axes.barh(places, lengths, 0.35, label=device)
     for limit in (64, 96, 128):
         axes.axvline(limit, color="grey", linewidth=0.5, linestyle=":")

@@ -71,8 +71,8 @@ class Vendor:
 
     def only(self, devices: tuple[str, ...]) -> Vendor:
         """The vendor with these of its devices; all, where none is named."""
-        own = tuple(name for name in self.devices if not devices or name in devices)
-        return dataclasses.replace(self, devices=own)
+        chosen = tuple(name for name in self.devices if not devices or name in devices)
+        return dataclasses.replace(self, devices=chosen)
 
     def figures(self, text: str, device: str, limits: tuple[int, ...] = ()) -> Figures:
         """Compile a text; limits: of registers, to try. Raises CompilerError."""
@@ -85,8 +85,8 @@ class Vendor:
 def find(name: str) -> Path | None:
     """A compiler or library: of the folder that GPU_COMPILERS names, or installed."""
     for place in PLACES if (root := os.environ.get(FOLDER)) else ():
-        for found in sorted(Path(str(root)).glob(f"{place}/{name}")):
-            return found
+        for path in sorted(Path(str(root)).glob(f"{place}/{name}")):
+            return path
     if name.endswith(".bc"):
         installed = Path("/usr/lib/clc", name)
         return installed if installed.exists() else None
@@ -141,14 +141,14 @@ GEN = (
 
 def counted(names: Iterable[str], kinds: tuple[re.Pattern[str], ...]) -> tuple[int, int, int]:
     """How many instructions are of memory, of arithmetic, of special functions."""
-    counts = Counter(names)
-    found = [0, 0, 0]
-    for name, count in counts.items():
+    instructions = Counter(names)
+    counts = [0, 0, 0]
+    for name, count in instructions.items():
         for number, kind in enumerate(kinds):
             if kind.match(name):
-                found[number] += count
+                counts[number] += count
                 break
-    return found[0], found[2], found[1]
+    return counts[0], counts[2], counts[1]
 
 
 def size_of(elf: bytes, section: str = ".text") -> int:
@@ -295,11 +295,11 @@ def intel(text: str, device: str, folder: Path, limits: tuple[int, ...]) -> Figu
 def words(tokens: str, number: int) -> list[list[int]]:
     """The words of a binary's patch tokens of a number, each."""
     rows = re.findall(rf"Token {number}\n\s*4 Size \d+\n\s*Hex ([0-9a-f ]+)", tokens)
-    found = []
+    listed = []
     for row in rows:
         data = bytes(int(byte, 16) for byte in row.split())
-        found.append(list(struct.unpack(f"<{len(data) // 4}I", data[: len(data) // 4 * 4])))
-    return found
+        listed.append(list(struct.unpack(f"<{len(data) // 4}I", data[: len(data) // 4 * 4])))
+    return listed
 
 
 def most(pattern: str, said: str) -> int:

@@ -48,14 +48,14 @@ def compare(
     if not chosen.any():
         return None
     error = (image - reference) ** 2 / (reference**2 + 1e-2 * reference.mean() ** 2)
-    own, kept = error.mean(-1)[chosen], max(1, int(chosen.sum() * (1 - TRIM)))
-    order = np.argsort(own)[:kept]
-    found, there = image[chosen], reference[chosen]
+    pixel_errors, kept = error.mean(-1)[chosen], max(1, int(chosen.sum() * (1 - TRIM)))
+    order = np.argsort(pixel_errors)[:kept]
+    pixels, there = image[chosen], reference[chosen]
     return {
-        "relmse": float(own[order].mean()),
-        "relmse_all": float(own.mean()),
-        "light_kept": float(found[order].mean() / there[order].mean()),
-        "light": float(found.mean() / there.mean()),
+        "relmse": float(pixel_errors[order].mean()),
+        "relmse_all": float(pixel_errors.mean()),
+        "light_kept": float(pixels[order].mean() / there[order].mean()),
+        "light": float(pixels.mean() / there.mean()),
     }
 
 
@@ -70,11 +70,12 @@ def measure(scene: str, method: str, file: Path, seconds: float, seeds: int) -> 
         "samples": int(np.median([shot.samples for shot in shots])),
     }  # fmt: skip
     for part, chosen in (("all", direct | True), ("direct", direct), ("sharp", ~direct)):
-        found = [compare(shot.image, reference, chosen) for shot in shots]
-        known = [one for one in found if one is not None]
+        compared = [compare(shot.image, reference, chosen) for shot in shots]
+        known = [figures for figures in compared if figures is not None]
         if known:
             row[part] = {
-                name: float(f"{np.median([one[name] for one in known]):.4g}") for name in known[0]
+                name: float(f"{np.median([figures[name] for figures in known]):.4g}")
+                for name in known[0]
             }
     return row
 

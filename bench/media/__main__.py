@@ -37,10 +37,10 @@ def figures(passes: np.ndarray, reference: np.ndarray, seconds: float) -> dict[s
     count, total = len(values), values.sum(axis=0)
     scale = target**2 + (0.1 * target.mean()) ** 2
     errors = np.zeros(target.shape[:2])
-    for one in values:
+    for value in values:
         # The others' mean has an error of its own: 1 / (count - 1) of that of a pass.
-        own = (one - (total - one) / (count - 1)) ** 2 * (count - 1) / count
-        errors += (own / scale).mean(axis=-1) / count
+        pseudo_value = (value - (total - value) / (count - 1)) ** 2 * (count - 1) / count
+        errors += (pseudo_value / scale).mean(axis=-1) / count
     kept = np.sort(errors.ravel())[: int(errors.size * (1.0 - TRIM))].mean()
     means = values.mean(axis=(1, 2, 3)) / target.mean() - 1.0
     return {
@@ -64,9 +64,9 @@ def measure(name: str, mode: str, renderer: str, seconds: float, folder: Path) -
         [*command, mode, str(spp), str(seconds), str(out)],
         check=True, cwd=machine.ROOT, env=environment,
     )  # fmt: skip
-    with np.load(out) as made, np.load(HERE / "references" / f"{name}.npz") as kept:
-        passes, took = made["passes"], float(made["seconds"])
-        found = figures(passes, kept["mean"], took)
+    with np.load(out) as rendered, np.load(HERE / "references" / f"{name}.npz") as kept:
+        passes, took = rendered["passes"], float(rendered["seconds"])
+        measured = figures(passes, kept["mean"], took)
         pixels = passes[0].shape[0] * passes[0].shape[1]
     rate = pixels * spp / took / 1e6
     return {
@@ -75,7 +75,7 @@ def measure(name: str, mode: str, renderer: str, seconds: float, folder: Path) -
         "renderer": renderer,
         "spp": spp,
         "msamples": rate,
-        **found,
+        **measured,
     }
 
 
@@ -96,25 +96,27 @@ def unpack(folder: Path) -> None:
 def main(scenes: tuple[str, ...], modes: tuple[str, ...], seconds: float, path: str | None) -> None:
     table = Table("scene", "mode", "renderer", "Msamples/s", "relMSE 99 %", "eff. 99 %", "bias, %")
     rows: list[Row] = []
-    with tempfile.TemporaryDirectory() as made:
-        folder = Path(made)
+    with tempfile.TemporaryDirectory() as folder_name:
+        folder = Path(folder_name)
         unpack(folder)
         for name in scenes or SCENES:
             for mode in modes or ("rgb", "spectral"):
                 if name == "chroma_spectral" and mode == "rgb":
                     continue  # its extinction is a spectrum
-                own = [measure(name, mode, one, seconds, folder) for one in ("clpt", *PEERS)]
-                best = max(row["efficiency_99"] for row in own[1:])
-                own[0]["efficiency_ratio"] = own[0]["efficiency_99"] / best
-                rows += own
-                for row in own:
+                compared = [
+                    measure(name, mode, renderer, seconds, folder) for renderer in ("clpt", *PEERS)
+                ]
+                best = max(row["efficiency_99"] for row in compared[1:])
+                compared[0]["efficiency_ratio"] = compared[0]["efficiency_99"] / best
+                rows += compared
+                for row in compared:
                     ratio = f" ({row['efficiency_99'] / best:.2f})"
                     table.add_row(
                         name, mode, row["renderer"], f"{row['msamples']:.3f}",
                         f"{row['relmse_99']:.4g}", f"{row['efficiency_99']:.3g}{ratio}",
                         f"{row['bias'] * 100:+.2f} ± {row['bias_se'] * 100:.2f}",
                     )  # fmt: skip
-                machine.append(path, "media", own)
+                machine.append(path, "media", compared)
     machine.console().print(table)
     ratios = [row["efficiency_ratio"] for row in rows if "efficiency_ratio" in row]
     mean = float(np.exp(np.mean(np.log(ratios))))

@@ -45,8 +45,8 @@ def variances(file: Path, mode: str, spp: int, passes: int) -> NDArray[np.float6
     values = np.array(pictures)[:, ball]
     sums = np.stack([values.mean(axis=-1), values @ LUMINANCE], axis=-1)
     values = np.concatenate([values, sums], axis=-1)
-    found = np.sort(values.var(axis=0, ddof=1), axis=0)
-    return found[: int(len(found) * (1.0 - TRIM))].mean(axis=0) / values.mean(axis=(0, 1)) ** 2
+    ordered = np.sort(values.var(axis=0, ddof=1), axis=0)
+    return ordered[: int(len(ordered) * (1.0 - TRIM))].mean(axis=0) / values.mean(axis=(0, 1)) ** 2
 
 
 @click.command(help=__doc__)
@@ -60,20 +60,20 @@ def main(spp: int, passes: int, modes: tuple[str, ...], path: str | None) -> Non
         .read_text()
         .replace('"res" value="128"', '"res" value="64"')
     )
-    with tempfile.TemporaryDirectory() as made:
-        file = Path(made) / "ball.xml"
+    with tempfile.TemporaryDirectory() as folder_name:
+        file = Path(folder_name) / "ball.xml"
         for mode in modes or ("rgb", "spectral"):
-            found = []
-            for sigma in (", ".join(OWN), *(", ".join([one] * 3) for one in OWN)):
+            rows = []
+            for sigma in (", ".join(OWN), *(", ".join([number] * 3) for number in OWN)):
                 file.write_text(text.replace(", ".join(OWN), sigma))
-                found.append(variances(file, mode, spp, passes))
-            ratios = [found[0][c] / found[1 + c][c] for c in range(3)]
-            grey = np.exp(np.log(found[1:]).mean(axis=0))
+                rows.append(variances(file, mode, spp, passes))
+            ratios = [rows[0][c] / rows[1 + c][c] for c in range(3)]
+            grey = np.exp(np.log(rows[1:]).mean(axis=0))
             row = {
                 "mode": mode,
                 "channels": [round(float(r), 3) for r in ratios],
-                "mean": round(float(found[0][3] / grey[3]), 3),
-                "luminance": round(float(found[0][4] / grey[4]), 3),
+                "mean": round(float(rows[0][3] / grey[3]), 3),
+                "luminance": round(float(rows[0][4] / grey[4]), 3),
             }
             machine.console().print(row)
             machine.append(path, "colours", [{**machine.circumstances(), **row}])

@@ -16,7 +16,7 @@ import numpy as np
 
 from bench import machine
 from clpt.formats import volumes
-from clpt.render.lights.bricks import CELLS, Windows
+from clpt.render.lights.bodies import CELLS, Windows
 from clpt.render.media import grids
 
 CLOUD = "volumes/teapot_cloud/teapot_cloud.nvdb"

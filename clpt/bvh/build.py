@@ -23,7 +23,7 @@ from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh, Part
 
 log = logging.getLogger(__name__)
 
-BRUTE_LIMIT = 96  # triangles up to which brute force is faster; see bench/notes/traversal.md
+BRUTE_LIMIT = 96  # triangles: brute force is faster up to here; see bench/notes/traversal.md
 
 WIDE8_BYTES = 54  # of a triangle with its share of nodes, in large scenes
 MOST = (2**31 - 1) // 3  # triangles or vertices: kernels count their words by an int

@@ -28,7 +28,7 @@ def devices(json_wanted: bool, verbose: int) -> None:
     """
     from .. import device  # here: help needs no OpenCL
     from ..device import runtimes
-    from ..device.context import selection, trial
+    from ..device.choosing import selection, trial
     from .console import output_console, shown
     from .display import device_name
 
@@ -52,7 +52,7 @@ def devices(json_wanted: bool, verbose: int) -> None:
 
 def as_json(listed: tuple[DeviceInfo, ...], failures: dict[int, str | None]) -> dict[str, object]:
     """Return the facts of devices, and the chosen device. Raises DeviceError."""
-    from ..device.context import selection
+    from ..device.choosing import selection
 
     choice = selection()
     hidden = ("cl_device",)

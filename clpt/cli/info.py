@@ -73,7 +73,8 @@ def info(scene: Path, variables: dict[str, Any], as_json: bool) -> None:
 
     from .console import output_console, shown
 
-    table = Table(show_header=False, title=shown(scene), title_justify="left")
+    console, table = output_console(), Table(show_header=False)
     for name, value in contents.items():
         table.add_row(name.replace("_", " "), shown(value))
-    output_console().print(table)
+    console.print(shown(scene))
+    console.print(table)

@@ -17,7 +17,7 @@ from .options.records import with_records
 from .options.scene_options import denoise_option
 
 if TYPE_CHECKING:
-    from ..render.film.saved_film import SavedFilm
+    from ..render.film.film_file import SavedFilm
 
 
 @click.command()
@@ -46,7 +46,7 @@ def merge(
     """
     for film in films:
         locate(film)
-    from ..render.film.saved_film import other_devices  # here: help needs no OpenCL
+    from ..render.film.film_file import other_devices  # here: help needs no OpenCL
     from .display import display
     from .files import checkpoints, outputs
 

@@ -73,7 +73,7 @@ class Known:
 
 
 class Admission:
-    """The workers that may render in one run.
+    """The workers that may render in a run.
 
     fit: device classes by address, of workers with the job open; opening: calls of workers that
     prepare; there: addresses of all workers of the scheduler.

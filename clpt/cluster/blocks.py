@@ -144,7 +144,7 @@ class Blocks:
         self.workers[worker].note(block.samples, seconds)
 
     def _leaves_to_others(self, record: WorkerRecord) -> bool:
-        """Whether the fastest worker finishes all samples before this worker finishes one."""
+        """Whether the fastest worker finishes all samples before this worker finishes a sample."""
         fastest = max(other.rate for other in self.workers.values())
         return record.rate > 0.0 and self.left * record.rate < fastest
 

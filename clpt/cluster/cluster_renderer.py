@@ -226,9 +226,9 @@ class ClusterMaker(HostMaker):
     def plan(self, changes: Changes, events: dev.Events = None) -> Plan | None:
         """Return the plan of another scene, which workers open at the next call.
 
-        Records of workers stay; for another integrator there is no plan, as workers agree on one.
-        Raises SceneError for changes of a part of the scene. The plan raises SceneError for a scene
-        that cannot be written, and for custom materials.
+        Records of workers stay; for another integrator there is no plan, as workers agree on an
+        integrator. Raises SceneError for changes of a part of the scene. The plan raises SceneError
+        for a scene that cannot be written, and for custom materials.
         """
         if changes.integrator is not None:
             return None

@@ -275,7 +275,7 @@ class DevicesMaker(HostMaker):
 
 @dataclass(frozen=True, eq=False)
 class DevicesPlan(Plan):
-    """Changes of the scene on several devices, each of which plans and writes them."""
+    """Changes of the scene on several devices; each device plans and writes them."""
 
     maker: DevicesMaker
     changes: Changes

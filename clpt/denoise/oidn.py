@@ -16,12 +16,12 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of Rec. 709
 
 
 class Oidn:
-    """Denoises pictures of one view, which see the same surfaces.
+    """Denoises pictures that see the same surfaces.
 
     albedo: (h, w, 3) float32, 0 to 1; normal: likewise, -1 to 1; both or none. They are denoised
     first, by themselves, and then taken to be clean.
 
-    Raises SceneError where pyoidn is not installed, DeviceError for what the library refuses.
+    Raises SceneError where pyoidn is not installed, DeviceError for errors of the library.
     """
 
     def __init__(self, albedo: Image | None = None, normal: Image | None = None):

@@ -1,10 +1,10 @@
 """A denoiser without anything learned: averages over pixels that see the same light, by statistics.
 
 It runs on any OpenCL device. Two halves of a picture's samples tell the noise of each pixel; which
-pixels are alike, and how that decides, is in kernels/film/likeness.cl. It averages twice: the
+pixels are alike, and how that decides, is in kernels/stage/denoise.cl. It averages twice: the
 averages of the first time, which have less noise, decide the second time. The halves then tell the
-error of both averages, and the picture is what has the least of the averages and the noisy one: so
-it is not worse than that where errors can be told.
+error of both averages, and the picture is chosen among the averages and the noisy picture by the
+least error: so it is not worse than the noisy picture where errors can be estimated.
 
 All weights follow from colours, and are the same for bands: so spectra keep their shape.
 """
@@ -33,10 +33,10 @@ VECTORS = 4  # MOST_VALUES, kernels/stage/denoise.cl
 
 
 class Statistical:
-    """Denoises pictures of one view.
+    """Denoises pictures that see the same surfaces.
 
-    on: where; halves: (h, w, 3) float32 each, of even and of odd samples; albedo, normal: likewise,
-    or None. colours: (h, w, 3) float32, their picture without most of its noise.
+    on: the device; halves: (h, w, 3) float32 each, of even and of odd samples; albedo, normal:
+    likewise, or None. colours: (h, w, 3) float32, their picture without most of its noise.
 
     Raises KernelBuildError, MemoryBudgetError.
     """
@@ -162,7 +162,7 @@ class Statistical:
     ) -> Any:
         """Averages of `count` vectors a pixel; which: the first time or the second.
 
-        by: a guide and its variance, in the place of those of both halves.
+        by: a guide and its variance, in place of the guides of both halves.
         """
         guide, variance = (self._planes(image, 1) for image in by or self._guides[which])
         (albedo, normal), averaged = self._surfaces, self._allocate(count)

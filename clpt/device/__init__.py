@@ -3,16 +3,9 @@
 from .array import DeviceArray, supersede
 from .buffers import Buffers, Flag, host_buffer
 from .building import build, build_all, compile_ahead, link
+from .choosing import choose, choose_all, names_several, share_compilers
 from .compilers import Compilers, kill_compilers, spare_cores
-from .context import (
-    Device,
-    DeviceInfo,
-    choose,
-    choose_all,
-    devices,
-    names_several,
-    share_compilers,
-)
+from .context import Device, DeviceInfo, devices
 from .program import Argument, BoundKernel, Kernel, Program
 from .runtimes import refused, wait
 from .source import Part, Source, Virtual, assemble, kernels_folder

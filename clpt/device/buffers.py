@@ -55,7 +55,7 @@ class AllOrNothing:
 
 
 class Buffers:
-    """Buffers on one device within a budget.
+    """Buffers on a device within a budget.
 
     limit: bytes of all buffers together; by default the device's free memory.
     A buffer counts until its last reference is gone; `release` frees it at once.

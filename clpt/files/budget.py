@@ -1,7 +1,7 @@
 """Limits of a load in memory, time and parts: readers ask before they take what a file announces.
 
 A file of a few bytes can announce gigabytes. So each reader asks here before it allocates. A load
-has one account. The scene keeps it, and the preparation of the scene for its first sample draws
+has an account. The scene keeps it, and the preparation of the scene for its first sample draws
 from the same account. The contents of files are always allowed while there is memory; data that a
 small file expands to is limited. A scene without a file has the limit of the machine alone.
 """
@@ -44,7 +44,7 @@ class Budget:
 
     memory: [bytes], by default half of the available memory, at most 768 MiB and 256 bytes for each
     byte of the files; seconds: 600 by default; parts: elements, shapes, instances and textures, by
-    default 50 000 and one for each 4 bytes of the files. A repeated part counts each time.
+    default 50 000 and another for each 4 bytes of the files. A repeated part counts each time.
 
     Raises SceneError for a limit that is not above 0.
     """

@@ -1,4 +1,4 @@
-"""Files that other processes see whole or not at all: the only way in which clpt writes a file.
+"""Files that other processes see whole or not at all: clpt writes files only this way.
 
 A file is written under a name that begins with PARTIAL, and then renamed. The writer holds its
 lock. So a killed process left such a file if its lock is free. The next process that writes into
@@ -180,11 +180,10 @@ def replacing(path: str | Path, *, suffixed: bool = True, follow: bool = True) -
 
     The new file is in the same folder, and its content is on the disk before the old file goes. So
     an error, Ctrl-C, a full disk or a killed process leaves the old file as it was. A link stays a
-    link: the file that it names is replaced, but for some links of other users, see
-    `ownership.followed`. What is no regular file, such as a pipe, is yielded itself. suffixed:
-    whether the new file has the suffix of `path`, by which libraries choose a format, and others
-    find files to read. follow: False lets the new file take the place of a link or a pipe too.
-    Raises OSError.
+    link: the file that it names is replaced, but for some links of other users, see `followed`. A
+    pipe, or another file that is not regular, is yielded itself. suffixed: whether the new file has
+    the suffix of `path`: libraries choose a format by it, and other programs find files to read.
+    follow: False lets the new file take the place of a link or a pipe too. Raises OSError.
     """
     path = followed(path) if follow else Path(path)
     if follow and path.exists() and not path.is_file():

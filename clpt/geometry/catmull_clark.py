@@ -16,16 +16,16 @@ from clpt.arrays import Floats, Integers
 from clpt.geometry.polygons import smooth_normals
 
 INFINITE = 10.0  # sharpness that no level wears off
-LINKS = 64  # rounds in which corners around a vertex find each other
+LINKS = 64  # most rounds of the search for corners around a vertex
 
 
 @dataclass(frozen=True)
 class Cage:
-    """Polygons of a surface: counts (f,) and vertex of each corner (c,), with what is sharp.
+    """Polygons of a surface: counts (f,) and vertex of each corner (c,), with its creases.
 
     edges (e, 2), crease (e,): vertices and sharpness of creases. corner (n,): that of vertices.
-    smooth: how edges of one face go: "edgeOnly" and "edgeAndCorner" as curves, which do not stop
-    at corners of one face or do; "linear": as straight lines. "bilinear": nothing is smooth.
+    smooth: rule for boundary edges: "edgeOnly" makes them curves, "edgeAndCorner" curves that stop
+    at corners of a single face, "linear" straight lines. "bilinear": nothing is smooth.
     """
 
     counts: Integers
@@ -84,6 +84,8 @@ def normals(cage: Cage, points: Floats) -> tuple[Floats, Integers]:
     points: (n, 3) of a cage of quadrilaterals.
     """
     edges, quads = _edges(cage), cage.corners.reshape(-1, 4)
+    if not ((edges.sharp >= 1.0) & (edges.faces == 2)).any():
+        return _smooth(points, quads), cage.corners
     label = np.arange(len(cage.corners))
     following = np.roll(label.reshape(-1, 4), -1, axis=1).ravel()
     order = np.argsort(edges.of, kind="stable")
@@ -108,9 +110,13 @@ def normals(cage: Cage, points: Floats) -> tuple[Floats, Integers]:
     corner = corner.reshape(-1)
     at = np.zeros((int(corner.max()) + 1, 3))
     at[corner] = points[cage.corners]
-    own = corner.reshape(quads.shape)
-    triangles = np.concatenate([own[:, [0, 1, 2]], own[:, [0, 2, 3]]])
-    return smooth_normals(at, triangles).astype(np.float64), corner
+    return _smooth(at, corner.reshape(quads.shape)), corner
+
+
+def _smooth(points: Floats, quads: Integers) -> Floats:
+    """Return smooth normals of the vertices of quadrilaterals, (n, 3)."""
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return smooth_normals(points, triangles).astype(np.float64)
 
 
 def _edges(cage: Cage) -> _Edges:
@@ -134,7 +140,7 @@ def _edges(cage: Cage) -> _Edges:
 
 
 def _once(cage: Cage, values: Floats) -> tuple[Cage, Floats]:
-    """Return a cage and its values after one level."""
+    """Return a cage and its values after a level of subdivision."""
     edges, count = _edges(cage), len(values)
     face = np.repeat(np.arange(len(cage.counts)), cage.counts)
     middles = _added(len(cage.counts), face, values[cage.corners]) / cage.counts[:, None]
@@ -167,7 +173,7 @@ def _once(cage: Cage, values: Floats) -> tuple[Cage, Floats]:
 
 
 def _vertices(cage: Cage, edges: _Edges, values: Floats, middles: Floats) -> Floats:
-    """Return where the vertices of a cage go in one level."""
+    """Return the positions of a cage's vertices after a level of subdivision."""
     count = len(values)
     face = np.repeat(np.arange(len(cage.counts)), cage.counts)
     valence = np.bincount(edges.ends.ravel(), minlength=count)[:, None]

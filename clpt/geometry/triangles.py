@@ -73,9 +73,7 @@ def triangulate(
     return vertices, np.ascontiguousarray(faces), normals, uvs
 
 
-def counted(
-    shape: Shape,
-) -> tuple[Points, Faces, Points | None, Points | None, tuple[Flat, ...]]:
+def counted(shape: Shape) -> tuple[Points, Faces, Points | None, Points | None, tuple[Flat, ...]]:
     """Return what `triangulate` does, and whether it left some out."""
     flat: list[Flat] = []
     return *triangulate(shape, flat), tuple(flat)
@@ -130,10 +128,7 @@ def check_deformation(shape: Shape) -> None:
     if points is None:
         raise SceneError(f"a {shape.kind} that deforms needs {name} too", where=place)
     expected = np.shape(on_host(points))
-    with_radii = shape.kind == "spheres" and deformation.points.shape[1:] == (
-        *expected[:1],
-        4,
-    )
+    with_radii = shape.kind == "spheres" and deformation.points.shape[1:] == (*expected[:1], 4)
     if deformation.points.shape[1:] != expected and not with_radii:
         message = f"its keys have {deformation.points.shape[1:]} where {name} are {expected}"
         raise SceneError(message, where=place)

@@ -1,8 +1,8 @@
 """Files of pictures as (h, w, c) float32 arrays, and back; row 0 is the top.
 
 Every picture that clpt takes comes in through `read` or `read_stored`, or through `decoded` where
-its bytes stand in another file. What a file says of its numbers is heeded: colours are linear Rec.
-709 unless data is asked for. docs/images.md has a table of what is honoured in which format.
+its bytes stand in another file. Statements of a file on its numbers are heeded: colours are linear
+Rec. 709 unless data is asked for. docs/images.md has a table of statements by format.
 """
 
 from clpt.choices import FOR_SCREENS, WRITABLE

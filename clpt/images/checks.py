@@ -9,7 +9,7 @@ from pathlib import Path
 from clpt.errors import SceneError
 from clpt.files import input_files
 
-PIXELS = 1 << 29  # of one image
+PIXELS = 1 << 29  # of an image
 
 
 def check_there(path: Path) -> None:

@@ -79,7 +79,7 @@ def agx(c: Floats32) -> Floats32:
 
 
 def agx_scales() -> tuple[float, float]:
-    """Return the scales of AgX's sigmoid below and above grey with which it ends at 0 and at 1."""
+    """Return the scales of AgX's sigmoid below and above grey, such that it ends at 0 and at 1."""
     low, high = AGX_STOPS
     pivot = -low / (high - low)
     ends = ((pivot, AGX_POWERS[0]), (1 - pivot, AGX_POWERS[1]))
@@ -126,7 +126,7 @@ def apply_tone(colours: Floats32, tone: str) -> Floats32:
 
 def false_colours(share: NDArray[Any]) -> Bytes:
     """Return numbers (h, w) from 0 to 1 as colours of the scale, (h, w, 3) uint8."""
-    table = np.array([[int(one[i : i + 2], 16) for i in (1, 3, 5)] for one in SCALE], float)
+    table = np.array([[int(code[i : i + 2], 16) for i in (1, 3, 5)] for code in SCALE], float)
     at = np.linspace(0.0, 1.0, len(table))
     fine = np.linspace(0.0, 1.0, 256)
     steps = np.stack([np.interp(fine, at, column) for column in table.T], axis=1)
@@ -136,7 +136,7 @@ def false_colours(share: NDArray[Any]) -> Bytes:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Codes of colours over a cube, for kernels/film/table.cl.
+    """Codes of colours over a cube, for kernels/film/tone.cl.
 
     values: (n, n, n, 4) float32, by blue, green and red, the last is 0; bounds: asinh(v / NEAR) at
     the ends of an axis, NEAR, and 0.
@@ -150,8 +150,7 @@ class View:
     """A view of OpenColorIO: the transform from light to the values of a display.
 
     name: of the view; display, look: by default the config's first display and no look; config: a
-    file, or a name such as ocio://default, or "$OCIO" for what the environment names. By default
-    each is the config's own default.
+    file, or a name such as ocio://default, or "$OCIO" for the file that the environment names.
 
     OpenColorIO (`pip install 'clpt[colour]'`) makes the pictures of files. A device gets a table of
     its result, see `table`.
@@ -204,7 +203,7 @@ class View:
         return codes
 
     def table(self, size: int = TABLE_SIZE) -> Table:
-        """Return the codes as a table, to which tetrahedra are fitted."""
+        """Return the codes as a table, fitted to interpolation over tetrahedra."""
         low, high = np.arcsinh(LOWEST / NEAR), np.arcsinh(HIGHEST / NEAR)
         axis = (NEAR * np.sinh(np.linspace(low, high, size))).astype(np.float32)
         values = np.zeros((size, size, size, 4), np.float32)
@@ -249,11 +248,13 @@ def _processors(ocio: Any, config: Any, view: View) -> list[Any]:
         both.appendTransform(ocio.LookTransform(src=light, dst=light, looks=view.look))
     both.appendTransform(shown)
     try:
-        found = [
+        processors = [
             ocio.Config.GetProcessorFromBuiltinColorSpace(REC709, config, light),
             config.getProcessor(both),
         ]
-        return [one.getDefaultCPUProcessor() for one in found if not one.isNoOp()]
+        return [
+            processor.getDefaultCPUProcessor() for processor in processors if not processor.isNoOp()
+        ]
     except (ocio.Exception, ocio.ExceptionMissingFile) as error:
         first = str(error).strip().splitlines()[0]
         raise SceneError(f"OpenColorIO refuses the view: {first}", file=view.config) from error

@@ -1,14 +1,15 @@
-"""OpenEXR files as pictures, by what their attributes mean.
+"""OpenEXR files as pictures, by the meaning of their attributes.
 
 Attributes as in "Technical Introduction to OpenEXR" and "OpenEXR File Layout": a picture is its
-display window; pixels outside of the data window are zero. Colours are of the primaries and the
-white in `chromaticities`, else of Rec. 709. Colours are multiplied by alpha, and stay so.
+display window; pixels outside of the data window are zero. Colours are as `colorInteropID` says,
+else linear, of the primaries and the white in `chromaticities`, else of Rec. 709. Colours are
+multiplied by alpha, and stay so.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +18,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats32, Matrix
 from clpt.errors import SceneError
-from clpt.images import exr_files
+from clpt.images import exr_files, interop
 from clpt.images.checks import check_there, reading
 from clpt.images.exr_files import Header, Window, window
+from clpt.images.interop import Encoding
 from clpt.images.stored import Stored
 from clpt.spectra import spaces
 
 FAVOURED = ("combined", "beauty", "rgba", "rgb", "color", "colour")  # Blender's is the first
-STOPS = "displayExposure"  # attribute: by which pictures for screens are brightened
+STOPS = "displayExposure"  # attribute: stops that brighten pictures for screens
 HALF_MAX = 65504.0
-HALF_MIN = 2.0**-14  # from which on it has 11 bits
+HALF_MIN = 2.0**-14  # halves from here on have 11 bits
 
 
 @dataclass(frozen=True)
@@ -58,40 +60,40 @@ def choose(parts: Sequence[Sequence[str]]) -> Choice:
     Deep parts have no names here, and are passed over.
     """
     layers = [_layers(names) for names in parts]
-    for number, found in enumerate(layers):
-        if made := _picture(number, found.get("", {}), whole=True):
-            return made
-    made, taken = None, ""
+    for number, named_letters in enumerate(layers):
+        if choice := _picture(number, named_letters.get("", {}), whole=True):
+            return choice
+    choice, taken = None, ""
     others: list[str] = []
-    for number, found in enumerate(layers):
-        named = {layer: _picture(number, letters) for layer, letters in found.items()}
+    for number, named_letters in enumerate(layers):
+        named = {layer: _picture(number, letters) for layer, letters in named_letters.items()}
         pictures = {layer: picture for layer, picture in named.items() if picture}
         others += pictures
-        if made is None and pictures:
-            layer = min(pictures, key=_rank)  # the first one of the lowest rank
-            made = pictures[layer]
+        if choice is None and pictures:
+            layer = min(pictures, key=_rank)  # the first layer of the lowest rank
+            choice = pictures[layer]
             taken = layer
-    if made is None:
+    if choice is None:
         number = next((i for i, names in enumerate(parts) if names), 0)
         return _numbers(number, parts[number], layers[number])
     if len(others) == 1 or _rank(taken) < len(FAVOURED):
-        return made
+        return choice
     note = f"its picture is taken from the layer {taken!r}; others with colours are left out"
-    return Choice(made.part, made.names, made.form, note)
+    return Choice(choice.part, choice.names, choice.form, note)
 
 
 def _layers(names: Sequence[str]) -> dict[str, dict[str, str]]:
     """The names by layer and letter, which is a capital; the name with a capital comes first."""
-    made: dict[str, dict[str, str]] = {}
+    layers: dict[str, dict[str, str]] = {}
     for name in sorted(names):
         layer, _, letter = name.rpartition(".")
-        made.setdefault(layer, {}).setdefault(letter.upper(), name)
-    return made
+        layers.setdefault(layer, {}).setdefault(letter.upper(), name)
+    return layers
 
 
 def _rank(layer: str) -> int:
     word = layer.rpartition(".")[2].lower()
-    return next((i for i, one in enumerate(FAVOURED) if word == one), len(FAVOURED))
+    return next((i for i, favoured in enumerate(FAVOURED) if word == favoured), len(FAVOURED))
 
 
 def _picture(part: int, letters: Mapping[str, str], whole: bool = False) -> Choice | None:
@@ -99,7 +101,7 @@ def _picture(part: int, letters: Mapping[str, str], whole: bool = False) -> Choi
     alpha = ("A",) if "A" in letters else ()
     for form, needed in _forms(letters, whole):
         if letters.keys() >= set(needed):
-            return Choice(part, tuple(letters[one] for one in (*needed, *alpha)), form)
+            return Choice(part, tuple(letters[letter] for letter in (*needed, *alpha)), form)
     return None
 
 
@@ -118,17 +120,17 @@ def _numbers(part: int, names: Sequence[str], layers: Mapping[str, Mapping[str, 
         return Choice(part, tuple(names), "numbers")
     for letters in layers.values():
         if letters.keys() >= set("XYZ"):
-            return Choice(part, tuple(letters[one] for one in "XYZ"), "numbers")
+            return Choice(part, tuple(letters[letter] for letter in "XYZ"), "numbers")
     every = tuple(sorted(names))
     note = f"has no channels R, G and B, nor Y: {', '.join(every)} are taken as they stand"
     return Choice(part, every, "numbers", note)
 
 
 def read(path: Path) -> Stored:
-    """Read the picture of a file. Raises SceneError for deep or too large ones, else as OpenEXR."""
-    found = exr_files.headers(path)
-    choice = choose([exr_files.flat_channels(header) for header in found])
-    header = found[choice.part]
+    """Read the picture of a file. Raises SceneError for deep or too large pictures."""
+    headers = exr_files.headers(path)
+    choice = choose([exr_files.flat_channels(header) for header in headers])
+    header = headers[choice.part]
     exr_files.check(path, header)
     read_ = exr_files.read_channels(path, choice.names, choice.part)
     names = choice.names
@@ -138,22 +140,24 @@ def read(path: Path) -> Stored:
     values = np.empty((y1 - y0, x1 - x0, len(names)), np.float32)
     for index, name in enumerate(names):
         values[..., index] = placed(_whole(read_[name], window(header, "dataWindow")), header)
-    matrix, notes = _matrix(header, choice)
+    stated, notes = _encoding(header, choice)
     if choice.form == "chroma":
         values[..., :3] = _from_chroma(values[..., :3], _weights(header))
-    return Stored(values, False, matrix=matrix, notes=_notes(header, choice), colour_notes=notes)
+    return Stored(
+        values, stated.encoded, stated.gamma, stated.matrix, _notes(header, choice), notes
+    )
 
 
 def placed(plane: NDArray[Any], header: Header) -> NDArray[Any]:
-    """A channel (h, w) of the data window as one of the display window: zero outside, or cut."""
+    """Return a channel (h, w) of the data window over the display window: zero outside, or cut."""
     data, shown = window(header, "dataWindow"), window(header, "displayWindow")
     if data == shown:
         return plane
-    made = np.zeros((shown[3] - shown[1], shown[2] - shown[0]), plane.dtype)
+    shown_plane = np.zeros((shown[3] - shown[1], shown[2] - shown[0]), plane.dtype)
     x0, y0, x1, y1 = common = _common(data, shown)
     if x0 < x1 and y0 < y1:
-        made[_part(common, shown)] = plane[_part(common, data)]
-    return made
+        shown_plane[_part(common, shown)] = plane[_part(common, data)]
+    return shown_plane
 
 
 def matrix_of(header: Header) -> Matrix | None:
@@ -185,8 +189,8 @@ def write(
     channels = {}
     letters_of = {1: "Y", 3: "RGB", 4: "RGBA"}[pixels.shape[2]]
     parts = [("", tuple(prefix + letter for letter in letters_of), pixels)]
-    for name, given in layers.items():
-        layer = np.asarray(given, np.float32)
+    for name, array in layers.items():
+        layer = np.asarray(array, np.float32)
         layer = layer[..., None] if layer.ndim == 2 else layer
         if layer.shape[:2] != pixels.shape[:2] or layer.shape[2] not in (1, 3, 4):
             message = f"layer {name!r} has shape {layer.shape}, the image {pixels.shape}"
@@ -201,27 +205,37 @@ def write(
     exr_files.write_channels(path, metadata, channels)
 
 
-def _matrix(header: Header, choice: Choice) -> tuple[Matrix | None, tuple[str, ...]]:
-    """Return the matrix from a picture's colours to Rec. 709, and notes on what is left out."""
+def _encoding(header: Header, choice: Choice) -> tuple[Encoding, tuple[str, ...]]:
+    """Return how a picture's colours are encoded, and notes on attributes left out.
+
+    `colorInteropID` comes before `chromaticities`.
+    """
     if choice.form == "xyz":
-        return spaces.from_xyz("rec709"), ()
-    if choice.form not in ("rgb", "chroma"):
-        return None, ()
-    try:
-        return matrix_of(header), ()
-    except SceneError as error:
-        return None, (f"{error.message}: left out, its colours are taken as Rec. 709",)
+        return Encoding(False, None, spaces.from_xyz("rec709")), ()
+    name, notes = str(header.get("colorInteropID", "")), list[str]()
+    if choice.form in ("rgb", "grey") and name not in interop.SILENT:
+        stated = interop.encoding(name)
+        if stated is not None:
+            return stated if choice.form == "rgb" else replace(stated, matrix=None), ()
+        notes.append(f"its colorInteropID {name!r} is left out: its colours are taken as linear")
+    matrix = None
+    if choice.form in ("rgb", "chroma"):
+        try:
+            matrix = matrix_of(header)
+        except SceneError as error:
+            notes.append(f"{error.message}: left out, its colours are taken as Rec. 709")
+    return Encoding(False, None, matrix), tuple(notes)
 
 
 def _notes(header: Header, choice: Choice) -> tuple[str, ...]:
     """Return notes on attributes of a picture that are left out."""
-    made = [choice.note] if choice.note else []
+    notes = [choice.note] if choice.note else []
     aspect = float(header.get("pixelAspectRatio", 1.0))
     if aspect != 1.0:
-        made.append(f"its pixelAspectRatio of {aspect:g} is left out: its pixels are square")
+        notes.append(f"its pixelAspectRatio of {aspect:g} is left out: its pixels are square")
     if getattr(header.get("envmap"), "name", "") == "ENVMAP_CUBE":
-        made.append("its envmap attribute says that it is a cube, which is left out")
-    return tuple(made)
+        notes.append("its envmap attribute says that it is a cube, which is left out")
+    return tuple(notes)
 
 
 def _common(a: Window, b: Window) -> Window:
@@ -236,25 +250,25 @@ def _part(part: Window, of: Window) -> tuple[slice, slice]:
 
 def _whole(plane: NDArray[Any], data: Window) -> Floats32:
     """A channel with a value for each pixel, where it is subsampled by linear interpolation."""
-    made = np.asarray(plane, np.float32)
+    full = np.asarray(plane, np.float32)
     for axis, wanted in ((0, data[3] - data[1]), (1, data[2] - data[0])):
-        count = made.shape[axis]
+        count = full.shape[axis]
         if count != wanted:
-            made = _finer(made, wanted // count, axis)
-    return made
+            full = _finer(full, wanted // count, axis)
+    return full
 
 
 def _finer(values: Floats32, times: int, axis: int) -> Floats32:
-    """Values at `times` as many places along an axis, the last ones held."""
+    """Return values at `times` as many places along an axis; beyond the last they are constant."""
     after = np.roll(values, -1, axis)
     last = [slice(None)] * 2
     last[axis] = slice(-1, None)
     after[tuple(last)] = values[tuple(last)]
     share = np.arange(times, dtype=np.float32) / np.float32(times)
-    made = [values + one * (after - values) for one in share]
+    between = [values + weight * (after - values) for weight in share]
     shape = list(values.shape)
     shape[axis] *= times
-    return np.stack(made, axis + 1).reshape(shape)
+    return np.stack(between, axis + 1).reshape(shape)
 
 
 def _weights(header: Header) -> NDArray[np.float64]:

@@ -34,8 +34,8 @@ def exr_name(path: str | Path) -> str:
 def opened(path: Path, header_only: bool = False) -> Iterator[Sequence[Any]]:
     """The parts of a file, whose `header` and `channels` are those of the library.
 
-    Raises SceneError for what is no regular file, else what the library does, from RuntimeError to
-    MemoryError.
+    Raises SceneError unless there is a regular file, else the library's errors, from RuntimeError
+    to MemoryError.
     """
     input_files.regular(path)
     with OpenEXR.File(exr_name(path), separate_channels=True, header_only=header_only) as file:
@@ -95,7 +95,7 @@ def windows(
 
 
 def check(path: Path, header: Header) -> None:
-    """Raise SceneError for a part of too many pixels, or of deep ones."""
+    """Raise SceneError for a part of too many pixels, or of deep pixels."""
     if _is_deep(header):
         raise SceneError(f"has deep pixels ({header['type'].name}); flatten it", file=path)
     for name in ("dataWindow", "displayWindow"):
@@ -109,15 +109,15 @@ def read_channels(path: Path, chosen: Sequence[str] | None = None, part: int = 0
     (h, w) of the data window, less where they are subsampled. chosen: which; all if None. Raises
     SceneError where they take too much memory, else as `opened` does.
     """
-    found = headers(path)
-    check(path, found[part])
-    names = channel_names(found[part]) if chosen is None else chosen
+    parts_headers = headers(path)
+    check(path, parts_headers[part])
+    names = channel_names(parts_headers[part]) if chosen is None else chosen
     if not names:
         return {}
-    if len(found) == 1 and set(names) < set(channel_names(found[0])):
-        return _some(path, found[0], names)
+    if len(parts_headers) == 1 and set(names) < set(channel_names(parts_headers[0])):
+        return _some(path, parts_headers[0], names)
     # The library reads all channels of all parts.
-    budget.check(sum(_size(one, channel_names(one)) for one in found), _WHAT, path)
+    budget.check(sum(_size(header, channel_names(header)) for header in parts_headers), _WHAT, path)
     with opened(path) as parts:
         channels = parts[part].channels
         return {name: np.asarray(channels[name].pixels) for name in names}
@@ -136,9 +136,9 @@ def _size(header: Header, names: Sequence[str]) -> int:
 
 
 def _some(path: Path, header: Header, names: Sequence[str]) -> Channels:
-    """Some channels of a file of one part: only they are kept.
+    """Read some channels of a file of a single part.
 
-    By the library's older interface, for the newer one always reads all of them.
+    By the library's older interface, for the newer interface always reads all channels.
     """
     budget.check(_size(header, names), _WHAT, path)
     x0, y0, x1, y1 = window(header, "dataWindow")
@@ -150,12 +150,12 @@ def _some(path: Path, header: Header, names: Sequence[str]) -> Channels:
         read = file.channels(list(names))
     finally:
         file.close()
-    made = {}
+    channels = {}
     for name, data in zip(names, read, strict=True):
-        one = about[name]
-        shape = (y1 - y0) // one.ySampling, (x1 - x0) // one.xSampling
-        made[name] = np.frombuffer(data, kinds[one.type.v]).reshape(shape)
-    return made
+        channel = about[name]
+        shape = (y1 - y0) // channel.ySampling, (x1 - x0) // channel.xSampling
+        channels[name] = np.frombuffer(data, kinds[channel.type.v]).reshape(shape)
+    return channels
 
 
 def write_parts(path: Path, parts: Sequence[Any]) -> None:
@@ -192,7 +192,7 @@ NOT_WHOLE = "it could not be written to its end; is the disk full?"
 
 
 def _skip_header(file: BinaryIO) -> bool:
-    """Read over the attributes of a part; return whether there was one."""
+    """Read over the attributes of a part; return whether there was a part."""
     some = False
     while _word(file):
         _word(file)  # its type
@@ -204,10 +204,10 @@ def _skip_header(file: BinaryIO) -> bool:
 
 def _word(file: BinaryIO) -> bytes:
     """The bytes before the next zero. Raises OSError at the end of the file."""
-    made = bytearray()
+    letters = bytearray()
     while (letter := _unpacked("<c", file)[0]) != b"\0":
-        made += letter
-    return bytes(made)
+        letters += letter
+    return bytes(letters)
 
 
 def _unpacked(form: str, file: BinaryIO) -> tuple[Any, ...]:

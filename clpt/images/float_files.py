@@ -87,7 +87,7 @@ def read_npy(path: Path) -> Stored:
 
 
 def write_npy(path: Path, array: NDArray[Any]) -> None:
-    """Write an array of one axis or more as .npy. Raises OSError.
+    """Write an array with axes as .npy. Raises OSError.
 
     Not by `np.save`, which does not tell that the last bytes were refused, as by a full disk.
     """

@@ -43,12 +43,12 @@ class _Header:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        found = []
+        notes = []
         if self.aspect != 1.0:
-            found.append(f"its PIXASPECT of {self.aspect:g} is left out: its pixels are square")
+            notes.append(f"its PIXASPECT of {self.aspect:g} is left out: its pixels are square")
         if self.gamma != 1.0:
-            found.append(f"its GAMMA of {self.gamma:g} is left out: its values are linear")
-        return tuple(found)
+            notes.append(f"its GAMMA of {self.gamma:g} is left out: its values are linear")
+        return tuple(notes)
 
 
 def read(path: Path) -> Stored:
@@ -74,7 +74,7 @@ def read(path: Path) -> Stored:
 
 def _parsed(path: Path, data: bytes) -> _Header:
     """Read the lines of a header. Raises SceneError."""
-    made, at = _Header(), data.find(b"\n") + 1
+    header, at = _Header(), data.find(b"\n") + 1
     if not data.startswith(b"#?") or not at:
         raise SceneError("not a Radiance picture: it does not begin with #?", file=path)
     while True:
@@ -86,22 +86,22 @@ def _parsed(path: Path, data: bytes) -> _Header:
             break
         name, equals, value = line.decode("latin-1").partition("=")
         if equals and name in KNOWN:
-            _note(path, made, name, value.strip())
+            _note(path, header, name, value.strip())
     order = RESOLUTION.match(data, at)
     if order is None or order[2] == order[5]:
         raise SceneError("not a Radiance picture: no line like '-Y 480 +X 640'", file=path)
     slow, slow_axis, fast, fast_axis = (order[i].decode() for i in (1, 2, 4, 5))
-    made.order = slow, slow_axis, fast, fast_axis
-    made.size, made.end = (int(order[3]), int(order[6])), order.end()
-    return made
+    header.order = slow, slow_axis, fast, fast_axis
+    header.size, header.end = (int(order[3]), int(order[6])), order.end()
+    return header
 
 
-def _note(path: Path, made: _Header, name: str, value: str) -> None:
+def _note(path: Path, header: _Header, name: str, value: str) -> None:
     """Put what a line says into a header. Raises SceneError."""
     if name == "FORMAT":
         if value not in (RGBE, XYZE):
             raise SceneError(f"its FORMAT must be {RGBE} or {XYZE}, not {value!r}", file=path)
-        made.format = value
+        header.format = value
         return
     count = {"COLORCORR": 3, "PRIMARIES": 8}.get(name, 1)
     try:
@@ -113,13 +113,13 @@ def _note(path: Path, made: _Header, name: str, value: str) -> None:
         needed = f"{count} numbers" if count > 1 else "a number above 0"
         raise SceneError(f"its {name} must be {needed}, not {value!r}", file=path)
     if name in ("EXPOSURE", "COLORCORR"):
-        made.divide *= np.array(numbers, np.float32)
+        header.divide *= np.array(numbers, np.float32)
     elif name == "PRIMARIES":
-        made.primaries = numbers if any(numbers) else None  # Photoshop's zeros state none
+        header.primaries = numbers if any(numbers) else None  # Photoshop's zeros state none
     elif name == "PIXASPECT":
-        made.aspect *= numbers[0]
+        header.aspect *= numbers[0]
     else:
-        made.gamma = numbers[0]
+        header.gamma = numbers[0]
 
 
 def _matrix(header: _Header) -> Matrix | None:
@@ -139,7 +139,7 @@ def _upright(values: Floats32, order: tuple[str, str, str, str]) -> Floats32:
 
 
 def _scanline(data: bytes, at: int, row: Bytes) -> int:
-    """Decode one scanline into `row` (w, 4); where the next one begins."""
+    """Decode a scanline into `row` (w, 4); return the offset of the next scanline."""
     width = len(row)
     if data[at : at + 2] != b"\2\2" or not 8 <= width < 32768 or data[at + 2] > 127:
         return _old_scanline(data, at, row)
@@ -161,8 +161,10 @@ def _scanline(data: bytes, at: int, row: Bytes) -> int:
 
 
 def _old_scanline(data: bytes, at: int, row: Bytes) -> int:
-    """Flat pixels, among which 1 1 1 n repeats the one before n times; the count of a repeat that
-    follows a repeat is 256 times as much."""
+    """Decode flat pixels into `row`; 1 1 1 n repeats the pixel before n times.
+
+    The count of a repeat that follows a repeat is 256 times as much.
+    """
     width = len(row)
     flat = np.frombuffer(data, np.uint8, min(4 * width, len(data) - at), at)
     flat = flat[: len(flat) // 4 * 4].reshape(-1, 4)

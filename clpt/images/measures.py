@@ -15,7 +15,7 @@ from clpt.images.transfer import to_codes
 
 GREY = 0.18  # reflectance of the middle grey that photographers expose for
 DIM = 1e-4  # of the mean: a pixel below counts as if it were as bright
-WHITE, BLACK = 250, 2  # codes of 255: a colour from which or to which nothing can be told apart
+WHITE, BLACK = 250, 2  # codes of 255: detail above and below is not visible
 LOOKED_AT = 1 << 20  # pixels that are enough to judge a picture
 EPSILON = 0.01  # beside the square of the reference, where that is dark
 
@@ -90,8 +90,8 @@ class Differences:
 
     means: of a and of b; bias: mean of a - b; absolute: mean of |a - b|; mean_square;
     relative_square: mean of (a - b)^2 / (b^2 + EPSILON), as renderers are compared by; largest:
-    |a - b|; where: x, y and channel of that; lost: values that are not finite in one of the two,
-    which are left out.
+    |a - b|; where: x, y and channel of that; lost: number of values that are not finite in a
+    or b, which are left out.
     """
 
     means: tuple[float, float]
@@ -110,7 +110,7 @@ class Differences:
 
 
 def differences(a: NDArray[np.float32], b: NDArray[np.float32]) -> Differences:
-    """Compare two images (h, w, n) of one shape."""
+    """Compare two images (h, w, n) of equal shape."""
     first, second = a.astype(np.float64), b.astype(np.float64)
     known = np.isfinite(first) & np.isfinite(second)
     first, second = np.where(known, first, 0.0), np.where(known, second, 0.0)

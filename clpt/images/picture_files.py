@@ -54,7 +54,7 @@ def read(path: str | Path, *, linear: bool = True) -> Floats32:
 
 
 def log_notes(path: str | Path, image: Stored, *, raw: bool) -> None:
-    """Warn in the log of what an image's file says that is left out."""
+    """Warn in the log of statements of an image's file that are left out."""
     for note in image.notes_of(raw):
         log.warning("%s: %s", path, note)
 

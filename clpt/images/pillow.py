@@ -35,7 +35,7 @@ NAMES = {"WEBP": "WebP"}  # of formats, where people write them in another way
 ORIENTATION = 0x0112  # the tag of Exif
 PHOTOMETRIC, WHITE_IS_ZERO = 262, 0  # a tag of TIFF, and its value
 START_OF_SCAN = b"\xff\xda"  # a marker of JPEG
-SCANS, SCANNED_PIXELS = 20, 1 << 31  # what a JPEG may have of the one or of the other
+SCANS, SCANNED_PIXELS = 20, 1 << 31  # limits for a JPEG
 LEFT_OUT = "is left out: its pixels are taken as they are stored"
 
 Source = Path | bytes
@@ -43,18 +43,18 @@ Admit = Callable[[int, int], object]
 
 
 def read(path: Path) -> Stored:
-    """Read a file, with what it says of its colours. Raises SceneError."""
+    """Read a file, with its statements on colours. Raises SceneError."""
     return decoded(path, FORMATS)
 
 
 def decoded(
     source: Source, formats: Sequence[str], admit: Admit | None = None, *, profiled: bool = True
 ) -> Stored:
-    """Decode a file, or its bytes, of one of some of FORMATS.
+    """Decode a file, or its bytes, in any of the given FORMATS.
 
-    admit: is asked with width and height before there are pixels, and raises; by default where they
-    are more than those of any image. profiled: heed what
-    the file says of its colours and its orientation; else all of it is passed over in silence.
+    admit: called with width and height before there are pixels, and may raise; by default it limits
+    the number of pixels. profiled: heed the file's statements on colours and orientation, which are
+    else passed over in silence.
 
     Raises SceneError if it is not such an image or takes too much memory, else Pillow's errors.
     """
@@ -62,17 +62,17 @@ def decoded(
         (admit or partial(checks.check_size, _file(source)))(image.width, image.height)
         _check_scans(source, image)
         with budget.lending(_bytes(image), "its pixels", _file(source)):
-            made = _pixels(source, formats, image)
+            pixels = _pixels(source, formats, image)
         # Only now: Pillow decodes an image to find its Exif.
         kind, notes, colour_notes = image.format, _notes(image), _colour_notes(image)
     if not profiled:
-        return made
+        return pixels
     if kind != "PNG":
-        return replace(made, notes=notes, colour_notes=colour_notes)
+        return replace(pixels, notes=notes, colour_notes=colour_notes)
     with BytesIO(source) if isinstance(source, bytes) else source.open("rb") as file:
         said = screen_files.profile(file)
     return replace(
-        made,
+        pixels,
         gamma=said.gamma,
         matrix=said.matrix,
         notes=notes,
@@ -120,14 +120,14 @@ def _opened(source: Source, formats: Sequence[str]) -> Iterator[ImageFile]:
         raise SceneError(f"is no {listed} image of a kind that is read", file=file) from None
     except Image.DecompressionBombError:
         most = 2 * (Image.MAX_IMAGE_PIXELS or 0)  # Pillow's rule
-        what = f"{file.suffix} images" if file else "images"
-        message = f"has more than the {most} pixels that are read of {what}"
+        subject = f"{file.suffix} images" if file else "images"
+        message = f"has more than the {most} pixels that are read of {subject}"
         raise SceneError(message, file=file) from None
 
 
 @cache
 def _know_formats() -> None:
-    """Import Pillow's modules of FORMATS; else it imports all of its own for those it lacks."""
+    """Import Pillow's modules of FORMATS; without them it imports all its modules."""
     for name in PLUGINS:
         importlib.import_module(f"PIL.{name}ImagePlugin")
 
@@ -151,8 +151,8 @@ def from_pillow(image: Image) -> Stored:
     if image.mode == "F":
         return Stored(np.asarray(image, np.float32)[..., None], encoded=False)
     if image.mode == "I" and getattr(image, "format", None) not in ("PNG", None):
-        what = "its whole numbers of 32 bits, or with a sign, have no meaning as colours"
-        raise SceneError(f"{what}; save floats, or 16 bits")
+        subject = "its whole numbers of 32 bits, or with a sign, have no meaning as colours"
+        raise SceneError(f"{subject}; save floats, or 16 bits")
     if image.mode == "I" or image.mode.startswith("I;16"):
         wide = np.asarray(image).astype(np.uint16)[..., None]
         if getattr(image, "tag_v2", {}).get(PHOTOMETRIC) == WHITE_IS_ZERO:
@@ -166,31 +166,32 @@ def from_pillow(image: Image) -> Stored:
 
 
 def _floats(values: NDArray[np.uint16], key: Sequence[int] | None) -> NDArray[np.float32]:
-    """Numbers of 16 bits from 0 to 1; key: the colour that is transparent, if there is one."""
-    made = values.astype(np.float32)
-    made /= np.float32(65535.0)
+    """Numbers of 16 bits from 0 to 1; key: the transparent colour, None for none."""
+    floats = values.astype(np.float32)
+    floats /= np.float32(65535.0)
     if key is None:
-        return made
+        return floats
     alpha = (values != np.array(key, np.uint16)).any(axis=2, keepdims=True)
-    colours = np.repeat(made, 3, axis=2) if made.shape[2] == 1 else made
+    colours = np.repeat(floats, 3, axis=2) if floats.shape[2] == 1 else floats
     return np.concatenate([colours, alpha.astype(np.float32)], axis=2)
 
 
 def _raw_mode(image: ImageFile) -> str:
-    """Return Pillow's name of the form in which the file stores pixels, such as "RGB;16B"."""
+    """Return Pillow's name of the file's form of pixels, such as "RGB;16B"."""
     if len(image.tile) != 1:
         return ""
-    given: Any = image.tile[0][3]
-    raw = given[0] if isinstance(given, tuple) and given else given
+    mode: Any = image.tile[0][3]
+    raw = mode[0] if isinstance(mode, tuple) and mode else mode
     return raw if isinstance(raw, str) else ""
 
 
 def _sixteen_bits(
     source: Source, formats: Sequence[str], image: ImageFile
 ) -> NDArray[np.uint16] | None:
-    """Colours of 16 bits (h, w, 3 or 4), of which Pillow keeps the upper 8; None: it has others.
+    """Return colours of 16 bits (h, w, 3 or 4); None for an image without.
 
-    The lower ones come from decoding it again as if the bytes had the other order.
+    Pillow keeps the upper 8 bits. The lower bits come from decoding it again as if the bytes had
+    the other order.
     """
     raw = _raw_mode(image)
     if raw == "LA;16B":
@@ -211,29 +212,29 @@ def _sixteen_bits(
 def _bytes_as(image: ImageFile, raw: str) -> NDArray[np.uint8]:
     """The pixels of an image that is not decoded yet, as if it stored them in another way."""
     tile: Any = image.tile[0]
-    given = tile[3]
-    changed: Any = (*tile[:3], (raw, *given[1:]) if isinstance(given, tuple) else raw)
+    mode = tile[3]
+    changed: Any = (*tile[:3], (raw, *mode[1:]) if isinstance(mode, tuple) else raw)
     image.tile = [type(tile)(*changed) if hasattr(tile, "_replace") else changed]
     return np.asarray(image)
 
 
 def _notes(image: ImageFile) -> tuple[str, ...]:
     """Return notes on pictures and orientations of a file that are left out."""
-    made = []
+    notes = []
     if image.format != "MPO" and getattr(image, "is_animated", False):  # n_frames reads them all
-        made.append("its first picture of several is taken")
+        notes.append("its first picture of several is taken")
     turned = image.getexif().get(ORIENTATION, 1) if image.format != "TIFF" else 1
     if turned not in (0, 1):
-        made.append(f"its Exif orientation {turned} {LEFT_OUT}")
-    return tuple(made)
+        notes.append(f"its Exif orientation {turned} {LEFT_OUT}")
+    return tuple(notes)
 
 
 def _colour_notes(image: ImageFile) -> tuple[str, ...]:
     """Return notes on a file's description of its colours that are left out."""
-    made = []
+    notes = []
     icc = image.info.get("icc_profile") or b""
     if icc and b"sRGB" not in icc and "sRGB".encode("utf-16-be") not in icc:
-        made.append("its colour profile is left out: its colours are taken as sRGB")
+        notes.append("its colour profile is left out: its colours are taken as sRGB")
     if image.mode == "CMYK":
-        made.append("its colours are CMYK, made RGB without a profile")
-    return tuple(made)
+        notes.append("its colours are CMYK, made RGB without a profile")
+    return tuple(notes)

@@ -53,11 +53,11 @@ def _stated(chunks: Mapping[bytes, bytes]) -> Profile:
     """Read the gamma of gAMA and the primaries of cHRM."""
     gamma, matrix, notes = None, None, []
     if len(chunks.get(b"gAMA", b"")) == 4:
-        given = struct.unpack(">I", chunks[b"gAMA"])[0] / 100000.0
-        if given == 0.0:
+        exponent = struct.unpack(">I", chunks[b"gAMA"])[0] / 100000.0
+        if exponent == 0.0:
             notes.append("its gAMA of 0 is left out: its colours are taken as sRGB")
-        elif abs(given - SRGB_GAMMA) > 0.01 * SRGB_GAMMA:
-            gamma = given
+        elif abs(exponent - SRGB_GAMMA) > 0.01 * SRGB_GAMMA:
+            gamma = exponent
     if len(chunks.get(b"cHRM", b"")) == 32:
         white_x, white_y, *others = np.divide(struct.unpack(">8I", chunks[b"cHRM"]), 100000.0)
         try:
@@ -68,7 +68,7 @@ def _stated(chunks: Mapping[bytes, bytes]) -> Profile:
 
 
 def _chunks(file: BinaryIO) -> Iterator[tuple[bytes, bytes]]:
-    """The chunks of colours before the first of pixels, by name; the first one of each name."""
+    """The chunks of colours before the first of pixels, by name; the first chunk of each name."""
     file.seek(0)
     seen = set()
     if file.read(8) != SIGNATURE:

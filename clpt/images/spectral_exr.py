@@ -48,9 +48,9 @@ class SpectralImage:
 
     values: (h, w, n) float32 at `lambdas` (n,) [nm], ascending. emissive: light, in `units`, dark
     beyond the ends; else reflectances or transmittances, which go on beyond the ends as they are
-    there. exposure: stops by which a viewer should brighten it, not contained in the values.
-    response, transmission: of the camera and the lens that took it. warnings: what a file holds
-    beside that. Raises SceneError where these do not fit together.
+    there. exposure: stops that viewers add, not contained in the values.
+    response, transmission: of the camera and the lens that took it. warnings: on further
+    contents of the file. Raises SceneError where these do not fit together.
     """
 
     values: Floats32
@@ -63,10 +63,10 @@ class SpectralImage:
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        given = np.asarray(in_memory(on_host(self.values)))
-        if given.dtype.kind != "f":
-            raise SceneError(f"a spectral image holds floats, not {given.dtype}")
-        values = single(given)
+        values = np.asarray(in_memory(on_host(self.values)))
+        if values.dtype.kind != "f":
+            raise SceneError(f"a spectral image holds floats, not {values.dtype}")
+        values = single(values)
         lambdas = np.asarray(self.lambdas, np.float64)
         if values.ndim != 3 or values.size == 0:
             raise SceneError(f"a spectral image is (h, w, n) and not empty, not {values.shape}")
@@ -113,7 +113,7 @@ def find(image: object, *, emissive: bool, where: str = "image") -> SpectralImag
 
 
 def is_spectral(path: str | Path) -> bool:
-    """Whether this is an EXR file with spectral channels; False for what cannot be read."""
+    """Whether this is a readable EXR file with spectral channels."""
     if Path(path).suffix.lower() != ".exr" or not Path(path).is_file():
         return False
     try:
@@ -126,9 +126,9 @@ def is_spectral(path: str | Path) -> bool:
 def read(path: str | Path, *, emissive: bool | None = None) -> SpectralImage:
     """Read a spectral EXR file.
 
-    path: of the file. emissive: which part of one that holds both; None: light if any.
-    Polarisation (S1 to S3) is left out with a warning. Raises SceneError for what is no such file,
-    lacks the part, holds a wavelength twice, or fluorescence.
+    emissive: True for light, False for reflectances, where a file holds both; None: light if any.
+    Polarisation (S1 to S3) is left out with a warning. Raises SceneError for other files, and for a
+    file that lacks the part, or holds a wavelength twice, or fluorescence.
     """
     path = Path(path)
     header, channels = _contents(path)
@@ -216,8 +216,8 @@ def _contents(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     with reading(path):
         header = images.attributes(path)
         names = [n for n in exr_files.channel_names(header) if _is_spectral(n)]
-        found = exr_files.read_channels(path, names)
-        return header, {name: exr.placed(found[name], header) for name in names}
+        channels = exr_files.read_channels(path, names)
+        return header, {name: exr.placed(channels[name], header) for name in names}
 
 
 def _is_spectral(name: str) -> bool:
@@ -251,10 +251,10 @@ def _other_kind(emissive: bool) -> str:
 def _left_out(parts: Mapping[str, Any], light: bool) -> tuple[str, ...]:
     """Return notes on parts of a file that are not read."""
     polarised = any(part in parts for part in ("S1", "S2", "S3"))
-    made = ["its polarisation (S1 to S3) is left out"] if light and polarised else []
+    notes = ["its polarisation (S1 to S3) is left out"] if light and polarised else []
     if {"S0", "T"} <= parts.keys():
-        made.append(f"its {'reflectances (T)' if light else 'light (S0)'} are left out")
-    return tuple(made)
+        notes.append(f"its {'reflectances (T)' if light else 'light (S0)'} are left out")
+    return tuple(notes)
 
 
 def _nanometres(path: Path, digits: str, exponent: str, prefix: str | None, unit: str) -> float:
@@ -275,7 +275,7 @@ def _decimal(nm: float) -> str:
 
 
 def _exposure(value: Any) -> float:
-    """The stops in an EV attribute, a number or a text; 0 for what is neither."""
+    """The stops in an EV attribute, a number or a text; 0 for other values."""
     try:
         stops = float(value)
     except (TypeError, ValueError):

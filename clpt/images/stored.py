@@ -1,4 +1,4 @@
-"""An image as its file has it, with what the file says that its numbers mean."""
+"""An image as its file has it, with the meaning of its numbers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ class Stored:
 
     encoded: its colours, but not alpha, went through a transfer: that of sRGB, or light to the
     power of `gamma`. matrix: (3, 3) from its linear colours to Rec. 709, None where they are that.
-    notes: what the file says that is left out; colour_notes: of that, what concerns colours alone.
+    notes: on statements of the file that are left out; colour_notes: notes that concern colours
+    alone.
     """
 
     values: NDArray[Any]
@@ -58,7 +59,7 @@ class Stored:
         return Stored(self.decoded(), encoded=False)
 
     def notes_of(self, raw: bool) -> tuple[str, ...]:
-        """Return notes on what is left out, for values that are data if raw, else colours."""
+        """Return notes on statements left out, for values that are data if raw, else colours."""
         return self.notes if raw else (*self.notes, *self.colour_notes)
 
     def _numbers(self) -> Floats32:
@@ -68,29 +69,29 @@ class Stored:
         if not self.encoded and self.matrix is None:
             return self._numbers()
         height, width, count = self.values.shape
-        made = np.empty((height, width, count), np.float32)
+        linear = np.empty((height, width, count), np.float32)
         rows = max(BLOCK // max(width * count, 1), 1)
         for first in range(0, height, rows):
             part = slice(first, first + rows)
-            made[part] = self._linear(self.values[part])
-        return made
+            linear[part] = self._linear(self.values[part])
+        return linear
 
     def _linear(self, values: NDArray[Any]) -> Floats32:
         """Some rows as linear Rec. 709."""
-        made = self._without_transfer(values)
-        if self.matrix is not None and made.shape[2] >= 3:
-            colours = made[..., :3] @ self.matrix.T.astype(np.float32)
-            made = np.concatenate([colours, made[..., 3:]], axis=2)
-        return made
+        linear = self._without_transfer(values)
+        if self.matrix is not None and linear.shape[2] >= 3:
+            colours = linear[..., :3] @ self.matrix.T.astype(np.float32)
+            linear = np.concatenate([colours, linear[..., 3:]], axis=2)
+        return linear
 
     def _without_transfer(self, values: NDArray[Any]) -> Floats32:
         is_bytes, curve = values.dtype == np.uint8, self._curve()
         if not self.encoded:
             return _SCALE[values] if is_bytes else values
-        made = curve(_SCALE)[values] if is_bytes else curve(values)
+        linear = curve(_SCALE)[values] if is_bytes else curve(values)
         if values.shape[2] == 4:
-            made[..., 3] = _SCALE[values[..., 3]] if is_bytes else values[..., 3]
-        return made
+            linear[..., 3] = _SCALE[values[..., 3]] if is_bytes else values[..., 3]
+        return linear
 
     def _curve(self) -> Callable[[Floats32], Floats32]:
         if self.gamma is None:

@@ -45,7 +45,7 @@ def address(text: str) -> tuple[str, int]:
 
 
 def create(name: str, width: int, height: int, channels: list[str]) -> bytes:
-    """The packet that makes an image, or empties the one of that name."""
+    """Return the packet that makes an image, or empties the image of that name."""
     names = b"".join(_text(channel) for channel in channels)
     return _packet(
         CREATE, b"\1" + _text(name) + struct.pack("<iii", width, height, len(channels)) + names
@@ -86,7 +86,7 @@ class Viewer:
         self._thread.start()
 
     def show(self, layers: Layers) -> None:
-        """Show channels (h, w) by name. Waits for nothing; the newest picture is the one sent."""
+        """Show channels (h, w) by name. Waits for nothing; only the newest picture is sent."""
         with self._changed:
             self._names = list(layers)
             self._wanted = np.stack([np.asarray(c, np.float32) for c in layers.values()], axis=2)
@@ -102,9 +102,9 @@ class Viewer:
             self._socket.close()
 
     def _connected(self) -> socket.socket:
-        found = socket.create_connection((self.host, self.port), TIMEOUT)
-        found.settimeout(TIMEOUT)
-        return found
+        connection = socket.create_connection((self.host, self.port), TIMEOUT)
+        connection.settimeout(TIMEOUT)
+        return connection
 
     def _send_all(self) -> None:
         while True:

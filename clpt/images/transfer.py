@@ -84,9 +84,9 @@ def to_codes(
 
 
 def straight(image: Floats32) -> Floats32:
-    """Colours (h, w, 4) over nothing as those of what covers: divided by alpha, as a .png has them.
+    """Return premultiplied colours (h, w, 4) divided by alpha, as a .png has them.
 
-    Images of other shapes are returned as they are; so are colours where nothing covers.
+    Images of other shapes are returned as they are; so are colours where alpha is 0.
     """
     if image.shape[2] != 4:
         return image
@@ -95,7 +95,7 @@ def straight(image: Floats32) -> Floats32:
 
 
 def multiplied(image: Floats32) -> Floats32:
-    """Colours (h, w, 4) of what covers as those over nothing: what `straight` undoes."""
+    """Return colours (h, w, 4) multiplied by alpha: the inverse of `straight`."""
     if image.shape[2] != 4:
         return image
     return np.concatenate([image[..., :3] * image[..., 3:], image[..., 3:]], axis=2)

@@ -23,12 +23,12 @@ from clpt.render.edit.plan import Plan
 from clpt.render.edit.scene_edit import MaterialKey, ShapeKey
 from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
-from clpt.render.film.layer_channels import write_picture
-from clpt.render.film.pictures import PictureForm, Pictures
-from clpt.render.film.saved_film import (
+from clpt.render.film.film_file import (
     classes_text,
     other_devices,
 )
+from clpt.render.film.layer_channels import write_picture
+from clpt.render.film.pictures import PictureForm, Pictures
 from clpt.render.film.state import join_ranges
 from clpt.render.makers.contents import (
     Change,
@@ -463,7 +463,7 @@ class FilmRenderer(FilmOwner, Pictures):
     def close(self) -> None:
         """Give the device's memory back; the renderer is of no use afterwards.
 
-        It waits for a `run` of another thread, not for what was enqueued. An array that the caller
+        It waits for a `run` of another thread, not for enqueued commands. An array that the caller
         still holds, such as `film`, keeps its memory. Dropping a renderer does the same.
         """
         with self._lock:

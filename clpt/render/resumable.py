@@ -17,8 +17,8 @@ from clpt import images
 from clpt.errors import MemoryBudgetError, SceneError
 from clpt.images.colour import View
 from clpt.render.film import film_file
+from clpt.render.film.film_file import Origin, SavedFilm, Session
 from clpt.render.film.resolve import Resolve, Screen
-from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.film.state import FilmState
 from clpt.render.film_renderer import FilmRenderer
 from clpt.render.makers.contents import Contents, synchronized

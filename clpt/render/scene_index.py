@@ -13,7 +13,7 @@ from clpt.render.records import GridFeatures, custom_materials
 from clpt.scene import Film, Scene
 from clpt.scene import materials as mt
 from clpt.scene.cameras import Camera
-from clpt.scene.integrators import Auto, Direct, Integrator, ParticleTracer, Path, Sampler, Vcm
+from clpt.scene.integrators import Direct, Integrator, Path, Sampler
 from clpt.scene.layers import LAYERS
 from clpt.scene.lights import Light
 from clpt.scene.media import Grid, Medium
@@ -145,7 +145,7 @@ class SceneIndex:
     @property
     def light_paths(self) -> bool:
         """Whether paths start at lights."""
-        return isinstance(self.integrator, ParticleTracer)
+        return self.integrator.from_lights_alone
 
     @property
     def weighed(self) -> float:
@@ -184,24 +184,20 @@ class SceneIndex:
     def may_have_light_paths(self) -> bool:
         """Whether the integrator starts paths at lights where `lights_reach`."""
         integrator = self.integrator
-        wanted = bool(integrator.light_paths) or integrator.guiding
-        return isinstance(integrator, Auto | ParticleTracer) or wanted
+        beside = bool(integrator.light_paths) or integrator.guiding
+        return integrator.from_lights_alone or integrator.leaves_choice or beside
 
     @property
     def joined(self) -> bool:
         """Whether light paths are connected to the camera."""
-        if not isinstance(self.integrator, Vcm):
-            return self.camera.is_connected(self.mode)
-        wanted = self.integrator.light_tracing
-        return wanted and self.camera.is_connected(self.mode)
+        return self.integrator.light_tracing and self.camera.is_connected(self.mode)
 
     @property
     def merged(self) -> bool:
         """Whether light paths store photons, which camera paths gather."""
         integrator = self.integrator
-        if not isinstance(integrator, Vcm) or self.shifts or not self.lights_reach:
-            return False
-        return integrator.merging and integrator.max_depth not in (1, 2)
+        possible = not self.shifts and self.lights_reach and integrator.max_depth not in (1, 2)
+        return integrator.merging and possible
 
     @property
     def guided(self) -> bool:

@@ -11,9 +11,8 @@ import numpy as np
 
 from clpt.scene.lights import Area
 from clpt.scene.materials import Mask, Material, NormalMap, Null, TwoSided
-from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap, Product
-from clpt.scene.values import Textured, TexturedNumber
+from clpt.scene.values import Texture, Textured, TexturedNumber
 from clpt.spectra import RGBUnbounded
 
 RGB = tuple[float, ...]

@@ -10,7 +10,7 @@ from clpt import spectra
 from clpt.errors import SceneError
 from clpt.scene.integrators import Film
 from clpt.scene.params import Kind, fields_of, params, place_of
-from clpt.scene.texture_values import is_texture
+from clpt.scene.values import is_texture
 from clpt.spectra import Spectrum
 from clpt.spectra.spectrum import extremes
 

@@ -25,9 +25,8 @@ from clpt.scene.params import (
     reflectance,
 )
 from clpt.scene.roles import EMISSION, REFLECTANCE
-from clpt.scene.texture_values import is_texture
 from clpt.scene.textures import Bitmap
-from clpt.scene.values import ImageLike, Matrix4, SpectrumLike, Textured, Vector3
+from clpt.scene.values import ImageLike, Matrix4, SpectrumLike, Textured, Vector3, is_texture
 from clpt.spectra import Blackbody, RGBIlluminant, Spectrum, lumens, scaled, watts
 
 RADIANCE = "W m^-2 sr^-1 nm^-1"

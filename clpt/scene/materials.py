@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 from clpt.errors import SceneError
 from clpt.measured import Measurement, MerlTable
 from clpt.scene import insides, roles
-from clpt.scene.energy import check_reradiation
 from clpt.scene.params import (
     Kind,
     Shorthand,
@@ -33,10 +32,9 @@ from clpt.scene.params import (
     reradiation,
 )
 from clpt.scene.roles import ORDERS, Param
-from clpt.scene.scatterer import Scatterer
-from clpt.scene.texture_values import Texture
+from clpt.scene.scatterer import Scatterer, check_reradiation
 from clpt.scene.textures import Bitmap
-from clpt.scene.values import IndexLike, SpectrumLike, Textured, TexturedNumber
+from clpt.scene.values import IndexLike, SpectrumLike, Texture, Textured, TexturedNumber
 from clpt.spectra import Constant, Reradiation, Spectrum
 from clpt.spectra import metal as named_metal
 
@@ -696,6 +694,7 @@ class Openpbr(Material):
     refracts = True
     chromatic = True
     needs_wavelengths = True
+    turning_lobe = "anisotropy_rotation"
 
     base_weight: TexturedNumber = _share(1.0, "factor on the base's colour")
     base_color: Textured = reflectance(0.8, "colour of the base, and of metal head-on")
@@ -711,6 +710,15 @@ class Openpbr(Material):
     specular_roughness: TexturedNumber = _share(0.3, "of facets; its square is their alpha")
     specular_roughness_anisotropy: TexturedNumber = _share(
         0.0, "how much rougher the tangent's direction is", lobe=True
+    )
+    anisotropy_rotation: TexturedNumber = real(
+        0.0,
+        "from u to the tangent, on the side of v; an image's own u and v",
+        "degrees",
+        -360.0,
+        360.0,
+        textured=True,
+        lobe=True,
     )
     specular_ior: IndexLike = index(1.5, "index of the dielectric")
     transmission_weight: TexturedNumber = _share(
@@ -756,6 +764,10 @@ class Openpbr(Material):
     def transmits(self) -> bool:
         below = self.thin_walled or self.subsurface_inside
         return self.transmission_weight != 0.0 or (below and self.subsurface_weight != 0.0)
+
+    @property
+    def directing(self) -> tuple[object, ...]:
+        return None, self.anisotropy_rotation
 
     @property
     def uses_tangents(self) -> bool:

@@ -352,7 +352,7 @@ class Cloud(Lattice, Homogeneous):
 
     @property
     def noise(self) -> tuple[float, ...]:
-        """Density, wispiness and frequency, see kernels/stage/cloud_density.cl."""
+        """Density, wispiness and frequency, see kernels/stage/density.cl."""
         return self.density, self.wispiness, self.frequency
 
     @property

@@ -44,7 +44,7 @@ from clpt.arrays import check_unmasked, in_memory
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.scene import roles
 from clpt.scene.roles import HostForm, Param
-from clpt.scene.shown import shown
+from clpt.spectra import Constant, Spectrum
 
 MOST_PARTS, MOST_NESTED = 1000, 64  # of a material, texture, light or medium
 
@@ -291,9 +291,12 @@ class Kind(metaclass=KindType):
 
     def __post_init__(self) -> None:
         parts, depth, textured = 1, 0, False
+        valid = _valid_defaults(type(self))
         for name, param in params(type(self)).items():
-            value = _checked(getattr(self, name), param, f"{self.kind}.{name}")
-            object.__setattr__(self, name, value)
+            value = getattr(self, name)
+            if valid.get(name, valid) is not value:
+                value = _checked(value, param, f"{self.kind}.{name}")
+                object.__setattr__(self, name, value)
             for inner in value if isinstance(value, tuple) else (value,):
                 if isinstance(inner, Kind):
                     seen = param.role.place != "host"  # by kernels
@@ -319,7 +322,6 @@ class Kind(metaclass=KindType):
         return f"{type(self).__name__}({', '.join(changed)})"
 
 
-@cache
 @cache  # thousands of objects ask
 def _declared(cls: type[Kind]) -> Mapping[str, Param]:
     fields = dataclasses.fields(cls)
@@ -360,6 +362,13 @@ def _usual(cls: type[Kind]) -> Mapping[str, Any]:
     """Return the checked defaults of a kind, without its required parameters."""
     declared = {name: v for name, v in defaults(cls).items() if v is not dataclasses.MISSING}
     return {name: _checked(v, _declared(cls)[name], cls.kind) for name, v in declared.items()}
+
+
+@cache
+def _valid_defaults(cls: type[Kind]) -> Mapping[str, Any]:
+    """Return the defaults of a kind that its checks return as they are."""
+    declared, checked = defaults(cls), _usual(cls)
+    return {name: value for name, value in checked.items() if declared[name] is value}
 
 
 def fields_of(kind: Kind) -> dict[str, Any]:
@@ -403,3 +412,20 @@ def _checked(value: object, param: Param, where: str) -> Any:
     for held in value.values() if isinstance(value, Mapping) else (value,):
         check_unmasked(held, where)
     return param.role.check(value, param, where)
+
+
+MATRIX = 16  # most numbers that an array shows; a larger array shows its shape
+LONGEST = 60  # characters of a spectrum
+
+
+def shown(value: Any) -> str:
+    """Return a value in short: an even spectrum as its number, a large array as its shape."""
+    if isinstance(value, np.ndarray):
+        few = value.size <= MATRIX
+        return str((value.round(5) + 0).tolist()) if few else f"<{value.dtype} {value.shape}>"
+    if isinstance(value, Constant):
+        return f"{value.value:g}"
+    text = repr(value)
+    if isinstance(value, Spectrum) and len(text) > LONGEST:
+        return f"<{type(value).__name__}>"
+    return text

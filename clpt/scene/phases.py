@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.scene.energy import check_reradiation
 from clpt.scene.params import angular, host, quantity, real, reflectance, reradiation
-from clpt.scene.scatterer import Scatterer
+from clpt.scene.scatterer import Scatterer, check_reradiation
 from clpt.scene.values import SpectrumLike
 from clpt.spectra import Reradiation, Spectrum
 

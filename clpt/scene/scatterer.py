@@ -6,7 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+
+from clpt.errors import SceneError
 from clpt.scene.params import Kind, fields_of
+from clpt.spectra import Reradiation
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,6 +61,8 @@ class Scatterer(Kind):
         """
         return None
 
+    turning_lobe: ClassVar[str] = "anisotropy"  # the parameter whose lobe a rotation turns
+
     @property
     def directing(self) -> tuple[object, ...]:
         """The values or textures of a coat's normals, and of directions along the surface."""
@@ -68,3 +74,19 @@ class Scatterer(Kind):
         values = fields_of(self)
         u, v = values.get("alpha_u"), values.get("alpha_v")
         return u is not v and u != v
+
+
+MEASURED = 0.02  # how much more light than comes may leave, by the noise of a measurement
+
+
+def check_reradiation(kind: str, elastic: Any, reradiation: Reradiation, amount: float) -> None:
+    """Raise SceneError where `elastic`, a spectrum, and `amount` of a matrix send on too much."""
+    into = reradiation.table[1]
+    total = elastic.sample(into) + amount * reradiation.emitted(into)
+    most = int(np.argmax(total))
+    if total[most] > 1.0 + MEASURED:
+        raise SceneError(
+            f"of the light at {into[most]:g} nm, {total[most]:.3f} would leave; "
+            "lower the reflectance, the yield or the amount",
+            where=f"{kind}.reradiation",
+        )

@@ -27,10 +27,14 @@ from clpt.scene.params import (
 )
 from clpt.scene.pixels import averaged, channel, check_image, image_file, thinned
 from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role
-from clpt.scene.texture_values import (
+from clpt.scene.values import (
     Attributes,
+    ImageLike,
     Look,
+    Matrix4,
     Operation,
+    Textured,
+    TexturedNumber,
     Use,
     brightness_at,
     channel_factors,
@@ -41,8 +45,7 @@ from clpt.scene.texture_values import (
     scaled_primary,
     separated,
 )
-from clpt.scene.texture_values import Texture as Texture
-from clpt.scene.values import ImageLike, Matrix4, Textured, TexturedNumber
+from clpt.scene.values import Texture as Texture
 from clpt.spectra import Constant, RGBIlluminant, Spectrum
 
 ATTRIBUTES = ("vertex_", "face_")  # prefixes of the names of attributes

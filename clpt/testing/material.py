@@ -43,8 +43,7 @@ def check_material(
     tolerance: how far the albedo may exceed 1. device: by default the first; seed: of the random
     parameters.
 
-    Raises AssertionError with the failed property; KernelBuildError; SceneError for a class that
-    is no material kind.
+    Raises AssertionError with the failed property, KernelBuildError, SceneError for other classes.
     """
     cls = material if isinstance(material, type) else type(material)
     if cls not in LEAVES:

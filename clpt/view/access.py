@@ -1,4 +1,4 @@
-"""Who may see the page: one-time tokens, cookies, and the names under which it may be asked for."""
+"""Access to the page: tokens for a single use, cookies, and the names of the server."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def is_wildcard(host: str) -> bool:
 
 
 def outward_address(host: str) -> str:
-    """Return the address of this machine from which others are reached; host: of its family.
+    """Return the address that this machine sends from to others; host: of the same family.
 
     127.0.0.1, or ::1, without a network. Nothing is sent.
     """
@@ -44,11 +44,11 @@ def outward_address(host: str) -> str:
 
 
 class Access:
-    """The secrets of one server; only their digests are kept.
+    """The secrets of a server; only their digests are kept.
 
-    A token of 256 bits stands in an address, opens the page once, and becomes a cookie. The page
-    is in a folder with a name of 128 bits: browsers send a cookie to all ports of a host, of which
-    another may be a stranger's, but only for the folder that it is of.
+    A token of 256 bits stands in an address, opens the page once, and becomes a cookie. The page is
+    in a folder with a name of 128 bits: browsers send a cookie to all ports of a host, some perhaps
+    a stranger's, but only for the folder of the cookie.
     """
 
     def __init__(self, port: int):
@@ -64,17 +64,17 @@ class Access:
         return token
 
     def exchange(self, token: str) -> str | None:
-        """Return a new cookie's value for a token, which is used up; None for a wrong one."""
-        found = _find(token, self._tokens)
-        if found is None:
+        """Return a new cookie's value for a token, which is used up; None for a wrong token."""
+        token_digest = _find(token, self._tokens)
+        if token_digest is None:
             return None
-        self._tokens.remove(found)
+        self._tokens.remove(token_digest)
         cookie = secrets.token_urlsafe(32)
         self._cookies = [*self._cookies, _digest(cookie)][-MOST_COOKIES:]
         return cookie
 
     def allows(self, cookies: str) -> bool:
-        """Return whether a header `Cookie` has a cookie that was given out."""
+        """Return whether a header `Cookie` has a cookie of this server."""
         for part in cookies.split(";"):
             name, _, value = part.strip().partition("=")
             if name == self.cookie_name and _find(value, self._cookies) is not None:
@@ -87,7 +87,7 @@ def _digest(secret: str) -> bytes:
 
 
 def _find(secret: str, known: list[bytes]) -> bytes | None:
-    """Return the digest of a secret among known ones; the time tells nothing of how they differ."""
+    """Return the digest of a secret among known digests, in a time that does not depend on them."""
     digest = _digest(secret)
-    found = [one for one in known if hmac.compare_digest(one, digest)]
-    return found[0] if found else None
+    equal = [other for other in known if hmac.compare_digest(other, digest)]
+    return equal[0] if equal else None

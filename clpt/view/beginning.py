@@ -23,9 +23,9 @@ PATIENCE = 0.4  # [s]
 
 
 class Making:
-    """Makes a renderer in a thread of its own, which waits before it compiles anything new.
+    """Makes a renderer in a separate thread, which waits before it compiles anything new.
 
-    device: the one that it is made on; make: makes it.
+    device: of the renderer; make: returns it.
     """
 
     def __init__(self, device: Device, make: Callable[[], Renderer]):
@@ -74,13 +74,13 @@ class Making:
 
     def _main(self) -> None:
         try:
-            made = self._make()
+            renderer = self._make()
         except BaseException as error:
             self._end()
             self._result.set_exception(error)
         else:
             self._end()
-            self._result.set_result(made)
+            self._result.set_result(renderer)
 
     def _end(self) -> None:
         self._builds.on_new = lambda: None
@@ -108,9 +108,10 @@ class Beginning:
 
     def __init__(self, device: Device, make: Make, variant: Variant, scene: Scene):
         self.variant = variant
-        own = Device.open(device.info, context=device.context)  # nobody waits for these programs
-        own.compilers, own.hurries = device.compilers, True
-        small = partial(Renderer, device=own, tree_quality="fast")
+        # Nobody waits for these programs.
+        unhurried = Device.open(device.info, context=device.context)
+        unhurried.compilers, unhurried.hurries = device.compilers, True
+        small = partial(Renderer, device=unhurried, tree_quality="fast")
         self._solid = Target(small, lambda scene: solid(variant(scene)))
         self._making = Making(device, lambda: make(variant(scene)))
         self._fails, self._began = False, time.monotonic()
@@ -130,9 +131,9 @@ class Beginning:
         self._making.wait(seconds)
 
     def show(self, scene: Scene, offer: Callable[[Bytes], None]) -> None:
-        """Offer a picture of the solid scene if it takes long until there is another one.
+        """Offer a picture of the solid scene if the real picture takes long.
 
-        Kernels are compiled only after the first one.
+        Kernels are compiled only after the first picture.
         """
         soon = not self._making.is_new and time.monotonic() - self._began < PATIENCE
         if soon or self._fails:

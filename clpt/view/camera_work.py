@@ -15,7 +15,7 @@ from clpt import transforms
 from clpt.arrays import Floats
 from clpt.scene import Scene, viewpoint
 from clpt.scene.cameras import Camera, Matrix, Perspective, ThinLens
-from clpt.scene.params import fields_of
+from clpt.scene.params import fields_of, params
 from clpt.scene.viewpoint import Pose, pose
 from clpt.view import saving
 from clpt.view.messages import OF_VIEW, CommandError, Reply, Request
@@ -30,7 +30,7 @@ LENS_SHARE = 0.01  # of the distance in focus: the radius that a pinhole gets as
 
 
 def rounded(point: Floats) -> list[float]:
-    """Return a point (3,) with six digits, as somebody would write it."""
+    """Return a point (3,) with six digits, as people write it."""
     return [float(f"{value:.6g}") for value in point]
 
 
@@ -102,7 +102,7 @@ def _unit(vector: Floats) -> Floats:
 class CameraWork:
     """Base of a session: its methods `_do_<command>` that concern the camera, and the pivot.
 
-    scene: the present one; _first: that of the file; the methods without a body are the session's.
+    scene: the present scene; _first: of the file; the methods without a body are the session's.
     """
 
     scene: Scene
@@ -151,9 +151,10 @@ class CameraWork:
         self._tell_state()
 
     def _do_field_of_view(self, reply: Reply, degrees: float) -> None:
-        if not isinstance(self.scene.camera, Perspective):
-            raise CommandError(f"the camera {self.scene.camera.kind} has no field of view")
-        self._move(dataclasses.replace(self.scene.camera, fov=degrees))
+        camera: Any = self.scene.camera
+        if "fov" not in params(type(camera)):
+            raise CommandError(f"the camera {camera.kind} has no field of view")
+        self._move(dataclasses.replace(camera, fov=degrees))
         self._tell_state()
 
     def _do_look_at(self, reply: Reply) -> None:
@@ -177,9 +178,9 @@ class CameraWork:
         if isinstance(camera, ThinLens):
             camera = dataclasses.replace(camera, focus_distance=distance)
         elif isinstance(camera, Perspective):
-            given = fields_of(camera)
+            fields = fields_of(camera)
             radius = LENS_SHARE * distance
-            camera = ThinLens(**given, focus_distance=distance, aperture_radius=radius)
+            camera = ThinLens(**fields, focus_distance=distance, aperture_radius=radius)
         else:
             raise CommandError(f"the camera {camera.kind} has no lens")
         self._move(camera)

@@ -1,6 +1,6 @@
-"""Looks at a scene: without some parts, under one lamp, at some wavelengths, in one region.
+"""Looks at a scene: without some parts, under a single lamp, at some wavelengths, in a region.
 
-A look changes no scene: it makes another one of it for the renderers.
+A look changes no scene: it makes a variant of it for the renderers.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from clpt.scene import Film, Scene
 from clpt.scene.lights import Light
 from clpt.scene.params import fields_of, params
 from clpt.scene.roles import EMISSION
-from clpt.spectra import Constant, Illuminant, Spectrum, illuminant, on_grid
+from clpt.spectra import Illuminant, Spectrum, illuminant, on_grid
 from clpt.spectra.cie import CIE_Y_INTEGRAL, LAMBDA_MAX, LAMBDA_MIN, cie_xyz
 from clpt.view.pictures import METHOD, PICTURE
 
@@ -30,12 +30,12 @@ MOST_STEPS = 100
 
 @dataclasses.dataclass(frozen=True)
 class Look:
-    """The way in which a viewer looks at a scene.
+    """A viewer's look at a scene.
 
-    hidden: indices of shapes; lamp: whose spectrum all lights have, each as bright as its own;
-    wavelength, width: [nm] of the only light, None for all; region: of the film, see `Film.crop`;
-    shows: the picture or a map of clpt.view.pictures; layers: that the film has for it, beside the
-    scene's own; denoises: whether the film is one for denoisers.
+    hidden: indices of shapes; lamp: all lights have its spectrum, with their luminance; wavelength,
+    width: [nm] of the only light, None for all; region: of the film, see `Film.crop`;
+    shows: the picture or a map of clpt.view.pictures; layers: of the film for that map, beside the
+    scene's layers; denoises: whether denoisers can use the film.
     """
 
     hidden: frozenset[int] = frozenset()
@@ -67,7 +67,7 @@ class Look:
         return dataclasses.replace(scene, shapes=shapes, lights=lights, film=film)
 
     def shape(self, number: int) -> int:
-        """Return the index in the scene of the shape that has this index in what is shown."""
+        """Return the index in the scene of a shape, by its index among the shown shapes."""
         for hidden in sorted(self.hidden):
             number += hidden <= number
         return number
@@ -86,7 +86,7 @@ class Look:
             changes |= {
                 "lambda_min": first,
                 "lambda_max": first + width,
-                # as bright as if all wavelengths were this one
+                # as bright as if all wavelengths were seen
                 "exposure": film.exposure * (high - low) / width,
             }
         return dataclasses.replace(film, **changes) if changes else film
@@ -98,9 +98,9 @@ _L = TypeVar("_L", bound=Light)
 def with_spectrum(light: _L, lamp: str) -> _L:
     """Return a light with a lamp's spectrum and its own luminance; textures and images stay."""
     changes: dict[str, Any] = {}
-    given = fields_of(light)
+    fields = fields_of(light)
     for name, param in params(type(light)).items():
-        value = given[name]
+        value = fields[name]
         if param.role is EMISSION and isinstance(value, Spectrum):
             changes[name] = illuminant(lamp, _luminance(value))
     return dataclasses.replace(light, **changes) if changes else light
@@ -108,8 +108,6 @@ def with_spectrum(light: _L, lamp: str) -> _L:
 
 def _luminance(spectrum: Spectrum) -> float:
     """Return the luminance of an emission; that of the constant 1 is 1."""
-    if isinstance(spectrum, Constant):
-        return float(spectrum.value)
     if isinstance(spectrum, Illuminant):
         return float(spectrum.scale)
     values = np.asarray(on_grid(spectrum, LAMBDA_MIN, LAMBDA_MAX), float)
@@ -118,14 +116,14 @@ def _luminance(spectrum: Spectrum) -> float:
 
 @dataclass(frozen=True)
 class State:
-    """A scene, and the way in which it is looked at."""
+    """A scene, and the look at it."""
 
     scene: Scene
     look: Look
 
 
 class History:
-    """States before the present one, and those that undoing has left."""
+    """States before the present state, and states that undoing has left."""
 
     def __init__(self) -> None:
         self._past: deque[State] = deque(maxlen=MOST_STEPS)
@@ -135,8 +133,8 @@ class History:
     def note(self, before: State, by: Hashable = None) -> None:
         """Note the state before a change.
 
-        by: what changed, such as a parameter. Changes of the same one after the other are one step,
-        as a slider makes many; None is never the same.
+        by: the changed part, such as a parameter. Consecutive changes of a part are a single step,
+        as a slider makes many; None is never the same part.
         """
         if by is None or by != self._last:
             self._past.append(before)
@@ -144,7 +142,7 @@ class History:
         self._last = by
 
     def back(self, now: State) -> State | None:
-        """Return the state before the present one; None where there is none."""
+        """Return the state before the present state; None where there is none."""
         self._last = None
         if not self._past:
             return None
@@ -160,7 +158,7 @@ class History:
         return self._future.pop()
 
     def clear(self) -> None:
-        """Forget all: the scene is another one."""
+        """Forget all states, after another scene was opened."""
         self._past.clear()
         self._future.clear()
         self._last = None

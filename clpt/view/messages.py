@@ -43,7 +43,7 @@ def as_json(message: object) -> str:
 
 
 def finite(value: object) -> Any:
-    """Return a message in which what is no finite number is None."""
+    """Return a message with None in place of numbers that are not finite."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -52,9 +52,9 @@ def finite(value: object) -> Any:
 
 
 def error_message(error: BaseException, before: str = "") -> dict[str, Any]:
-    """Return what a viewer is told of an error, on one line.
+    """Return a viewer's message about an error, on a single line.
 
-    before: begins the line. Of a file only the name is told, not its folder.
+    before: begins the line. A file has its name there, not its folder.
     """
     text = f"{before}{_reason(error)}"
     for folder in (CUT_NAME, QUOTED_FOLDER, FOLDER, CUT_FOLDER):
@@ -89,7 +89,7 @@ def _reason(error: BaseException) -> str:
 
 
 class CommandError(ClptError):
-    """A message that is no command, or one that cannot be done; its text is for the viewer."""
+    """A message without a command, or a command that fails; its text is for the viewer."""
 
 
 class Type(Protocol):
@@ -141,7 +141,7 @@ class Flag:
 
 @dataclass(frozen=True)
 class Choice:
-    """One of some names."""
+    """A name among several."""
 
     names: tuple[str, ...]
 
@@ -189,11 +189,11 @@ class Optional:
 
 @dataclass(frozen=True)
 class Command:
-    """One command.
+    """A command.
 
-    parameters: types by name; all but `Optional` ones must be given. steers: only the viewer who
-    steers may send it. restarts: the picture so far is of no use afterwards. quick: it does
-    not wait until samples that are being taken are there.
+    parameters: types by name; all but `Optional` parameters are required. steers: only the viewer
+    who steers may send it. restarts: the picture so far is of no use afterwards. quick: it does not
+    wait for the samples of the present pass.
     """
 
     doc: str
@@ -322,32 +322,32 @@ def parse(message: str | bytes) -> Request:
     if len(message) > LARGEST_MESSAGE:
         raise CommandError("the message is too long")
     try:
-        found = json.loads(message, parse_constant=_no_constant)
+        decoded = json.loads(message, parse_constant=_no_constant)
     except (ValueError, RecursionError):
         raise CommandError("the message is not JSON") from None
-    return checked(found)
+    return checked(decoded)
 
 
-def checked(found: object) -> Request:
+def checked(message: object) -> Request:
     """Return the command that a message is, with values of its declared types.
 
     Here alone a command is looked up. Raises CommandError.
     """
-    if not isinstance(found, dict) or not isinstance(found.get("do"), str):
+    if not isinstance(message, dict) or not isinstance(message.get("do"), str):
         raise CommandError("a message is an object that says what to do")
-    name = found["do"]
+    name = message["do"]
     command = COMMANDS.get(name)
     if command is None:
         raise CommandError(f"there is no command {_shown(name)}")
-    for key in found:
+    for key in message:
         if key != "do" and key not in command.parameters:
             raise CommandError(f"{name} has no parameter {_shown(key)}")
     values = {}
     for key, kind in command.parameters.items():
-        if key not in found and not isinstance(kind, Optional):
+        if key not in message and not isinstance(kind, Optional):
             raise CommandError(f"{name} needs {key}")
         try:
-            values[key] = kind.check(found.get(key))
+            values[key] = kind.check(message.get(key))
         except CommandError as error:
             raise CommandError(f"{name}: {key} {error}") from None
     return Request(name, values)
@@ -369,7 +369,7 @@ def _shown(value: object) -> str:
 def _check_value(value: object, levels: int) -> int:
     """Return how many parts a value has.
 
-    Raises CommandError for what is nested too deeply, and numbers too large or not finite.
+    Raises CommandError for values nested too deeply, and numbers too large or not finite.
     """
     if levels == 0:
         raise CommandError("is nested too deeply")

@@ -1,4 +1,4 @@
-"""Panels for what a scene has, made from the declarations of `clpt.scene`; and edits by them."""
+"""Panels for the parts of a scene, from the declarations of `clpt.scene`; and edits by them."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ from clpt.scene import Scene
 from clpt.scene.materials import LEAVES, Material, parts
 from clpt.scene.params import Kind, defaults, fields_of, params
 from clpt.scene.roles import INDEX, MEASUREMENT, MERL, SPECTRA, Param
-from clpt.scene.shapes import Group, Instance, Shape
-from clpt.scene.textures import Texture
+from clpt.scene.shapes import Shape
+from clpt.scene.values import is_texture
 from clpt.spectra.sensors import OBSERVERS
 from clpt.view.messages import OF_VIEW, CommandError
+from clpt.view.solid import each
 from clpt.view.target import Change
 
 # Controls of the page by the names of roles; others cannot be edited there.
@@ -47,7 +48,7 @@ METAL = "metal"  # a name in place of `eta` and `k`
 KIND = "type"  # of a material, as scene.json calls it
 MOST_OBJECTS = 500  # that a page lists
 MOST_PANELS = 300
-LONGEST_NAME = 80  # characters that it is told of a name
+LONGEST_NAME = 80  # characters of a name on the page
 CURVE_AT = range(380, 781, 20)  # [nm]
 OF_FILM = (  # what can change while the renderers stay
     "sensor", "white_balance", "exposure", "display_exposure", "lambda_min", "lambda_max",
@@ -56,33 +57,33 @@ OF_FILM = (  # what can change while the renderers stay
 
 
 def panels(scene: Scene) -> list[dict[str, Any]]:
-    """Return a description of a panel for each thing that can be edited.
+    """Return a description of a panel for each kind of the scene that can be edited.
 
-    target, index: what `edited` takes; title, kind, doc: for people; kinds: those that it can
-    become, by KIND as the key; metals: those that METAL as the key takes; shapes: indices of those
-    that have a material or an emission; parameters: see `_parameter`.
+    target, index: arguments of `edited`; title, kind, doc: for people; kinds: that KIND as the key
+    takes; metals: that METAL as the key takes; shapes: indices of shapes that have the material or
+    emission; parameters: see `_parameter`.
     """
-    found: list[dict[str, Any]] = []
-    for target, things in _targets(scene).items():
-        for index, (thing, owners) in enumerate(things[: MOST_PANELS - len(found)]):
-            found.append(
+    described: list[dict[str, Any]] = []
+    for target, targets in _targets(scene).items():
+        for index, (target_kind, owners) in enumerate(targets[: MOST_PANELS - len(described)]):
+            described.append(
                 {
                     "target": target,
                     "index": index,
-                    "title": _title(target, thing, owners, scene),
-                    "kind": thing.kind,
+                    "title": _title(target, target_kind, owners, scene),
+                    "kind": target_kind.kind,
                     "kinds": list(_material_kinds()) if target == "material" else [],
-                    "metals": list(spectra.metals()) if _is_metal(thing) else [],
-                    "doc": (type(thing).__doc__ or "").strip().splitlines()[0],
+                    "metals": list(spectra.metals()) if _is_metal(target_kind) else [],
+                    "doc": (type(target_kind).__doc__ or "").strip().splitlines()[0],
                     "shapes": owners[:MOST_OBJECTS],
-                    "parameters": _parameters(target, thing),
+                    "parameters": _parameters(target, target_kind),
                 }
             )
-    return found
+    return described
 
 
 def names(with_view: bool) -> dict[str, list[str]]:
-    """Return the names that the page offers, by what they are of; with_view: of OpenColorIO."""
+    """Return the names that the page offers, by subject; with_view: of OpenColorIO."""
     return {
         "tones": [*TONES, *[OF_VIEW] * with_view],
         "illuminants": list(spectra.illuminants()),
@@ -104,7 +105,7 @@ def objects(scene: Scene) -> list[dict[str, Any]]:
 
 
 def object_of(scene: Scene, index: int) -> dict[str, Any]:
-    """Return a shape for people: name, kind, what its material is, and the index of its panel."""
+    """Return a shape for people: name, kind, name of its material, and the index of its panel."""
     shape = scene.shapes[index]
     materials = [id(material) for material, _ in _targets(scene)["material"]]
     panel = materials.index(id(shape.material)) if id(shape.material) in materials else None
@@ -116,33 +117,33 @@ def object_of(scene: Scene, index: int) -> dict[str, Any]:
 
 
 def for_people(name: str) -> str:
-    """Return a name of a scene, of which a file may make anything, as a page shows it.
+    """Return a name of a scene as a page shows it; a file may hold any text.
 
-    It is short, and has no signs that are not seen, such as those that turn the text around.
+    It is short, and has no invisible characters, such as marks that turn the text around.
     """
-    shown = "".join(one if one.isprintable() else "?" for one in name[: LONGEST_NAME + 1])
+    shown = "".join(letter if letter.isprintable() else "?" for letter in name[: LONGEST_NAME + 1])
     return shown if len(shown) <= LONGEST_NAME else f"{shown[: LONGEST_NAME - 3]}..."
 
 
 def edited(scene: Scene, target: str, index: int, key: str, value: object) -> tuple[Scene, Change]:
-    """Return a scene in which a parameter has another value, and how it differs.
+    """Return a scene with another value of a parameter, and the change.
 
     value: as in scene.json, but it names no file; of a material KIND is a key too. Raises
     CommandError, SceneError.
     """
-    things = _targets(scene).get(target, [])
-    if index >= len(things):
+    targets = _targets(scene).get(target, [])
+    if index >= len(targets):
         raise CommandError(f"the scene has no {target} {index + 1}")
-    thing = things[index][0]
+    edited_kind = targets[index][0]
     if key == KIND and target == "material":
-        return _replaced(scene, target, thing, _of_kind(thing, value))
-    if key == METAL and target == "material" and _is_metal(thing):
-        return _replaced(scene, target, thing, _of_metal(thing, value))
-    param = params(type(thing)).get(key)
+        return _replaced(scene, target, edited_kind, _of_kind(edited_kind, value))
+    if key == METAL and target == "material" and _is_metal(edited_kind):
+        return _replaced(scene, target, edited_kind, _of_metal(edited_kind, value))
+    param = params(type(edited_kind)).get(key)
     if param is None or not _editable(target, key, param):
-        raise CommandError(f"{thing.kind}.{key} cannot be edited")
-    new = dataclasses.replace(thing, **{key: read(key, value, param)})
-    return _replaced(scene, target, thing, new)
+        raise CommandError(f"{edited_kind.kind}.{key} cannot be edited")
+    new = dataclasses.replace(edited_kind, **{key: read(key, value, param)})
+    return _replaced(scene, target, edited_kind, new)
 
 
 @cache
@@ -156,8 +157,8 @@ def _material_kinds() -> dict[str, type[Material]]:
     }
 
 
-def _is_metal(thing: Kind) -> bool:
-    return any(METAL in shorthand.arguments for shorthand in thing.shorthands)
+def _is_metal(material: Kind) -> bool:
+    return any(METAL in shorthand.arguments for shorthand in material.shorthands)
 
 
 def _of_metal(material: Material, metal: object) -> Material:
@@ -185,15 +186,15 @@ def _of_kind(material: Material, kind: object) -> Material:
     }
     try:
         return cls(**values)
-    except SceneError:  # of values that fit one kind alone
+    except SceneError:  # of values that fit a single kind
         return cls(name=material.name)
 
 
-def written(thing: Kind) -> dict[str, Any]:
+def written(kind: Kind) -> dict[str, Any]:
     """Return a camera or a light as scene.json has it, without what cannot be shown."""
-    given, declared = fields_of(thing), params(type(thing)).items()
-    known = {name: _shown(given[name], param) for name, param in declared}
-    return {"type": thing.kind, **{key: value for key, value in known.items() if value is not None}}
+    values, declared = fields_of(kind), params(type(kind)).items()
+    known = {name: _shown(values[name], param) for name, param in declared}
+    return {"type": kind.kind, **{key: value for key, value in known.items() if value is not None}}
 
 
 def _targets(scene: Scene) -> dict[str, list[tuple[Any, list[int]]]]:
@@ -201,7 +202,7 @@ def _targets(scene: Scene) -> dict[str, list[tuple[Any, list[int]]]]:
     materials: dict[int, tuple[Material, list[int]]] = {}
     emissions: dict[int, tuple[Any, list[int]]] = {}
     for i, shape in enumerate(scene.shapes):
-        for member in _members(shape):
+        for member in shape.members:
             for part in parts(member.material):
                 owners = materials.setdefault(id(part), (part, []))[1]
                 if not owners or owners[-1] != i:
@@ -218,22 +219,18 @@ def _targets(scene: Scene) -> dict[str, list[tuple[Any, list[int]]]]:
     }
 
 
-def _members(shape: Shape) -> tuple[Shape, ...]:
-    return shape.group.shapes if isinstance(shape, Instance) else (shape,)
-
-
-def _title(target: str, thing: Any, owners: list[int], scene: Scene) -> str:
-    if getattr(thing, "name", ""):
-        return for_people(thing.name)
+def _title(target: str, kind: Any, owners: list[int], scene: Scene) -> str:
+    if getattr(kind, "name", ""):
+        return for_people(kind.name)
     named = [scene.shapes[i].name for i in owners if scene.shapes[i].name]
-    return for_people(named[0]) if named else thing.kind.replace("_", " ")
+    return for_people(named[0]) if named else kind.kind.replace("_", " ")
 
 
-def _parameters(target: str, thing: Kind) -> list[dict[str, Any]]:
-    given, default = fields_of(thing), defaults(type(thing))
+def _parameters(target: str, kind: Kind) -> list[dict[str, Any]]:
+    values, default = fields_of(kind), defaults(type(kind))
     return [
-        _parameter(name, param, given[name], default[name])
-        for name, param in params(type(thing)).items()
+        _parameter(name, param, values[name], default[name])
+        for name, param in params(type(kind)).items()
         if _editable(target, name, param)
     ]
 
@@ -250,7 +247,7 @@ def _editable(target: str, key: str, param: Param) -> bool:
 
 
 def _parameter(name: str, param: Param, value: object, default: object) -> dict[str, Any]:
-    """Return what the page has to know: control, words, unit, limits, choices, value."""
+    """Return a parameter for the page: control, words, unit, limits, choices, value."""
     form = param.role.name
     choices = list(OBSERVERS) if form == "sensor" else list(param.choices)
     if form == "white_balance":
@@ -268,13 +265,13 @@ def _parameter(name: str, param: Param, value: object, default: object) -> dict[
         "value": _shown(value, param),
         "default": _shown(default, param),
         "curve": _curve(value, param),
-        "texture": value.kind if isinstance(value, Texture) else None,
+        "texture": value.kind if is_texture(value) else None,
     }
 
 
 def _curve(value: Any, param: Param) -> list[float] | None:
-    """Return a spectrum at CURVE_AT, for a small plot; None for what is none."""
-    if param.role not in SPECTRA or isinstance(value, Texture):
+    """Return a spectrum at CURVE_AT, for a small plot; None for other values."""
+    if param.role not in SPECTRA or is_texture(value):
         return None
     try:
         if param.role is INDEX:
@@ -282,14 +279,14 @@ def _curve(value: Any, param: Param) -> list[float] | None:
         else:
             plain = isinstance(value, (int, float))
             spectrum = spectra.Constant(float(value)) if plain else value
-        return [float(f"{one:.4g}") for one in spectrum.sample(np.array(CURVE_AT, float))]
+        return [float(f"{number:.4g}") for number in spectrum.sample(np.array(CURVE_AT, float))]
     except (SceneError, AttributeError):
         return None
 
 
 def _shown(value: object, param: Param) -> Any:
     """Return a value as scene.json has it, None where the page cannot show it."""
-    if isinstance(value, (Texture, Material, Group)) or not is_plain(param):
+    if is_texture(value) or not is_plain(param):
         return None
     shown = forms.write(value, param, _WRITER)
     try:
@@ -327,25 +324,15 @@ def _replaced(scene: Scene, target: str, old: Any, new: Any) -> tuple[Scene, Cha
         changed, _ = edit_scene(scene, Successors(), {old: new})
         same = type(old) is type(new)
         return changed, Change(materials={old: new}) if same else Change(whole=True)
-    groups: dict[int, Group] = {}
-    shapes = [_with_emission(shape, old, new, groups) for shape in scene.shapes]
-    return dataclasses.replace(scene, shapes=shapes), Change(whole=True)
 
+    def emitting(shape: Shape) -> Shape:
+        return dataclasses.replace(shape, emission=new) if shape.emission is old else shape
 
-def _with_emission(shape: Shape, old: Any, new: Any, groups: dict[int, Group]) -> Shape:
-    if isinstance(shape, Instance):
-        group = shape.group
-        if all(member.emission is not old for member in group.shapes):
-            return shape
-        if id(group) not in groups:
-            members = tuple(_with_emission(member, old, new, groups) for member in group.shapes)
-            groups[id(group)] = dataclasses.replace(group, shapes=members)
-        return dataclasses.replace(shape, group=groups[id(group)])
-    return dataclasses.replace(shape, emission=new) if shape.emission is old else shape
+    return dataclasses.replace(scene, shapes=each(scene.shapes, emitting)), Change(whole=True)
 
 
 class _NoParts:
-    """Reads and writes no part of a scene but values: whatever else is asked of it is refused."""
+    """Reads and writes values alone; it refuses parts of a scene."""
 
     def __getattr__(self, name: str) -> NoReturn:
         raise CommandError("only a value can stand here")

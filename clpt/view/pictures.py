@@ -21,12 +21,12 @@ from clpt.render.renderer import Renderer
 from clpt.scene.layers import LAYERS
 from clpt.view.messages import OF_VIEW, CommandError
 
-METHOD = "oidn"  # of denoising: the other one takes a second for a small picture
+METHOD = "oidn"  # of denoising: the other method takes a second for a small picture
 JPEG_QUALITY = 85
 SHARE = 0.02  # of the time of a render that pictures may take
 ALLOWANCE = 0.15  # [s] of pictures that a new render has at once
 PICTURE, SAMPLES, ERROR, DENOISED = "picture", "samples", "error", "denoised"
-# layers that are one picture each, of what paths have met
+# layers that are a picture each, of surfaces that paths have met
 SURFACES = tuple(n for n, layer in LAYERS.items() if layer.form in ("near", "long", "id"))
 MAPS: Final = (PICTURE, DENOISED, SAMPLES, ERROR, *SURFACES)  # each is a choice in the page
 
@@ -52,7 +52,7 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
 
 @dataclass(frozen=True)
 class Display:
-    """Settings by which a page shows the picture; the render does not know of them.
+    """Settings of a page for the picture; the render does not know them.
 
     exposure [stops] over that of the film; tone: a curve of clpt.images.colour, or that of
     `view`, of OpenColorIO.
@@ -134,21 +134,21 @@ def samples(film: Image) -> tuple[Bytes, Legend]:
 
 
 class ErrorMap:
-    """An estimate of each pixel's error, from the films of one render.
+    """An estimate of each pixel's error, from the films of a render.
 
     With n samples the mean is m, with n1 of them it was m1: the variance of m is the mean of
     (m - m1)^2 n1 / (n - n1), where samples are independent; where they are stratified it is less.
     """
 
     def __init__(self) -> None:
-        self._films: list[Image] = []  # two at most, the newer one with twice as many samples
+        self._films: list[Image] = []  # two at most, the newer film with twice as many samples
 
     def wants(self, samples: float) -> bool:
         """Return whether the film of so many samples is to be noted."""
         return not self._films or samples >= 2.0 * float(self._films[-1][..., 3].mean())
 
     def note(self, film: Image) -> None:
-        """Note a film (h, w, 4), to compare later ones with."""
+        """Note a film (h, w, 4), to compare later films with."""
         self._films = [*self._films[-1:], film]
 
     def of(self, film: Image) -> NDArray[np.float64] | None:
@@ -157,9 +157,8 @@ class ErrorMap:
         It is a mean over the pixels around it, whose brightness it is relative to.
         """
         count = film[..., 3].astype(float)
-        former = next(
-            (one for one in reversed(self._films) if 1.5 * one[..., 3].mean() <= count.mean()), None
-        )
+        most = count.mean() / 1.5
+        former = next((f for f in reversed(self._films) if f[..., 3].mean() <= most), None)
         if former is None:
             return None
         before = former[..., 3].astype(float)
@@ -186,7 +185,7 @@ class ErrorMap:
 
 
 def _around(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean of the pixels around each one, by a tent; of fewer at the edges."""
+    """Return the mean of the pixels around each pixel, by a tent; of fewer at the edges."""
     total, half = values, WINDOW // 4
     for axis in (0, 1, 0, 1):  # two boxes make a tent
         size = total.shape[axis]

@@ -1,7 +1,7 @@
-"""The contents of one pixel: its first hit, and its spectrum with the error that is left.
+"""The contents of a pixel: its first hit, and its spectrum with the remaining error.
 
-A probe has renderers of a film of one pixel, and a thread and a queue of its own: it works while
-the picture goes on. The camera is turned into one that sees that pixel alone.
+A probe has renderers of a film of a single pixel, and a separate thread and queue: it works while
+the picture goes on. Its camera sees that pixel alone.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from clpt.device import Device
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
-from clpt.scene.integrators import Box, Direct, Integrator, Path, Whitted, shared
+from clpt.scene.integrators import Box, Integrator, Path, shared
 from clpt.view.messages import Reply, answering
 from clpt.view.solid import bare, each
 
@@ -29,7 +29,7 @@ NARROW = 0.01  # pixels around the centre that a hit is looked for in
 
 
 def pixel_of(scene: Scene, x: int, y: int, bands: int, integrator: Integrator) -> Scene:
-    """Return a scene that shows the pixel (x, y) of another one alone."""
+    """Return a scene that shows the pixel (x, y) of `scene` alone."""
     camera = scene.camera.pixel_camera(scene.film.width, scene.film.height, x, y)
     size: dict[str, Any] = {"width": 1, "height": 1, "crop": None}
     if camera is None:
@@ -39,26 +39,26 @@ def pixel_of(scene: Scene, x: int, y: int, bands: int, integrator: Integrator) -
 
 
 def plain(integrator: Integrator) -> tuple[Integrator, str]:
-    """Return an integrator that renders one pixel well, and what to say if it is another."""
-    if isinstance(integrator, (Direct, Whitted)):
+    """Return an integrator that renders a single pixel well, and a remark if it is another."""
+    starts_at_lights = integrator.light_paths != 0 or integrator.from_lights_alone
+    if not (starts_at_lights or integrator.asks_photons):
         return integrator, ""
-    alone = isinstance(integrator, Path) and integrator.light_paths == 0
-    remark = "" if alone else "by paths from the camera alone"
     path = Path(light_paths=0)
-    return dataclasses.replace(path, **shared(integrator, path)), remark
+    path = dataclasses.replace(path, **shared(integrator, path))
+    return path, "by paths from the camera alone"
 
 
 def _differ_by_camera(former: Scene, scene: Scene) -> bool:
     """Whether all but the cameras of two scenes are the same objects."""
     parts = [
-        (one.shapes, one.lights, one.film, one.integrator, one.sampler, one.seed)
-        for one in (former, scene)
+        (each.shapes, each.lights, each.film, each.integrator, each.sampler, each.seed)
+        for each in (former, scene)
     ]
     return all(old is new for old, new in zip(*parts, strict=True))
 
 
 class Follower:
-    """A renderer of one pixel, of whatever scene it is asked for next."""
+    """A renderer of a single pixel, of the scene that it is asked for next."""
 
     def __init__(self, device: Device):
         self.device = device
@@ -107,7 +107,7 @@ class Question:
 
 
 class Probe:
-    """Answers questions in a thread of its own; a new one ends the work on an older one."""
+    """Answers questions in a separate thread; a new question ends the work on an older question."""
 
     def __init__(self, device: Device):
         self._device = device
@@ -120,7 +120,7 @@ class Probe:
         self._thread.start()
 
     def ask(self, question: Question) -> None:
-        """Let a question be answered, in the place of one of the same sort that waits."""
+        """Queue a question; it replaces a queued question of the same sort."""
         with self._wake:
             self._waiting[question.then is not None] = question
             self._wake.notify_all()
@@ -155,9 +155,11 @@ class Probe:
 
     def _answer(self, question: Question) -> None:
         if self._hits is None:
-            own = Device.open(self._device.info, context=self._device.context)
-            own.compilers = self._device.compilers  # else the picture waits for the driver's lock
-            self._hits, self._spectra = Follower(own), Follower(own)
+            device = Device.open(self._device.info, context=self._device.context)
+            device.compilers = (
+                self._device.compilers
+            )  # else the picture waits for the driver's lock
+            self._hits, self._spectra = Follower(device), Follower(device)
         scene, x, y = question.scene, question.x, question.y
         hit = first_hit(self._hits, scene, x, y)
         if question.then is not None:
@@ -178,8 +180,8 @@ class Probe:
                 return
             renderer.run(BATCH)
             total = tuple(
-                np.asarray(one, float).ravel() * batch
-                for one in (renderer.image(), renderer.colours())
+                np.asarray(picture, float).ravel() * batch
+                for picture in (renderer.image(), renderer.colours())
             )
             means.append((total[0] - before[0], total[1] - before[1]))
             before = total

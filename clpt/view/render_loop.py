@@ -1,6 +1,6 @@
-"""The two renderers behind a page, the whole picture and a smaller one, and what goes out of them.
+"""The two renderers behind a page, of the whole picture and of smaller pictures, and their output.
 
-While something moves, the smaller one makes a picture at every step. Then the whole picture
+While something moves, there is a smaller picture at every step. Then the whole picture
 begins, in passes that grow, so that few ends of passes cost time; it is offered as often as
 `Budget` lets it.
 """
@@ -31,15 +31,15 @@ from clpt.view.target import Change, Make, Target, smaller
 
 PREVIEW_PIXELS = 64_000  # about, of the picture while it moves
 PREVIEW_SAMPLES = 4  # of it, before the whole picture begins
-SLOW = 0.06  # [s] of two previews, beyond which the next ones are smaller
-FAST_PREVIEWS = 4  # after which, where finer ones would be fast too, the next ones are finer
+SLOW = 0.06  # [s] of two previews: slower previews become smaller
+FAST_PREVIEWS = 4  # after them the next previews are finer, if these would be fast too
 MUCH_FASTER = 0.5  # of SLOW: so that they do not become coarser at once
-CANCEL_SECONDS = 0.1  # in which a pass ends when something moves
+CANCEL_SECONDS = 0.1  # a pass ends within them when something moves
 DIVIDERS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128, 256)
 PASS_SECONDS = 2.0  # of a pass; and more when the render has lasted, since ends of passes are dear
 PASS_SHARE, LONGEST_PASS = 0.5, 10.0  # of the time so far, and [s]
 STATUS_SECONDS = 0.25  # between messages of progress
-BEGINNING_SECONDS = 0.02  # between looks at what viewers ask for while kernels are compiled
+BEGINNING_SECONDS = 0.02  # between looks at requests while kernels are compiled
 
 
 class Outlet(Protocol):
@@ -58,7 +58,7 @@ class RenderLoop:
     make: of the whole picture's renderer, called with the scene and options; by default it is a
     `Renderer` on the device, as that of smaller pictures always is. options: of renderers.
 
-    One thread calls its methods; but for `cancel` and `close`, which any may call.
+    A single thread calls its methods; any thread may call `cancel` and `close`.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class RenderLoop:
     def begin(self, scene: Scene, change: Change, denoise: str | None = None) -> None:
         """Render another scene from now on.
 
-        denoise: the denoiser that the picture is for: a limit of noise is for what that leaves.
+        denoise: the denoiser of the picture: a limit of noise is for the denoised picture.
         """
         limits = None if scene.noise is None else denoise
         if limits != self._limits:
@@ -160,7 +160,7 @@ class RenderLoop:
             if not discarded and (self._budget.due() or self._stale):
                 self._offer(self._full.follow(self.scene), 1)
         elif self._stale or not self._offered:
-            self._offer(self._full.follow(self.scene), 1, rest=True)
+            self._offer(self._full.follow(self.scene), 1, at_rest=True)
         else:
             return False
         return True
@@ -256,9 +256,9 @@ class RenderLoop:
             self._resize_preview(finer, now=True)
 
     def _make(self, scene: Scene, beside: Renderer | None = None, **more: Any) -> Renderer:
-        """Return a renderer on the device, beside one that there is."""
+        """Return a renderer on the device, beside a former renderer."""
         others = beside, self._full.renderer, self._preview.renderer
-        beside = next((one for one in others if isinstance(one, Renderer)), None)
+        beside = next((renderer for renderer in others if isinstance(renderer, Renderer)), None)
         return Renderer(scene, self.device, beside=beside, **self._options, **more)
 
     def _make_whole(self, scene: Scene) -> Renderer:
@@ -316,7 +316,7 @@ class RenderLoop:
             self._errors.note(renderer.film.get())
 
     def _offer(
-        self, renderer: Renderer, divider: int, rest: bool = False, rendered: float = 0.0
+        self, renderer: Renderer, divider: int, at_rest: bool = False, rendered: float = 0.0
     ) -> None:
         """Offer the picture as it is; rest: equal to `Renderer.resolve` to the byte.
 
@@ -328,25 +328,25 @@ class RenderLoop:
             self.has_shown, self._film = True, None
         shown = None if legend is None else dataclasses.asdict(legend)
         took = {"samples": renderer.samples, "rendered": rendered}
-        self._send(pixels, divider, rest=rest, legend=shown, **took)
-        self._stale, self._offered = False, rest
+        self._send(pixels, divider, at_rest=at_rest, legend=shown, **took)
+        self._stale, self._offered = False, at_rest
         self._budget.spend(time.perf_counter() - began)
         self.tell(renderer)
 
-    def _send(self, pixels: Bytes, divider: int, *, rest: bool = False, **told: object) -> None:
-        """Send a picture, with a header of its size and of what else is `told` of it."""
-        data = pictures.png(pixels) if rest else pictures.jpeg(pixels)
+    def _send(self, pixels: Bytes, divider: int, *, at_rest: bool = False, **facts: object) -> None:
+        """Send a picture, with a header of its size and further `facts`."""
+        data = pictures.png(pixels) if at_rest else pictures.jpeg(pixels)
         self._frame += 1
         film = self.scene.film
         header = {
             "frame": self._frame,
-            "format": "png" if rest else "jpeg",
+            "format": "png" if at_rest else "jpeg",
             "size": [pixels.shape[1], pixels.shape[0]],
             "film": [film.width, film.height],
             "crop": film.crop,
             "divider": divider,
             "samples": 0,
-            "rest": rest,
+            "rest": at_rest,
             "solid": False,
             "difference": self._difference(),
             "changes": self._changes,
@@ -355,7 +355,7 @@ class RenderLoop:
             "shows": self.shows,
             "legend": None,
         }
-        self.outlet.picture(header | told, data)
+        self.outlet.picture(header | facts, data)
 
     def _shown(self, renderer: Renderer, whole: bool) -> tuple[NDArray[np.uint8], Any]:
         """Return what a renderer has for the screen, and the legend of its colours or None."""
@@ -365,17 +365,19 @@ class RenderLoop:
             return pictures.denoised(renderer, self.display), None
         if whole and self.shows == pictures.SAMPLES:
             return pictures.samples(renderer.film.get())
-        found = self._errors.shown(renderer.film.get()) if self.shows == pictures.ERROR else None
-        if found is not None and whole:
-            return found
+        error_map = (
+            self._errors.shown(renderer.film.get()) if self.shows == pictures.ERROR else None
+        )
+        if error_map is not None and whole:
+            return error_map
         return pictures.shown(renderer, self.display), None
 
     def _difference(self) -> dict[str, float] | None:
-        """Return how much the picture differs from the one that is kept, if they are as large."""
+        """Return the difference of the picture from the kept picture, if they are as large."""
         film = None if self.kept is None else self.film
         if self.kept is None or film is None or self.kept.shape != film.shape:
             return None
-        kept, now = (one[..., :3].astype(np.float64) for one in (self.kept, film))
+        kept, now = (picture[..., :3].astype(np.float64) for picture in (self.kept, film))
         error, mean = np.abs(now - kept), max(float(kept.mean()), 1e-30)
         return {
             "relative_mean": float(error.mean()) / mean,

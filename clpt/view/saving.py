@@ -1,4 +1,4 @@
-"""Views, and files that a page saves: new ones in the folder that was given at the start.
+"""Views, and files that a page saves: new files in the folder that was given at the start.
 
 A view is a camera and the look of its picture, as JSON that is saved, copied and opened again. The
 name of a file is taken by making the file, which fails where anything has that name, a link to
@@ -72,9 +72,9 @@ def request(document: object) -> Request:
     if not isinstance(document, dict) or "camera" not in document:
         raise CommandError("this is no view: it has no camera")
     display = document.get("display")
-    given = {"exposure": 0.0, "tone": "none", **(display if isinstance(display, dict) else {})}
+    look = {"exposure": 0.0, "tone": "none", **(display if isinstance(display, dict) else {})}
     kinds_of = COMMANDS["open_view"].parameters
-    values = {"camera": document["camera"], **given}
+    values = {"camera": document["camera"], **look}
     checked = {name: kind.check(values[name]) for name, kind in kinds_of.items()}
     camera_of(checked["camera"])
     return Request("open_view", checked)
@@ -127,7 +127,7 @@ class Folder:
 
     @contextmanager
     def _new_file(self, suffix: str) -> Iterator[tuple[Path, Path]]:
-        """Yield the path of a new file, and the one to write to, which gets that name at the end.
+        """Yield the path of a new file, and a path to write to, which gets that name at the end.
 
         Nothing stays if writing fails. Raises CommandError, OSError.
         """
@@ -140,7 +140,7 @@ class Folder:
             raise
 
     def _new(self, suffix: str, make: Callable[[Path], object]) -> Path:
-        """Return the first path of those that are numbered which `make` can make."""
+        """Return the first of the numbered paths that `make` can make."""
         for number in range(1, MOST_FILES):
             path = self.folder / f"{self.name}-{number:03d}{suffix}"
             try:

@@ -1,7 +1,7 @@
-"""Serves the page and its socket to browsers, of which none is trusted.
+"""Serves the page and its socket to browsers, and trusts none of them.
 
-Every connection must ask for a name under which the server listens (or a page elsewhere could
-reach it by a name of its own, "DNS rebinding"), and have a cookie that a one-time token became.
+Every connection must ask for a name of the server (or a page elsewhere could reach it by another
+name, "DNS rebinding"), and have a cookie, which a token buys a single time.
 A socket must also come from the server's own page.
 """
 
@@ -50,15 +50,15 @@ quiet.setLevel(logging.CRITICAL)  # what strangers send is nothing to report
 
 MOST_VIEWERS = 8
 MOST_STRANGERS = 64  # connections that have not become a viewer's; beyond, the oldest is dropped
-HELLO_SECONDS = 5.0  # in which a connection says what it wants
-PING_SECONDS = 20.0  # between pings, and in which each is answered
-CLOSE_SECONDS = 1.0  # in which the other end agrees that a socket is closed
+HELLO_SECONDS = 5.0  # a connection sends its request within them
+PING_SECONDS = 20.0  # between pings, and until an answer
+CLOSE_SECONDS = 1.0  # the other end agrees within them that a socket is closed
 MOST_FRAGMENTS = 64  # of a message
 FRAME_RATE, FRAME_BURST = 240.0, 480.0  # parts of messages, pings and confirmations of a viewer
 MOST_FRAMES = 2  # on their way to a viewer, who has not confirmed them
 MOST_MESSAGES = 256  # that wait for a viewer
-PRESENT = ("state", "status", "wheel")  # types of messages that the next one makes untrue
-RATE, BURST = 60.0, 120.0  # messages a second of one viewer, and how many at once
+PRESENT = ("state", "status", "wheel")  # types of messages that the next of the type makes untrue
+RATE, BURST = 60.0, 120.0  # messages a second of a viewer, and how many at once
 SEND_SECONDS = 20.0  # after which a viewer who takes nothing is left
 SOCKET = "socket"
 TYPES = {
@@ -113,8 +113,8 @@ class Connection(ServerConnection):
     """A connection whose other end cannot let memory grow.
 
     The library bounds what a message holds and how many wait. It answers each ping, though nobody
-    may read the answers, and keeps all parts of a message, of which empty ones cost nothing to
-    send. Both are counted here.
+    may read the answers, and keeps all parts of a message, though empty parts cost nothing to send.
+    Both are counted here.
 
     strangers: all that are no viewer's yet, in their order; the first leaves where they are many.
     """
@@ -170,10 +170,10 @@ class Viewer:
         self.rate = Rate(RATE, BURST)
 
     def tell(self, message: dict[str, Any]) -> None:
-        """Let a message be sent; of what is true only now, in the place of one that waits."""
+        """Queue a message; a message about the present replaces a queued message of its kind."""
         kind = message["type"]
         if kind in PRESENT:
-            self.messages = deque(one for one in self.messages if one[0] != kind)
+            self.messages = deque(queued for queued in self.messages if queued[0] != kind)
         self.messages.append((kind, as_json(message)))
         if len(self.messages) > MOST_MESSAGES:  # it takes nothing
             self.messages.clear()
@@ -185,7 +185,7 @@ class Viewer:
         self.connection.transport.abort()
 
     def offer(self, frame: int, data: bytes) -> None:
-        """Let a picture be sent, in the place of one that waits."""
+        """Queue a picture; it replaces a queued picture."""
         self.frame = frame, data
         self.wake.set()
 
@@ -257,8 +257,8 @@ class Server:
         return f"[{host}]:{self.port}" if ":" in host else f"{host}:{self.port}"
 
     def _is_named(self, connection: ServerConnection, name: str) -> bool:
-        """Return whether a request names this server, by a name of its own or by the address at
-        which it has come, where the server listens at all of them.
+        """Return whether a request names this server: by its name, or by the address of the
+        connection, where the server listens at all addresses.
         """
         if name.lower() in self._hosts:
             return True

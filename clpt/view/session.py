@@ -1,4 +1,4 @@
-"""The session behind a page: a thread that does what viewers ask for, and renders meanwhile."""
+"""The session behind a page: a thread that serves requests of viewers, and renders meanwhile."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Session(CameraWork):
         self.where = where or device.info.label
         self.scene = self._first = scene
         self.look = Look()
-        self._works = self.scene, self.look  # the last ones that could be rendered
+        self._works = self.scene, self.look  # the last scene and look that could be rendered
         self._history = History()
         self._has_worked = False
         self._rests = False  # nothing can be rendered until something is asked for
@@ -116,12 +116,12 @@ class Session(CameraWork):
             self._wake.notify_all()
         if left_out is not None:
             left_out[1](error_message(CommandError(f"{left_out[0].name} was left out: too many")))
-        command = COMMANDS.get(request.name)  # None for what the probe asks for
+        command = COMMANDS.get(request.name)  # None for requests of the probe
         if command is not None and command.restarts:
             self._loop.cancel(discard=command.certain)
 
     def watched(self, viewers: int) -> None:
-        """Note how many viewers there are; when the last one has left the render waits."""
+        """Note how many viewers there are; when the last has left the render waits."""
         with self._wake:
             if viewers or self._viewers > 0:
                 self._viewers = viewers
@@ -134,7 +134,7 @@ class Session(CameraWork):
         return self._loop.status
 
     def state(self) -> dict[str, Any]:
-        """Return what a viewer has to know of the scene, and how it is looked at."""
+        """Return the state of scene and look for a viewer."""
         scene, film = self.scene, self.scene.film
         return {
             "type": "state",
@@ -182,10 +182,10 @@ class Session(CameraWork):
             self._loop.close()
 
     def _try_to_advance(self) -> bool:
-        """Go on; a scene that cannot be rendered is given up for the last one that could.
+        """Go on; the last scene that could be rendered replaces a scene that cannot.
 
-        Raises what the loop raises where the first one cannot be rendered. If a later one cannot be
-        rendered any more, as with a device that is gone, the render rests.
+        Raises errors of the loop where the first scene cannot be rendered. If a former scene cannot
+        be rendered any more, as with a device that is gone, the render rests.
         """
         if self._rests:
             return False
@@ -219,8 +219,8 @@ class Session(CameraWork):
         if not self._requests:
             return
         with self._wake:
-            requests = [one for one in self._requests if is_quick(one[0])]
-            kept = [one for one in self._requests if not is_quick(one[0])]
+            requests = [waiting for waiting in self._requests if is_quick(waiting[0])]
+            kept = [waiting for waiting in self._requests if not is_quick(waiting[0])]
             self._requests = deque(kept)
         self._handle(requests)
 
@@ -285,7 +285,7 @@ class Session(CameraWork):
         self.outlet.message({"type": "note", "text": "the scene's file was read again"})
 
     def _show(self, scene: Scene, change: Change, look: Look | None = None) -> None:
-        """Render another scene, as it is looked at; look: another one too."""
+        """Render another scene with the present look, or another look."""
         look = self.look if look is None else look
         shown = look.apply(scene)
         self.scene, self.look = scene, look
@@ -395,8 +395,8 @@ class Session(CameraWork):
     def _do_hide(self, reply: Reply, shape: int, hidden: bool) -> None:
         if shape >= len(self.scene.shapes):
             raise CommandError(f"the scene has {len(self.scene.shapes)} objects")
-        one = {shape}
-        self._look(hidden=self.look.hidden | one if hidden else self.look.hidden - one)
+        others = self.look.hidden - {shape}
+        self._look(hidden=others | {shape} if hidden else others)
 
     def _do_hide_at(self, reply: Reply, x: int, y: int) -> None:
         look = self.look
@@ -520,13 +520,13 @@ def is_quick(request: Request) -> bool:
 
 
 def merged(requests: list[tuple[Request, Reply]]) -> list[tuple[Request, Reply]]:
-    """Return requests with moves of one kind that follow each other added up."""
-    found: list[tuple[Request, Reply]] = []
+    """Return requests; consecutive moves of a kind are added up."""
+    kept: list[tuple[Request, Reply]] = []
     for request, reply in requests:
-        last = found[-1][0] if found else None
+        last = kept[-1][0] if kept else None
         if last is not None and request.name == last.name and request.name in MOVES:
             values = {key: last.values[key] + value for key, value in request.values.items()}
-            found[-1] = Request(request.name, values), reply
+            kept[-1] = Request(request.name, values), reply
         else:
-            found.append((request, reply))
-    return found
+            kept.append((request, reply))
+    return kept

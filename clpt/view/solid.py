@@ -7,6 +7,7 @@ camera lights it. Its few kernels are the same for most scenes.
 from __future__ import annotations
 
 import dataclasses
+import operator
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -18,11 +19,12 @@ from clpt.arrays import Bytes, Floats
 from clpt.render.renderer import Renderer
 from clpt.scene import Film, Scene
 from clpt.scene.integrators import Path
-from clpt.scene.materials import Diffuse, Material, Null
-from clpt.scene.params import Kind, fields_of, params
+from clpt.scene.materials import Diffuse, Material
+from clpt.scene.params import fields_of, params
 from clpt.scene.roles import REFLECTANCE
 from clpt.scene.shapes import Group, Instance, Mesh, Shape
 from clpt.scene.textures import Bitmap
+from clpt.scene.values import is_texture
 from clpt.spectra import Spectrum
 
 PLAIN: dict[str, Any] = {"emission": None, "interior": None, "exterior": None, "priority": 0}
@@ -31,22 +33,22 @@ LAYERS = ("albedo", "shading_normal")
 LAMP = np.array([0.35, 0.5, -0.8])  # where it is in the camera's space: left, up, behind
 SHADE = 0.3  # what is left where the lamp does not reach
 BEHIND = 0.06  # radiance where there is no surface
-SHINES, OTHER = 1.0, 0.5  # albedo of lamps, and of what has no colour of its own
+SHINES, OTHER = 1.0, 0.5  # albedo of lamps, and of surfaces without a colour
 SIDE = 64  # texels of an image along a side that its mean is of, about
 
 
 def bare(shape: Shape, **more: object) -> Shape:
-    """Return a shape without light and media; more: further fields that it is to have."""
-    given = fields_of(shape)
+    """Return a shape without light and media; more: further fields to set."""
+    fields = fields_of(shape)
     wanted = PLAIN | more
-    own = {name: value for name, value in wanted.items() if given[name] is not value}
-    return dataclasses.replace(shape, **own) if own else shape
+    changed = {name: value for name, value in wanted.items() if fields[name] is not value}
+    return dataclasses.replace(shape, **changed) if changed else shape
 
 
 def each(shapes: Iterable[Shape], change: Callable[[Shape], Shape | None]) -> list[Shape]:
-    """Return the shapes as `change` makes them, without those of which it makes None.
+    """Return the shapes as `change` returns them, without shapes that it returns None for.
 
-    What several instances place is changed once.
+    A group of several instances is changed once.
     """
     groups: dict[int, Group] = {}
     changed: list[Shape | None] = []
@@ -54,25 +56,27 @@ def each(shapes: Iterable[Shape], change: Callable[[Shape], Shape | None]) -> li
         if isinstance(shape, Instance):
             group = shape.group
             if id(group) not in groups:
-                kept = [one for one in map(change, group.shapes) if one is not None]
-                groups[id(group)] = Group(shapes=tuple(kept), name=group.name)
-            changed.append(dataclasses.replace(shape, group=groups[id(group)]))
+                kept = tuple(inner for inner in map(change, group.shapes) if inner is not None)
+                same = all(map(operator.is_, kept, group.shapes)) and len(kept) == len(group.shapes)
+                groups[id(group)] = group if same else Group(shapes=kept, name=group.name)
+            new = groups[id(group)]
+            changed.append(shape if new is group else dataclasses.replace(shape, group=new))
         else:
             changed.append(change(shape))
     return [shape for shape in changed if shape is not None]
 
 
 def solid(scene: Scene) -> Scene:
-    """Return a scene with the shapes and the camera of another one, and nothing else of it.
+    """Return a scene with the shapes and the camera of `scene`, in plain colours.
 
-    What is seen through, as a surface around a medium, is left out.
+    Null surfaces, as around a medium, are left out.
     """
     colours: dict[int, Diffuse] = {}
     lamp = _painted(np.full(3, SHINES))
 
     def paint(shape: Shape) -> Shape | None:
         material = shape.material
-        if isinstance(material, Null):
+        if material.is_null:
             return None
         if shape.emission is None and id(material) not in colours:
             colours[id(material)] = _painted(colour(material))
@@ -104,20 +108,22 @@ def shaded(renderer: Renderer) -> Bytes:
     return images.to_srgb8((albedo * lit + BEHIND * (1.0 - covered)).astype(np.float32))
 
 
-def colour(part: Kind) -> Floats:
-    """Return about what a material reflects, linear (3,): the mean of the colours in it."""
-    found = [_mean(value) for value in _colours(part)]
-    return np.mean(found, axis=0) if found else np.full(3, OTHER)
+def colour(part: Material) -> Floats:
+    """Return the mean of the colours in a material, linear (3,)."""
+    means = [_mean(value) for value in _colours(part)]
+    return np.mean(means, axis=0) if means else np.full(3, OTHER)
 
 
-def _colours(part: Kind) -> list[Any]:
+def _colours(part: Material) -> list[Any]:
     """Return the first colour of each material in a material."""
-    given = fields_of(part)
-    inner = [value for value in given.values() if isinstance(value, Material)]
+    inner = part.shared_parts.values()
     if inner:
-        return [one for value in inner for one in _colours(value)]
-    own = [given[name] for name, param in params(type(part)).items() if param.role is REFLECTANCE]
-    return own[:1]
+        return [part_colour for material in inner for part_colour in _colours(material)]
+    fields = fields_of(part)
+    reflectances = [
+        fields[name] for name, param in params(type(part)).items() if param.role is REFLECTANCE
+    ]
+    return reflectances[:1]
 
 
 def _mean(value: object) -> Floats:
@@ -127,10 +133,9 @@ def _mean(value: object) -> Floats:
     if isinstance(value, Bitmap):
         mean = value.pixels(REFLECTANCE, side=SIDE).mean(axis=(0, 1), dtype=np.float64)
         return np.broadcast_to(mean, 3)
-    inner = [] if not isinstance(value, Kind) else [
-        one for one in fields_of(value).values() if isinstance(one, (Spectrum, Kind))
-    ]  # fmt: skip
-    return np.mean([_mean(one) for one in inner], axis=0) if inner else np.full(3, OTHER)
+    fields = fields_of(value).values() if is_texture(value) else ()
+    inner = [part for part in fields if isinstance(part, Spectrum) or is_texture(part)]
+    return np.mean([_mean(part) for part in inner], axis=0) if inner else np.full(3, OTHER)
 
 
 def _painted(rgb: NDArray[Any]) -> Diffuse:

@@ -18,9 +18,9 @@ Make = Callable[..., Renderer]  # called with a scene
 
 @dataclasses.dataclass(frozen=True)
 class Change:
-    """The difference of a scene from the one before: its camera, materials, or anything.
+    """The difference of a scene from the former scene: its camera, materials, or anything.
 
-    materials: new ones by those that they replace; whole: anything else differs too.
+    materials: new materials by the materials that they replace; whole: anything else differs too.
     """
 
     camera: Camera | None = None
@@ -28,7 +28,7 @@ class Change:
     whole: bool = False
 
     def then(self, after: Change) -> Change:
-        """Return this change and one after it as one."""
+        """Return this change and a later change as a single change."""
         materials = {old: after.materials.get(new, new) for old, new in self.materials.items()}
         fresh = set(self.materials.values())
         materials |= {old: new for old, new in after.materials.items() if old not in fresh}
@@ -36,7 +36,7 @@ class Change:
 
 
 class Target:
-    """A renderer of a variant of the scene, such as a smaller one; made when it is needed."""
+    """A renderer of a variant of the scene, such as a smaller picture; made when it is needed."""
 
     def __init__(self, make: Make, variant: Variant):
         self.make, self.variant = make, variant
@@ -79,7 +79,7 @@ class Target:
                 renderer.update(camera=change.camera, materials=materials or None)
                 return
             except SceneError as error:
-                if error.where != "materials":  # one that is inside of another that was exchanged
+                if error.where != "materials":  # a material inside of another that was exchanged
                     raise
         variant = self.variant(scene)
         try:

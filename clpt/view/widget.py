@@ -21,7 +21,7 @@ from clpt.scene import Scene
 from clpt.view.messages import answering, checked, finite
 from clpt.view.session import Session
 
-MODULES = (  # of the page, in an order in which each finds what it needs
+MODULES = (  # of the page; a module stands behind the modules that it imports
     "dom.js", "plot.js", "connection.js", "picture.js", "steering.js", "inspector.js",
     "notebook.js",
 )  # fmt: skip
@@ -35,7 +35,7 @@ def _read(name: str) -> str:
 
 
 def joined() -> str:
-    """Return the modules of the page as a single one, which is what a notebook can load."""
+    """Return the modules of the page as a single module, which a notebook can load."""
     text = "\n".join(map(_read, MODULES))
     text = re.sub(r'^import \{[^}]*\} from "\./[^"]*";\n', "", text, flags=re.MULTILINE)
     return re.sub(r"^export (?!default)", "", text, flags=re.MULTILINE)
@@ -89,7 +89,7 @@ class Widget(anywidget.AnyWidget):
     # what a session calls, from its thread
 
     def picture(self, header: dict[str, Any], data: bytes) -> None:
-        """Show a picture, in the place of one that waits."""
+        """Queue a picture; it replaces a queued picture."""
         with self._lock:
             self._picture = self._frame = header, data
         self._shown.set()
@@ -143,7 +143,7 @@ class Widget(anywidget.AnyWidget):
     # what a saved notebook keeps
 
     def _png(self) -> bytes:
-        """The last picture that was made, as a PNG file; wait a little for the first one."""
+        """The last picture that was made, as a PNG file; wait a little for the first."""
         self._shown.wait(FIRST_SECONDS)
         with self._lock:
             shown = self._picture
@@ -153,8 +153,8 @@ class Widget(anywidget.AnyWidget):
         return data if header["format"] == "png" else _as_png(data)
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        found = super()._repr_mimebundle_(**kwargs)
-        data, *more = found if isinstance(found, tuple) else (found,)
+        bundle = super()._repr_mimebundle_(**kwargs)
+        data, *more = bundle if isinstance(bundle, tuple) else (bundle,)
         return ({**(data or {}), "image/png": self._png()}, *more)
 
 

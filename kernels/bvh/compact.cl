@@ -34,17 +34,12 @@ typedef struct {
 inline CompactRay compact_ray(float ox, float oy, float oz, float dx, float dy, float dz, float tmin)
 {
     uint octant = (uint)(dx >= 0.0f) | (uint)(dy >= 0.0f) << 1 | (uint)(dz >= 0.0f) << 2;
-    CompactRay r = {(float3)(ox, oy, oz),
-                    (float3)(ray_reciprocal(dx), ray_reciprocal(dy), ray_reciprocal(dz)), tmin, octant,
-                    octant * 0x01010101u};
-    return r;
+    return (CompactRay){(float3)(ox, oy, oz),
+                        (float3)(ray_reciprocal(dx), ray_reciprocal(dy), ray_reciprocal(dz)), tmin, octant,
+                        octant * 0x01010101u};
 }
 
-inline CompactState compact_start(uint2 *waiting)
-{
-    CompactState state = {(uint2)(0u, 0x80000000u), waiting, 0};
-    return state;
-}
+inline CompactState compact_start(uint2 *waiting) { return (CompactState){(uint2)(0u, 0x80000000u), waiting, 0}; }
 
 inline float4 compact_min(float4 a, float4 b) { return a < b ? a : b; }
 inline float4 compact_max(float4 a, float4 b) { return a > b ? a : b; }

@@ -28,15 +28,10 @@ inline float tri_side(float3 e1, float3 e2) { float3 e = fmax(fabs(e1), fabs(e2)
 inline TriHit tri_hit(float t, float u, float v, uint prim, uint tag, float3 v0, float3 e1, float3 e2)
 {
     float3 n = (float3)(e1.y * e2.z - e1.z * e2.y, e1.z * e2.x - e1.x * e2.z, e1.x * e2.y - e1.y * e2.x);
-    TriHit hit = {t, u, v, prim, tag, n.x, n.y, n.z, dot(n, v0), tri_side(e1, e2)};
-    return hit;
+    return (TriHit){t, u, v, prim, tag, n.x, n.y, n.z, dot(n, v0), tri_side(e1, e2)};
 }
 
-inline TriHit tri_miss(float tmax)
-{
-    TriHit hit = {tmax, 0.0f, 0.0f, BVH_MISS, 0u, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
-    return hit;
-}
+inline TriHit tri_miss(float tmax) { return (TriHit){tmax, 0.0f, 0.0f, BVH_MISS, 0u, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f}; }
 
 /* The arrays for all hits of a ray, in the traversal's order. With null pointers a traversal only counts. `begin` is
  * the index of the ray's first hit. */
@@ -72,9 +67,8 @@ inline float ray_reciprocal(float d) { return 1.0f / (fabs(d) > 1e-20f ? d : cop
 
 inline Ray ray_make(float ox, float oy, float oz, float dx, float dy, float dz, float tmin)
 {
-    Ray ray = {(float3)(ox, oy, oz), (float3)(dx, dy, dz),
-               (float3)(ray_reciprocal(dx), ray_reciprocal(dy), ray_reciprocal(dz)), tmin};
-    return ray;
+    return (Ray){(float3)(ox, oy, oz), (float3)(dx, dy, dz),
+                 (float3)(ray_reciprocal(dx), ray_reciprocal(dy), ray_reciprocal(dz)), tmin};
 }
 
 /* The ray's entry distance into a node's box between tmin and t; INFINITY without entry. */

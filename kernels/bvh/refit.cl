@@ -83,9 +83,8 @@ inline Refit refit_tree(global float *leaves, uint leaves_begin, global const fl
                         global const uint *faces, uint faces_begin, global const uint *indices,
                         global const float *boxes, float reach)
 {
-    Refit tree = {leaves + (ulong)leaves_begin * 8, vertices, boxes, faces + (ulong)faces_begin * 3,
-                  indices, reach};
-    return tree;
+    return (Refit){leaves + (ulong)leaves_begin * 8, vertices, boxes, faces + (ulong)faces_begin * 3,
+                   indices, reach};
 }
 
 #define REFIT_ARGS                                                                                \

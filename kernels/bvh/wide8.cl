@@ -28,9 +28,8 @@ inline Wide8Ray wide8_ray(float ox, float oy, float oz, float dx, float dy, floa
     float4 p = -o * r, g = -o * f, wider = copysign((float4)(WIDE8_PRODUCTS), p);
     p *= 1.0f - wider;
     g *= 1.0f + wider;
-    Wide8Ray ray = {tmin, r.x, r.y, r.z, p.x, p.y, p.z, f.x, f.y, f.z, g.x, g.y, g.z,
-                    r.x < 0.0f, 2 + (r.y < 0.0f), 4 + (r.z < 0.0f), shear_make(ox, oy, oz, dx, dy, dz)};
-    return ray;
+    return (Wide8Ray){tmin, r.x, r.y, r.z, p.x, p.y, p.z, f.x, f.y, f.z, g.x, g.y, g.z,
+                      r.x < 0.0f, 2 + (r.y < 0.0f), 4 + (r.z < 0.0f), shear_make(ox, oy, oz, dx, dy, dz)};
 }
 
 /* The corners of the root's box; boxes of missing children are inverted. */

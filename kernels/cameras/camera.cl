@@ -23,7 +23,7 @@
  * has a step `connect`, see film/connect.cl.
  *
  * film: position on the film, x and y in [0, 1], y down; lens: a point of the unit square;
- * index: of the glass at the hero's wavelength, for which alone the ray then holds.
+ * index: of the glass at the hero's wavelength; the ray then holds for this wavelength alone.
  * The struct is a uniform Record in clpt/render/records/camera.py.
  */
 typedef struct {
@@ -74,6 +74,5 @@ inline vec2 pinhole_screen(global const float *m, global const float *extent, gl
     vec3 d = sel3(away, screen_back(m, p), screen_point_back(m, p));
     *seen = *seen & (d.z > 1e-6f);
     real z = sel(d.z > 1e-6f, d.z, (real)(1.0f));
-    vec2 film = {0.5f - offset[0] - d.x / (z * extent[0]), 0.5f - offset[1] - d.y / (z * extent[1])};
-    return film;
+    return (vec2){0.5f - offset[0] - d.x / (z * extent[0]), 0.5f - offset[1] - d.y / (z * extent[1])};
 }

@@ -47,6 +47,13 @@ inline CameraPoint camera_point_moved(Motion m, CameraPoint c, mask away)
     return c;
 }
 
+inline CameraPoint camera_connect(Scene scene, vec3 p, mask away, vec2 lens)
+{
+    Motion motion = camera_motion(scene);
+    p = camera_point_back(motion, p, away);
+    return camera_point_moved(motion, camera_connect_still(scene, p, away, lens), away);
+}
+
 /* Step front: the front of a lens that moves. */
 inline CameraRay front_moved(Scene scene, CameraRay ray) { return camera_moved(scene, ray); }
 

@@ -38,8 +38,7 @@ inline Fixed fixed_of(real v)
 inline Fixed fixed_of_small(real v)
 {
     natural middle = to_natural(v * 0x1p16f), low = to_natural((v - to_real(middle) * 0x1p-16f) * 0x1p48f);
-    Fixed f = {low, middle, (natural)(0u)};
-    return f;
+    return (Fixed){low, middle, (natural)(0u)};
 }
 
 /* Whether this function accepts all three values; false for values that are not finite. */
@@ -50,3 +49,35 @@ inline mask fixed_takes_small(vec3 v)
 
 /* Whether another term might exceed a sum's 96 bits. */
 inline mask fixed_is_full(natural high) { return high + 0x40000000u >= 0x80000000u; }
+
+/* Sums in memory: three streams of words each, the lowest first. Several slots, and several devices, may add to a sum:
+ * 32-bit atomics that carry, which OpenCL 1.2 has. */
+/* Adds `v` to the word and returns the carry. */
+inline uint sums_add_word(global uint *word, uint v)
+{
+    return v && atomic_add((volatile global uint *)word, v) > 0xffffffffu - v;
+}
+
+/* Adds a lane's number to the sum at `sum`; returns 1 if the sum is full then, else 0. stride: of the streams. */
+inline uint sums_add(global uint *sum, size_t stride, uint low, uint middle, uint high)
+{
+    uint carry = sums_add_word(sum, low), next = middle + carry;
+    high += (next < carry) + sums_add_word(sum + stride, next);
+    if (!high) return 0;
+    uint before = atomic_add((volatile global uint *)(sum + 2 * stride), high);
+    return before + high + 0x40000000u >= 0x80000000u;
+}
+
+/* A sum as the nearest float. */
+inline float sums_float(uint low, uint middle, uint high)
+{
+    uint negative = 0u - (high >> 31);
+    ulong top = ((ulong)(high ^ negative) << 32) | (middle ^ negative);
+    low = (low ^ negative) - negative; /* the carry of the two's complement goes on where low becomes 0 */
+    top += negative && !low;
+    int zeros = (int)clz(top | 1ul);   /* moving all bits up by these, 64 bits say all but for rounding */
+    ulong bits = (top << zeros) | (zeros <= 32 ? (ulong)low >> (32 - zeros) : (ulong)low << (zeros - 32));
+    bits |= zeros < 32 && (low << zeros); /* what was cut off decides a tie */
+    float size = ldexp(convert_float(bits), -16 - zeros);
+    return negative ? -size : size;
+}

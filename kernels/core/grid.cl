@@ -128,4 +128,28 @@ inline Spectrum texel_at(Scene scene, integer first, integer i, Wavelengths lamb
     vec4 texel = gather4(scene.texels, first + 4 * i);
     return spectrum_light_texel(scene, texel.x, texel.y, texel.z, texel.w, lambdas);
 }
-#include "core/texels_between.cl"
+#include "core/grid.cl#texels_at_once"
+
+/* Step texels_at_once: radiance between four texels, whose numbers are i00 to i11; at: in the square between them. */
+inline Spectrum texels_between(Scene scene, integer first, integer i00, integer i10, integer i01, integer i11, vec2 at,
+                               Wavelengths lambdas)
+{
+    Spectrum sum = spectrum_scale(texel_at(scene, first, i00, lambdas), (1.0f - at.x) * (1.0f - at.y));
+    sum = spectrum_madd(texel_at(scene, first, i10, lambdas), at.x * (1.0f - at.y), sum);
+    sum = spectrum_madd(texel_at(scene, first, i01, lambdas), (1.0f - at.x) * at.y, sum);
+    return spectrum_madd(texel_at(scene, first, i11, lambdas), at.x * at.y, sum);
+}
+
+/* Step texels_in_turn: the same texel by texel: four spectra at once need too many of a GPU's registers. */
+inline Spectrum texels_between(Scene scene, integer first, integer i00, integer i10, integer i01, integer i11, vec2 at,
+                               Wavelengths lambdas)
+{
+    Spectrum sum = spectrum_of((real)(0.0f));
+    ROLLED
+    for (int k = 0; k < 4; k++) {
+        integer i = k & 2 ? (k & 1 ? i11 : i01) : (k & 1 ? i10 : i00);
+        real share = (k & 1 ? at.x : 1.0f - at.x) * (k & 2 ? at.y : 1.0f - at.y);
+        sum = spectrum_madd(texel_at(scene, first, i, lambdas), share, sum);
+    }
+    return sum;
+}

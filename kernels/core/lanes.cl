@@ -1,6 +1,6 @@
 /* Lanes: the types that all shading code is written in.
  *
- * A GPU builds the text with LANES = 1, so that a work-item shades one path; a CPU with LANES = 8 or
+ * A GPU builds the text with LANES = 1, so that a work-item shades a path; a CPU with LANES = 8 or
  * 16, so that a work-item shades that many paths in SIMD. `real`, `integer` and `mask` are then
  * vectors. A kind's functions are branch-free except for `if (any(mask))`, which in a single lane is a plain
  * branch. Masks come from comparisons, combine with & and |, and negate with !, never with ~ (a

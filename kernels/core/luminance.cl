@@ -7,8 +7,7 @@ inline real luminance_of(Spectrum s) { return 0.2126f * s.x + 0.7152f * s.y + 0.
 #else
 inline Spectrum luminance_lambdas(void)
 {
-    Spectrum r = {(real)(462.5986f), (real)(529.7404f), (real)(591.5357f), (real)(658.8561f)};
-    return r;
+    return (Spectrum){(real)(462.5986f), (real)(529.7404f), (real)(591.5357f), (real)(658.8561f)};
 }
 inline real luminance_of(Spectrum s)
 {

@@ -1,4 +1,4 @@
-/* The error of surface points in float32, and so the distance from the surface at which rays begin and end.
+/* The error of surface points in float32, and so the distance between a surface and the ends of its rays.
  *
  * The rounding error of a surface point is proportional to its coordinates; the error of a hit distance is
  * proportional to the primitive's size. Measured over random triangles, near and far from the origin and thin: with
@@ -36,15 +36,13 @@ typedef struct { vec3 high, low; } Twofold3;
 inline Twofold twofold_sum(real a, real b)
 {
     real sum = a + b, from_b = sum - a;
-    Twofold r = {sum, (a - (sum - from_b)) + (b - from_b)};
-    return r;
+    return (Twofold){sum, (a - (sum - from_b)) + (b - from_b)};
 }
 
 inline Twofold twofold_product(real a, real b)
 {
     real product = a * b;
-    Twofold r = {product, fma(a, b, -product)};
-    return r;
+    return (Twofold){product, fma(a, b, -product)};
 }
 
 inline Twofold twofold_add(Twofold a, Twofold b)
@@ -66,8 +64,7 @@ inline Twofold twofold_sqr(Twofold a)
 inline Twofold3 twofold_sub3(vec3 a, vec3 b)
 {
     Twofold x = twofold_sum(a.x, -b.x), y = twofold_sum(a.y, -b.y), z = twofold_sum(a.z, -b.z);
-    Twofold3 r = {v3(x.high, y.high, z.high), v3(x.low, y.low, z.low)};
-    return r;
+    return (Twofold3){v3(x.high, y.high, z.high), v3(x.low, y.low, z.low)};
 }
 
 inline Twofold twofold_dot3(Twofold3 a, vec3 b)

@@ -47,22 +47,19 @@ inline vec2 gather2(global const float *p, integer at)
 #else
     ROW_HALVES(ROW_2)
 #endif
-    vec2 r = {EVENS(a, b), ODDS(a, b)};
-    return r;
+    return (vec2){EVENS(a, b), ODDS(a, b)};
 }
 inline vec3 gather3(global const float *p, integer at)
 {
     ROW_QUARTERS(ROW_3)
     real xy = EVENS(a, b), last_xy = EVENS(c, d), yz = ODDS(a, b), last_yz = ODDS(c, d);
-    vec3 r = {EVENS(xy, last_xy), EVENS(yz, last_yz), ODDS(yz, last_yz)};
-    return r;
+    return (vec3){EVENS(xy, last_xy), EVENS(yz, last_yz), ODDS(yz, last_yz)};
 }
 inline vec4 gather4(global const float *p, integer at)
 {
     ROW_QUARTERS(ROW_4)
     real xz = EVENS(a, b), last_xz = EVENS(c, d), yw = ODDS(a, b), last_yw = ODDS(c, d);
-    vec4 r = {EVENS(xz, last_xz), EVENS(yw, last_yw), ODDS(xz, last_xz), ODDS(yw, last_yw)};
-    return r;
+    return (vec4){EVENS(xz, last_xz), EVENS(yw, last_yw), ODDS(xz, last_xz), ODDS(yw, last_yw)};
 }
 #undef ROW_2
 #undef ROW_3
@@ -79,12 +76,10 @@ inline vec4 row4_alike(global const uint *table, integer at)
     if (any(at != at.s0)) {
         real a = NATIVE_PAIRS(row, at.lo), b = NATIVE_PAIRS(row, at.hi);
         real c = NATIVE_PAIRS(row + 2, at.lo), d = NATIVE_PAIRS(row + 2, at.hi);
-        vec4 r = {EVENS(a, b), ODDS(a, b), EVENS(c, d), ODDS(c, d)};
-        return r;
+        return (vec4){EVENS(a, b), ODDS(a, b), EVENS(c, d), ODDS(c, d)};
     }
     Row4 one = *(global const Row4 *)(row + at.s0);
-    vec4 r = {(real)(one.x), (real)(one.y), (real)(one.z), (real)(one.w)};
-    return r;
+    return (vec4){(real)(one.x), (real)(one.y), (real)(one.z), (real)(one.w)};
 }
 #define row4 row4_alike
 #else

@@ -22,11 +22,7 @@ inline void slab_store(global float *p, mask m, real v)
 }
 
 /* Members of several words, from word c on. */
-inline vec2 slab_read_vec2(Slab s, uint c, uint at)
-{
-    vec2 r = {slab_read(s, c, at), slab_read(s, c + 1u, at)};
-    return r;
-}
+inline vec2 slab_read_vec2(Slab s, uint c, uint at) { return (vec2){slab_read(s, c, at), slab_read(s, c + 1u, at)}; }
 inline void slab_write_vec2(Slab s, uint c, uint at, mask m, vec2 v)
 {
     slab_write(s, c, at, m, v.x);
@@ -59,8 +55,7 @@ inline void slab_write_spectrum(Slab s, uint c, uint at, mask m, Spectrum v)
 inline Natural3 slab_read_natural3(Slab s, uint c, uint at)
 {
     vec3 v = slab_read_vec3(s, c, at);
-    Natural3 r = {as_natural(v.x), as_natural(v.y), as_natural(v.z)};
-    return r;
+    return (Natural3){as_natural(v.x), as_natural(v.y), as_natural(v.z)};
 }
 inline void slab_write_natural3(Slab s, uint c, uint at, mask m, Natural3 v)
 {
@@ -69,8 +64,7 @@ inline void slab_write_natural3(Slab s, uint c, uint at, mask m, Natural3 v)
 inline Fixed slab_read_fixed(Slab s, uint c, uint at)
 {
     vec3 v = slab_read_vec3(s, c, at);
-    Fixed r = {as_natural(v.x), as_natural(v.y), as_natural(v.z)};
-    return r;
+    return (Fixed){as_natural(v.x), as_natural(v.y), as_natural(v.z)};
 }
 inline void slab_write_fixed(Slab s, uint c, uint at, mask m, Fixed v)
 {

@@ -26,8 +26,7 @@ inline natural scramble_reversed(natural x, natural seed)
 
 inline Sampler sampler_start(uint seed, natural pixel, natural sample)
 {
-    Sampler s = {hash_natural(pixel ^ (seed * 0x9e3779b9u)), reverse_bits(sample)};
-    return s;
+    return (Sampler){hash_natural(pixel ^ (seed * 0x9e3779b9u)), reverse_bits(sample)};
 }
 
 /* Dimensions 2 n and 2 n + 1 are the pairs of a group of four. */
@@ -41,6 +40,5 @@ inline vec2 sampler_pair(Sampler s, natural dimension)
     natural b = (~second & z) | (second & w2), other = key * (0x85ebca6bu ^ (second & 0x2c1b3c6cu));
     i = scramble_reversed((~second & i) | (second & DIGITS_SWAPPED(w)), other + 1u);
     b = scramble_reversed(b ^ ((b >> 1u) & 0x55555555u), other * 0xc2b2ae35u + 3u);
-    vec2 u = {unit_interval(reverse_bits(i)), unit_interval(reverse_bits(b))};
-    return u;
+    return (vec2){unit_interval(reverse_bits(i)), unit_interval(reverse_bits(b))};
 }

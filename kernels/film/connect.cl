@@ -34,7 +34,7 @@ inline CameraPoint camera_nowhere(void)
     return c;
 }
 
-/* A pinhole, or a lens on which the light arrives at (a, b): the plane at distance `focus` is sharp. The
+/* A pinhole, or a lens, where the light arrives at (a, b): the plane at distance `focus` is sharp. The
  * matrix is rigid, so its transpose leads back to the camera's space. */
 inline CameraPoint pinhole_connect(global const Settings *settings, global const float *m, global const float *extent,
                                    global const float *offset, float near, float far, float focus, vec2 lens, vec3 p,

@@ -1,8 +1,8 @@
-/* How much a sample covers of what is behind the picture: 1, less the share of light that comes through from there, as
- * a mean over the wavelengths. Black smoke covers too. */
+/* The share of the background that a sample covers: 1, less the share of light that comes through from there, as a mean
+ * over the wavelengths. Black smoke covers too. */
 #include "lights/sky.cl#dimmed"
 
-/* start: the throughput with which the path began, which a lens weighs. */
+/* start: the throughput at the beginning of the path, which a lens weighs. */
 inline real path_covers(Scene scene, Slab path, uint at, PathEnd end, Wavelengths lambdas, Spectrum start)
 {
     mask through = end.missed & (end.depth == 0);

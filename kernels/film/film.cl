@@ -3,7 +3,7 @@
  * atomics. Where paths from lights are weighed against those from the camera, a film has two groups of words: first
  * that of the camera's paths, then that of light paths; a program adds to the group that begins at FILM_GROUP. */
 #include "film/pixel.cl"
-#include "film/sums.cl"
+#include "core/fixed.cl"
 #define FILM_SAMPLES 9 /* after the sums of three channels, three words each: the number of samples */
 #if FILM_WEIGHTS
 #define FILM_WEIGHT 10 /* then the sum of the filter's values, where samples serve several pixels */
@@ -12,11 +12,11 @@
 #define FILM_ALPHA 10
 #endif
 #if USES_ALPHA
-#define FILM_GROUP_WORDS (FILM_ALPHA + 3) /* then the sum of what is covered */
+#define FILM_GROUP_WORDS (FILM_ALPHA + 3) /* then the sum of covered shares */
 #else
 #define FILM_GROUP_WORDS FILM_ALPHA
 #endif
-#ifndef FILM_GROUP /* there is one group */
+#ifndef FILM_GROUP /* a single group */
 #define FILM_GROUP 0
 #define FILM_WORDS FILM_GROUP_WORDS
 #define FILM_GROUPS 1

@@ -1,11 +1,11 @@
-/* Light beside the picture, by the surfaces that it has met and by the lights that it comes from: sums over all samples
- * as those of the film, LIGHT_LAYERS pictures of nine streams of words (core/fixed.cl). Each part of a path's light is
- * added when it is found. The sums of all groups, and direct with indirect light, are the picture. Where paths start at
- * lights too, as many pictures follow of what these bring, which are divided by the number of light paths. */
+/* Light beside the picture, by the surfaces that it has met and by its lights: sums over all samples like the film's,
+ * LIGHT_LAYERS pictures of nine streams of words (core/fixed.cl). Each part of a path's light is added when it is
+ * found. The sums of all groups, and direct with indirect light, are the picture. Where paths start at lights too, as
+ * many pictures of their light follow, which are divided by the number of light paths. */
 #include "generated/light_layer_args.cl"
 
 /* Step. */
-#include "film/sums.cl"
+#include "core/fixed.cl"
 #include "generated/seen_wavelengths.cl"
 #define LIGHT_PICTURE_WORDS 9
 
@@ -38,7 +38,7 @@ inline void light_layer_sum(Scene scene, mask m, integer pixel_index, integer pi
 inline void light_layers_sum(Scene scene, mask m, integer pixel_index, integer surfaces, integer row, int first, vec3 v,
                              global uint *light_layers)
 {
-    m = m & (fabs(v.x) + fabs(v.y) + fabs(v.z) < FIXED_LARGEST); /* false for what is not finite */
+    m = m & (fabs(v.x) + fabs(v.y) + fabs(v.z) < FIXED_LARGEST); /* false for a value that is not finite */
     if (!any(m)) return;
     v = sel3(m, v, v3(0.0f, 0.0f, 0.0f));
     mask direct = surfaces <= 1;

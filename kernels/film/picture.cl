@@ -1,8 +1,8 @@
-/* What pictures read of a film: its sums over all parts, as numbers. For work-items of one lane. */
+/* Pictures read a film's sums over all parts, as numbers. For work-items of a single lane. */
 #include "film/film.cl"
 #define FILM_PARTS (settings->halves * settings->octaves) /* film/work_list.cl */
 
-/* One sum as a number. sum: its first word in the first part. */
+/* A sum as a number. sum: its first word in the first part. */
 inline float parts_sum(global const Settings *settings, global const uint *sum)
 {
     size_t stream = settings->padded_pixels;
@@ -23,7 +23,7 @@ inline vec3 film_sum(global const Settings *settings, global const uint *film, i
     return v3(parts_sum(settings, at), parts_sum(settings, at + 3 * stream), parts_sum(settings, at + 6 * stream));
 }
 
-/* How many samples a pixel has. */
+/* The number of samples of a pixel. */
 inline uint film_samples(global const Settings *settings, global const uint *film, int pixel_index)
 {
     size_t stream = settings->padded_pixels, at = FILM_SAMPLES * stream + pixel_index;
@@ -32,8 +32,8 @@ inline uint film_samples(global const Settings *settings, global const uint *fil
     return samples;
 }
 
-/* The number of samples of a pixel in a picture: its own, or, of light paths, how many there were per pixel, which the
- * host says, as each may have lit any pixel. */
+/* The number of samples of a pixel in a picture: its own or, of light paths, the number per pixel, which the host
+ * gives, as each may have lit any pixel. */
 #if LIGHT_PATHS || SUMS_LIGHT_PATHS
 #define LIGHT_PATHS_ARG , float light_paths
 #else
@@ -46,14 +46,14 @@ inline uint film_samples(global const Settings *settings, global const uint *fil
 #endif
 
 #if SUMS_LIGHT_PATHS
-/* One over what the sums of light paths are divided by; 0 where a pixel has no samples: it stays black. */
+/* The factor from sums of light paths to their mean; 0 where a pixel has no samples: it stays black. */
 inline float light_paths_mean(float light_paths, float samples)
 {
     return light_paths > 0.0f && samples > 0.0f ? 1.0f / light_paths : 0.0f;
 }
 #endif
 
-/* One over what a pixel's sums are divided by: its samples, or, of samples that serve several pixels, their weight. */
+/* The factor from a pixel's sums to their mean: by its samples or, if samples serve several pixels, by their weight. */
 inline float film_mean(global const Settings *settings, global const uint *film, int pixel_index, float samples)
 {
 #if FILM_WEIGHTS

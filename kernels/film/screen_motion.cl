@@ -1,5 +1,6 @@
-/* How what a path sees moves across the film while the shutter is open: from where it is at the path's time to where it
- * was when the shutter opened, and to where it will be when it closes, to the right and up [pixels]. */
+/* The motion of a point across the film while the shutter is open: from its position at the path's time to the position
+ * when the shutter opened, and to the position when it closes, to the right and up [pixels]. */
+/* Step. */
 #include "film/layers.cl"
 #include "motion/motion.cl"
 
@@ -7,7 +8,7 @@ typedef struct {
     vec2 backward, forward; /* [pixels] */
 } ScreenMotion;
 
-/* A point of the scene's shape of this number, as it is at another time. */
+/* A point of the scene's shape of this number, at another time. */
 inline vec3 point_at_time(Scene scene, integer object, vec3 p, real time)
 {
     vec3 rest = motion_point_back(motion_of_shape(scene, object), p);
@@ -15,7 +16,7 @@ inline vec3 point_at_time(Scene scene, integer object, vec3 p, real time)
     return motion_point(motion_of_shape(scene, object), rest);
 }
 
-/* Where on the film it is at a time [pixels], y down; p: a point, or where `away` a unit vector. */
+/* Its position on the film at a time [pixels], y down; p: a point, or where `away` a unit vector. */
 inline vec2 screen_at_time(Scene scene, vec3 p, mask away, real time, mask *seen)
 {
     scene.time = time;
@@ -26,9 +27,9 @@ inline vec2 screen_at_time(Scene scene, vec3 p, mask away, real time, mask *seen
     return film;
 }
 
-/* object: the shape that is seen, below 0 for what stands still; p: the point, or where `away` the unit vector to what
- * is infinitely far; first, last: p, but that the shape has deformed as when the shutter opens and closes. Nothing
- * moves that is behind the camera at one of the three times. */
+/* object: the shape, below 0 if it stands still; p: the point, or where `away` the unit vector to a point at infinity;
+ * first, last: p on the shape as it has deformed when the shutter opens and closes. A point that is behind the camera
+ * at any of the three times does not move. */
 inline ScreenMotion screen_motion(Scene scene, integer object, vec3 p, vec3 first, vec3 last, mask away)
 {
     global const float *shutter = scene.distributions + as_int(scene.distributions[MOTION_ROW]);
@@ -60,7 +61,7 @@ inline void screen_motion_put(integer *words, mask m, ScreenMotion s, real weigh
     layer_put_long(words + 3 * LAYER_LONG_WORDS, m, s.forward.y * weight);
 }
 
-/* Adds the motion of the sky, which the `unseen` paths have come to. */
+/* Adds the motion of the sky, where the `unseen` paths have come to. */
 inline void layers_of_sky(Scene scene, Slab path, uint at, mask unseen LAYER_ARGS)
 {
     mask m = layers_want(path, at, unseen);
@@ -75,3 +76,22 @@ inline void layers_of_sky(Scene scene, Slab path, uint at, mask unseen LAYER_ARG
 
 /* Twin, where no layer tells how what is seen moves. */
 inline void layers_of_sky(Scene scene, Slab path, uint at, mask unseen LAYER_ARGS) {}
+
+/* Step record: puts the motion of the first surface into the words of the layer of motion. */
+inline void screen_motion_record(Scene scene, integer *words, mask first, Vertex v, real weight)
+{
+    vec3 opens = v.s.p, closes = v.s.p;
+#if MOVES_VERTICES || MOVES_SPHERES
+    opens = add3(v.s.p, v.s.to_open);
+    closes = add3(v.s.p, v.s.to_close);
+#endif
+    ScreenMotion motion = screen_motion(scene, v.object, v.s.p, opens, closes, mask_of(0));
+    screen_motion_put(words, first, motion, weight);
+}
+
+/* Twin, where nothing moves. */
+#include "film/layers.cl"
+inline void screen_motion_record(Scene scene, integer *words, mask first, Vertex v, real weight)
+{
+    for (int i = 0; i < 4 * LAYER_LONG_WORDS; i++) words[i] = 0;
+}

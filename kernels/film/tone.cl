@@ -1,5 +1,5 @@
-/* Tone curves: linear Rec. 709 of any brightness to what a screen shows, linear, white is 1. The host has the
- * same, clpt/images/colour.py, whose names of curves stand in the order of these numbers.
+/* Tone curves: from linear Rec. 709 of any brightness to the linear light of a screen, white is 1. The host has the
+ * same curves, clpt/images/colour.py, with names in the order of these numbers.
  *
  * Reinhard: Reinhard et al. 2002, "Photographic Tone Reproduction", eq. 3, of the luminance of Rec. 709.
  * Aces: the rational fit to the curve of ACES by Narkowicz 2015, "ACES Filmic Tone Mapping Curve".
@@ -49,4 +49,32 @@ inline float4 tone_curve(float4 c, int tone)
     if (tone == TONE_AGX) return agx(c);
     if (tone == TONE_NEUTRAL) return neutral(c);
     return clamp(c * (2.51f * c + 0.03f) / (c * (2.43f * c + 0.59f) + 0.14f), 0.0f, 1.0f);
+}
+
+/* A table of colours over a cube of linear Rec. 709, as clpt/images/colour.py bakes it: red changes first.
+ * Each axis is asinh(v / NEAR) from LOWEST to HIGHEST; between points the tetrahedron that holds a colour
+ * decides (Kasson et al. 1993, "Tetrahedral interpolation technique for color space conversion"). */
+/* The position of a colour on the axes of a table, in [0, 1]; bounds: asinh at their ends, and NEAR. */
+inline float4 table_place(float4 c, float4 bounds)
+{
+    return clamp((asinh(c / bounds.z) - bounds.x) / (bounds.y - bounds.x), 0.0f, 1.0f);
+}
+
+inline float4 table_colour(global const float4 *table, int size, float4 bounds, float4 c)
+{
+    float4 at = table_place(c, bounds) * (float)(size - 1);
+    int4 cell = min(convert_int4(at), size - 2);
+    float4 f = at - convert_float4(cell);
+    int3 steps = (int3)(1, size, size * size);
+    int first = cell.x + cell.y * steps.y + cell.z * steps.z;
+    /* the axes by how far the colour is along them: the path over the edges of its tetrahedron */
+    int longest = f.x >= f.y ? (f.x >= f.z ? 0 : 2) : (f.y >= f.z ? 1 : 2);
+    int shortest = f.z <= f.y ? (f.z <= f.x ? 2 : 0) : (f.y <= f.x ? 1 : 0);
+    if (longest == shortest) shortest = longest == 2 ? 0 : 2; /* all are equal */
+    float high = fmax(f.x, fmax(f.y, f.z)), low = fmin(f.x, fmin(f.y, f.z)), middle = f.x + f.y + f.z - high - low;
+    int to_long = longest == 0 ? steps.x : longest == 1 ? steps.y : steps.z;
+    int to_short = shortest == 0 ? steps.x : shortest == 1 ? steps.y : steps.z;
+    int last = first + steps.x + steps.y + steps.z;
+    return (1.0f - high) * table[first] + (high - middle) * table[first + to_long] +
+           (middle - low) * table[last - to_short] + low * table[last];
 }

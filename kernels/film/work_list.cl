@@ -1,8 +1,8 @@
-/* Which pixel and sample a slot renders next (clpt/render/wavefront/work_list.py).
+/* The next pixel and sample of a slot (clpt/render/wavefront/work_list.py).
  *
- * The slots of a film plane share its pixels: each has a list of pixels and renders all samples of the plane in one
- * pixel before it goes to the next. `work_list` holds, `padded_pixels` words each: the pixel after each pixel, the
- * sample before which each pixel is left; then the first pixel of each slot of a plane. An index that is not below
+ * The slots of a film plane share its pixels: each has a list of pixels and renders all samples of the plane in a pixel
+ * before it goes to the next. `work_list` holds, `padded_pixels` words each: the pixel after each pixel, the end of
+ * each pixel's samples; then the first pixel of each slot of a plane. An index that is not below
  * `padded_pixels` ends a list. The samples of a pixel are dealt out to the planes in turn. */
 
 inline integer slot_plane(global const Settings *settings, integer slot)
@@ -11,8 +11,8 @@ inline integer slot_plane(global const Settings *settings, integer slot)
     return divide(slot, settings->per_plane);
 }
 
-/* The part of the film that a sample goes to: there is one, but where even and odd samples are kept apart, or octaves:
- * samples from 2^k to before 2^(k + 1), of which those of even and of odd k have a part each. */
+/* The part of the film that a sample goes to. A film has a single part, unless even and odd samples are kept apart, or
+ * octaves: samples from 2^k to before 2^(k + 1), where even and odd k have a part each. */
 inline integer film_part(global const Settings *settings, integer sample)
 {
     integer part = sample & (settings->halves - 1);
@@ -20,22 +20,22 @@ inline integer film_part(global const Settings *settings, integer sample)
     return part;
 }
 
-/* How far after `first` the first sample is that belongs to a plane. */
+/* The distance from `first` to the first sample of a plane. */
 inline integer plane_ahead(integer plane, int planes, int first)
 {
     integer ahead = plane - first % planes;
     return sel_i(ahead < 0, ahead + planes, ahead);
 }
 
-/* The sample before which a pixel is left, `end` at most. */
+/* The end of a pixel's samples, `end` at most. */
 inline integer work_list_end(global const Settings *settings, global const uint *work_list, integer pixel_index,
                              int end)
 {
     return min_i(gather_i(work_list, pixel_index + settings->padded_pixels), (integer)(end));
 }
 
-/* The pixel after `pixel_index`, or the first one of a slot that has not `begun`, of which a sample is wanted that is
- * `ahead` of the first one. slot: of its plane. */
+/* The next pixel after `pixel_index`, or for a slot that has not `begun` its first pixel, that wants a sample `ahead`
+ * of the first sample. slot: of its plane. */
 inline integer work_list_next(global const Settings *settings, global const uint *work_list, mask leaves, mask begun,
                               integer pixel_index, integer slot, integer ahead, int2 samples)
 {
@@ -51,13 +51,13 @@ inline integer work_list_next(global const Settings *settings, global const uint
 }
 
 typedef struct {
-    integer pixel_index, sample; /* what comes next */
-    mask leaves;                 /* the slot leaves the pixel that it had, if it had one */
+    integer pixel_index, sample; /* the next */
+    mask leaves;                 /* the slot leaves its pixel, if it had a pixel */
     mask done;                   /* it leaves, and its list is at its end */
 } NextSample;
 
-/* What comes after `sample` of a pixel, in the slots that `ended` a path; for those that have not `begun`, the first
- * sample. samples: first and end of those to render. */
+/* The sample after `sample` of a pixel, in the slots that `ended` a path; for slots that have not `begun`, the first
+ * sample. samples: first and end of the samples to render. */
 inline NextSample next_sample(global const Settings *settings, global const uint *work_list, int2 samples,
                               integer slot, mask ended, mask begun, integer pixel_index, integer sample)
 {

@@ -1,10 +1,10 @@
-/* One vertex of a path that comes from a light: it is joined to the camera, and goes on. Steps that a scene or a
+/* A vertex of a path that comes from a light: it is joined to the camera, and goes on. Steps that a scene or a
  * material does not have do nothing.
  *
  * f is asked for as radiance flows, from the light to the camera, and light that is carried takes it with the
- * geometric cosine of the side where it leaves (Veach 1997, 5.3.2): what bsdf_sample gives for the opposite flow
- * lacks, where light is refracted, eta^2, and where normals are smoothed, the quotient
- * |wo . ns| |wi . n| / (|wo . n| |wi . ns|), wo being the side where the light came from.
+ * geometric cosine of the side where it leaves (Veach 1997, 5.3.2). bsdf_sample's weight for the opposite flow lacks
+ * eta^2 where light is refracted and, where normals are smoothed, the quotient
+ * |wo . ns| |wi . n| / (|wo . n| |wi . ns|), with wo on the side of the light.
  *
  * As the light paths of `path` they are weighed against those from the camera (transport/mis_ratio.cl). */
 #include "cameras/camera.cl"
@@ -14,6 +14,22 @@
 #include "transport/light_path.cl"
 #include "generated/mis_ratio.cl"
 #include "generated/light_path_steps.cl"
+
+/* The weight of a direction for light that is carried; leaves: the cosine of the ray that goes on over the cosine of
+ * the ray that arrives. */
+inline Spectrum adjoint_weight(Vertex v, Scattering scatter, BsdfSample bs, mask next, real leaves)
+{
+    real over = max_r(fabs(bs.wi.z), (real)(1e-6f));
+    real adjoint = BSDF_IS_PHASE ? (real)(1.0f) : bs.eta * bs.eta * leaves * fabs(scatter.wo.z) / over;
+    Spectrum carried = spectrum_scale(bs.weight, adjoint);
+#if BSDF_CHROMATIC && !BSDF_IS_PHASE /* eta differs between the wavelengths */
+    mask spread = next & ((bs.lobe & LOBE_DELTA) == 0);
+    Spectrum f = bsdf_eval(scatter.bsdf, bs.wi, scatter.wo);
+    Spectrum exact = spectrum_scale(f, leaves / sel(spread, bs.pdf, (real)(1.0f)));
+    carried = spectrum_sel(spread, exact, carried);
+#endif
+    return carried;
+}
 
 inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v)
 {
@@ -53,10 +69,9 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     vertex_end(path, at, active, next, null, v.state);
 }
 
-#if !SHADES_BOTH
+/* Step vertex: where a program shades light paths alone. */
 inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
 {
     Vertex v = vertex_load(scene, path, hit, at, active);
     light_path_vertex(scene, path, shadow, at, active, v);
 }
-#endif

@@ -1,7 +1,7 @@
-/* One vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on.
- * Light is found both by meeting it and by choosing it; the two are weighted by the power heuristic (Veach 1997,
- * 9.2.4), and against paths from lights where there are some (transport/mis_ratio.cl). Steps that a scene or a material
- * does not have do nothing. */
+/* A vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on. Light
+ * is found both by meeting it and by choosing it; the two are weighted by the power heuristic (Veach 1997, 9.2.4), and
+ * against paths from lights where a scene has them (transport/mis_ratio.cl). Steps that a scene or a material does not
+ * have do nothing. */
 #include "lights/light.cl#met"
 #include "generated/ghosts.cl"
 #include "generated/light_layers.cl"
@@ -21,7 +21,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     Scattering scatter = vertex_scattering(scene, path, at, met, v, sampler);
     if (VERTEX_COUNTS)
         v.state = layers_record(scene, path, at, met, v, scatter, v.state LAYER_PASSED);
-#if BSDF_ABSORBS /* as the surfaces of lights mostly do */
+#if BSDF_ABSORBS /* as most surfaces of lights do */
     next = next & (spectrum_max(bsdf_albedo(scatter.bsdf)) > 0.0f);
 #endif
     MisRatio mis_ratio = mis_ratio_of_camera_path(scene, path, at, v, sampler);
@@ -31,7 +31,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     NextEvent event = next_event_seek(scene, next, v, scatter);
     bsdf_ask(scene, scatter, event.wi, 0);
     event = next_event_weigh(scene, event, v, scatter, mis_ratio, guided, ratio SHADE_PASSED);
-    if (LANES == 1) { /* for what is kept meanwhile a GPU has too few registers */
+    if (LANES == 1) { /* a GPU has too few registers to keep the event meanwhile */
         v.state += next_event_keep(scene, path, shadow, at, active, v, event);
         scatter.wo = to_frame(scatter.shading.frame, neg3(load_path_d(path, at)));
     }
@@ -40,7 +40,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 
     mask null = vertex_is_null(bs.lobe);
     next = next & (bs.pdf > 0.0f);
-    if (BSDF_IS_PANE) { /* of which the lobe tells */
+    if (BSDF_IS_PANE) { /* the lobe tells whether it scatters */
         next = next & vertex_continues(scene, v, null);
         v.state = layers_record(scene, path, at, met & !null, v, scatter, v.state LAYER_PASSED);
     }
@@ -57,10 +57,19 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     store_path_ratio(path, at, on, ratio);
 }
 
-#if !SHADES_BOTH
+/* Step vertex: where a program shades paths from the camera alone. */
 inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active SHADE_ARGS)
 {
     Vertex v = vertex_load(scene, path, hit, at, active);
     path_vertex(scene, path, shadow, at, scout_vertex(scene, path, at, active, v LAYER_PASSED), v SHADE_PASSED);
 }
-#endif
+
+/* Step both: paths from a light (which: 0) and from the camera (1), in a single program: the surface that either meets
+ * is loaded by the same instructions, as to compile them takes long. */
+inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active SHADE_ARGS,
+                              uint which)
+{
+    Vertex v = vertex_load(scene, path, hit, at, active);
+    if (which == 0) light_path_vertex(scene, path, shadow, at, active, v);
+    else path_vertex(scene, path, shadow, at, scout_vertex(scene, path, at, active, v LAYER_PASSED), v SHADE_PASSED);
+}

@@ -1,5 +1,5 @@
-/* The classic ray tracer (Whitted 1980): ambient and direct light, and one ray onward where a surface mirrors: with the
- * weight of a material's `reflectivity`, or as a delta material sends it. Direct light comes from one light a sample,
+/* The classic ray tracer (Whitted 1980): ambient and direct light, and a ray onward where a surface mirrors: with the
+ * weight of a material's `reflectivity`, or as a delta material sends it. Direct light comes from a light a sample,
  * chosen at random, so several lights converge to their sum. */
 /* `radiance` with the light of surfaces that are met. */
 inline Spectrum whitted_emission(Scene scene, mask active, Vertex v, Spectrum radiance)
@@ -14,8 +14,8 @@ inline Spectrum whitted_emission(Scene scene, mask active, Vertex v, Spectrum ra
 }
 
 #if USES_LIGHTS
-/* Puts a ray to a light into the shadow slab; own: the throughput of what is not mirrored. Returns what the path's
- * state gains. */
+/* Puts a ray to a light into the shadow slab; own: the throughput of light that is not mirrored. Returns the gain
+ * of the path's state. */
 inline integer whitted_light(Scene scene, Slab shadow, uint at, mask active, Vertex v, Scattering scatter, Spectrum own)
 {
     Frame frame = scatter.shading.frame;
@@ -35,6 +35,7 @@ inline integer whitted_light(Scene scene, Slab shadow, uint at, mask active, Ver
 }
 #endif
 
+/* Step vertex: the whole vertex. */
 inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
 {
     global const Settings *settings = scene.settings;

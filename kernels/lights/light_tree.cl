@@ -24,7 +24,7 @@ inline mask light_tree_in_cone(LightNode n, vec3 from)
     return within | (n.radius * inverse >= 1.0f);
 }
 
-/* Estimate of the light of a node at p: power, times the mean cosine at the lights (tree_nodes.py), over the squared
+/* Estimate of the light of a node at p: power, times the mean cosine at the lights (lights/tree.py), over the squared
  * distance, times the reflectance at p, which is the cosine for a diffuse surface if only a single hemisphere matters.
  * It is 0 only where no light arrives. lift: 1 where light from both sides matters, else 0. Lights on the whole scene
  * have the same importance everywhere. */

@@ -87,8 +87,7 @@ inline LightView light_view(Scene scene, integer row, LightRow l, vec3 p, vec3 h
 }
 inline LightView light_view_along(LightView v, vec3 wi, real t, vec3 n)
 {
-    LightView along = {v.p, wi, n, v.hemisphere, t};
-    return along;
+    return (LightView){v.p, wi, n, v.hemisphere, t};
 }
 inline vec3 light_view_direction(LightView v, vec3 d) { return d; }
 inline LightSample light_moved(LightView v, LightSample s) { return s; }

@@ -5,7 +5,7 @@
  * al. 2019, "Adaptive BRDF-Oriented Multiple Importance Sampling of Many Lights", and Tokuyoshi et al. 2024,
  * "Hierarchical Light Sampling with Accurate Spherical Gaussian Lighting", use other lobes. The half vector keeps the
  * shape of the lobe at grazing angles, and costs a single division. */
-#include "core/octahedral.cl"
+#include "core/warp.cl"
 
 #define RECEIVER_SPREAD 0.1f /* share of a node's squared sine that is added to the squared roughness */
 #define RECEIVER_MOST 0.95f  /* of the share, as it is an estimate: other light must be sampled, too */
@@ -58,11 +58,7 @@ inline real receiver_reflects(Receiver r, vec3 wi, real sine, real cosine)
 /* Twin, where no light is sampled by gloss. */
 typedef struct { vec3 hemisphere; } Receiver;
 
-inline Receiver receiver_at(Scene scene, integer row, vec3 hemisphere, vec3 away)
-{
-    Receiver r = {hemisphere};
-    return r;
-}
+inline Receiver receiver_at(Scene scene, integer row, vec3 hemisphere, vec3 away) { return (Receiver){hemisphere}; }
 inline real receiver_reflects(Receiver r, vec3 wi, real sine, real cosine) { return cosine; }
 
 /* Step kept: the receiver where a ray was sampled: next-event estimation chose lights by it. */

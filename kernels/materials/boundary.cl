@@ -147,8 +147,7 @@ typedef struct {
 inline Layers layers_load(Scene scene, integer at, TexturePoint point, Wavelengths lambdas)
 {
     integer first = gather_i(scene.materials, at), count = gather_i(scene.materials, at + 1);
-    Layers l = {scene, first, count, point, lambdas};
-    return l;
+    return (Layers){scene, first, count, point, lambdas};
 }
 inline Layer layer_at(Layers l, integer i)
 {
@@ -165,7 +164,6 @@ typedef struct {
 inline Layers layers_load(Scene scene, integer at, TexturePoint point, Wavelengths lambdas)
 {
     integer row = gather_i(scene.materials, at);
-    Layers l = {scene, gather_i(scene.materials, at + 1), gather_i(scene.materials, row),
-                gather_i(scene.materials, row + 1), film_profile(scene, row + 2, point, lambdas)};
-    return l;
+    return (Layers){scene, gather_i(scene.materials, at + 1), gather_i(scene.materials, row),
+                    gather_i(scene.materials, row + 1), film_profile(scene, row + 2, point, lambdas)};
 }

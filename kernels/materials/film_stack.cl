@@ -96,8 +96,7 @@ inline Stack stack_layer(Stack a, Admittance layer, real thickness, real lambda)
 }
 inline Wave wave_sel(mask m, Wave a, Wave b)
 {
-    Wave w = {{sel(m, a.r.re, b.r.re), sel(m, a.r.im, b.r.im)}, sel(m, a.t, b.t)};
-    return w;
+    return (Wave){{sel(m, a.r.re, b.r.re), sel(m, a.r.im, b.r.im)}, sel(m, a.t, b.t)};
 }
 inline Stack stack_sel(mask m, Stack a, Stack b)
 {

@@ -33,14 +33,12 @@ typedef struct {
 
 inline GridTable measurement_grid(Measurement t, integer first, int i)
 {
-    GridTable r = {first, MEASUREMENT_COUNT(t, i), MEASUREMENT_COUNT(t, i + 1)};
-    return r;
+    return (GridTable){first, MEASUREMENT_COUNT(t, i), MEASUREMENT_COUNT(t, i + 1)};
 }
 inline WarpTable measurement_warp(Measurement t, integer first, int i, int unit)
 {
-    WarpTable r = {t.values, first, MEASUREMENT_COUNT(t, 1), MEASUREMENT_COUNT(t, i), MEASUREMENT_COUNT(t, i + 1),
-                   gather(t.values, t.first + unit)};
-    return r;
+    return (WarpTable){t.values, first, MEASUREMENT_COUNT(t, 1), MEASUREMENT_COUNT(t, i), MEASUREMENT_COUNT(t, i + 1),
+                       gather(t.values, t.first + unit)};
 }
 
 inline MeasurementParts measurement_parts(Measurement t)

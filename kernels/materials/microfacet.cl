@@ -8,8 +8,7 @@ typedef struct {
 
 inline Microfacets microfacets_of(integer distribution, real alpha_u, real alpha_v)
 {
-    Microfacets d = {distribution == 1, max_r(alpha_u, (real)(1e-4f)), max_r(alpha_v, (real)(1e-4f))};
-    return d;
+    return (Microfacets){distribution == 1, max_r(alpha_u, (real)(1e-4f)), max_r(alpha_v, (real)(1e-4f))};
 }
 
 /* D(m), normalised so that the integral of D(m) m.z over the hemisphere is 1. */

@@ -57,8 +57,7 @@ inline real fuzz_albedo_mean(FuzzLobe l)
 inline vec2 fuzz_azimuth(vec3 w)
 {
     real r2 = w.x * w.x + w.y * w.y, inv = 1.0f / sqrt(max_r(r2, (real)(1e-20f)));
-    vec2 v = {sel(r2 > 1e-14f, w.x * inv, (real)(1.0f)), sel(r2 > 1e-14f, w.y * inv, (real)(0.0f))};
-    return v;
+    return (vec2){sel(r2 > 1e-14f, w.x * inv, (real)(1.0f)), sel(r2 > 1e-14f, w.y * inv, (real)(0.0f))};
 }
 /* The density of wi in the lobe of wo [1/sr]. */
 inline real fuzz_pdf(FuzzLobe l, vec3 wo, vec3 wi)

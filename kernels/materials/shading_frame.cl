@@ -114,8 +114,7 @@ typedef struct { Frame frame; } ShadingFrame;
 
 inline ShadingFrame shading_frame_load(Scene scene, integer row, Surface s, vec3 d, Wavelengths lambdas)
 {
-    ShadingFrame f = {surface_frame(s)};
-    return f;
+    return (ShadingFrame){surface_frame(s)};
 }
 /* The frame of a coat's normals (which: 1) or of directions of anisotropy (2). */
 inline MapFrame shading_map_frame(Scene scene, integer row, Surface s, Frame base, int which)

@@ -66,8 +66,7 @@ inline real warp_linear(real u, real a, real b)
 
 inline vec2 warp_mixed(vec2 a, vec2 b, real along)
 {
-    vec2 r = {a.x + along * (b.x - a.x), a.y + along * (b.y - a.y)};
-    return r;
+    return (vec2){a.x + along * (b.x - a.x), a.y + along * (b.y - a.y)};
 }
 
 inline real warp_at(vec2 rows, real y) { return rows.x + y * (rows.y - rows.x); }
@@ -76,21 +75,18 @@ inline real warp_at(vec2 rows, real y) { return rows.x + y * (rows.y - rows.x); 
 inline vec2 warp_halves(real word)
 {
     natural bits = as_natural(word);
-    vec2 r = {as_real((bits & 0x7fffu) << 13), as_real((bits >> 16 & 0x7fffu) << 13)};
-    return r;
+    return (vec2){as_real((bits & 0x7fffu) << 13), as_real((bits >> 16 & 0x7fffu) << 13)};
 }
 
 /* Of two slices and their shares: of halves in a word each, of pairs, of numbers. */
 inline vec2 warp_sum_halves(vec2 share, vec2 words)
 {
     vec2 a = warp_halves(words.x), b = warp_halves(words.y);
-    vec2 r = {share.x * a.x + share.y * b.x, share.x * a.y + share.y * b.y};
-    return r;
+    return (vec2){share.x * a.x + share.y * b.x, share.x * a.y + share.y * b.y};
 }
 inline vec2 warp_sum_pairs(vec2 share, vec4 v)
 {
-    vec2 r = {share.x * v.x + share.y * v.z, share.x * v.y + share.y * v.w};
-    return r;
+    return (vec2){share.x * v.x + share.y * v.z, share.x * v.y + share.y * v.w};
 }
 inline real warp_sum(vec2 share, vec2 v) { return share.x * v.x + share.y * v.y; }
 inline vec2 warp_added(vec2 a, vec2 b) { vec2 r = {a.x + b.x, a.y + b.y}; return r; }
@@ -121,8 +117,7 @@ inline vec2 warp_read_halves(global const float *values, WarpSlices s, integer a
 inline vec2 warp_ends(real word)
 {
     natural bits = as_natural(word);
-    vec2 r = {to_real(as_integer(bits & 0xffffu)), to_real(as_integer(bits >> 16))};
-    return r;
+    return (vec2){to_real(as_integer(bits & 0xffffu)), to_real(as_integer(bits >> 16))};
 }
 inline real warp_part(vec2 share, vec2 words, real along)
 {
@@ -213,8 +208,7 @@ inline vec2 warp_sample(WarpTable t, WarpSlices s, vec2 u, real *density)
     real c1 = warp_at(warp_densities(t, s, node + 1), y) * t.unit;
     real x = warp_linear(clamp_r(along / max_r(0.5f * (c0 + c1), (real)(1e-30f)), (real)(0.0f), (real)(1.0f)), c0, c1);
     *density = (c0 + x * (c1 - c0)) * warp_cells(t);
-    vec2 p = {(to_real(column) + x) / to_real(t.columns - 1), (to_real(row) + y) / to_real(t.rows - 1)};
-    return p;
+    return (vec2){(to_real(column) + x) / to_real(t.columns - 1), (to_real(row) + y) / to_real(t.rows - 1)};
 }
 
 /* The even point that goes to p, and the density there. */
@@ -238,8 +232,7 @@ inline vec2 warp_invert(WarpTable t, WarpSlices s, vec2 p, real *density)
 inline vec2 halfway_square(vec3 w)
 {
     real theta = atan2_r(sqrt_r(w.x * w.x + w.y * w.y), w.z);
-    vec2 r = {sqrt_r(theta * (2.0f * INV_PI)), (atan2_r(w.y, w.x) + PI) * INV_2PI};
-    return r;
+    return (vec2){sqrt_r(theta * (2.0f * INV_PI)), (atan2_r(w.y, w.x) + PI) * INV_2PI};
 }
 
 /* A point's direction; its azimuth is turned by so many full turns. */

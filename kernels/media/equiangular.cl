@@ -125,6 +125,5 @@ inline AimSpan aim_span(Scene scene, integer row, vec3 d, vec3 to, real delta, r
 
 inline AimSpan aim_span(Scene scene, integer row, vec3 d, vec3 to, real delta, real far2, real end)
 {
-    AimSpan s = {(real)(0.0f), end, mask_of(1)};
-    return s;
+    return (AimSpan){(real)(0.0f), end, mask_of(1)};
 }

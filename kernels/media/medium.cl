@@ -142,8 +142,7 @@ typedef struct { integer inside, outside; } ShapeMedia;
 inline ShapeMedia shape_media(Scene scene, integer shape)
 {
     integer row = MEDIA_OF_SHAPES + 2 * shape;
-    ShapeMedia m = {gather_i(scene.media, row), gather_i(scene.media, row + 1)};
-    return m;
+    return (ShapeMedia){gather_i(scene.media, row), gather_i(scene.media, row + 1)};
 }
 
 /* The medium whose transmittance a vertex still applies: none where stage/flight.cl has applied it. */

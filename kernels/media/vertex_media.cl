@@ -29,6 +29,5 @@ inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask 
 /* Twin, for scenes without media. */
 inline VertexMedia vertex_media(Scene scene, Slab path, Slab hit, uint at, mask active, integer row, mask front)
 {
-    VertexMedia m = {0, 0, 0, 0, mask_of(0)};
-    return m;
+    return (VertexMedia){0, 0, 0, 0, mask_of(0)};
 }

@@ -47,8 +47,7 @@ inline real shape_motion_size(Motion m, vec3 rest) { return 4.0f * (size3(m.t) +
 inline Motion shape_motion(Scene scene, ShapeRow shape)
 {
     vec3 zero = v3(0.0f, 0.0f, 0.0f);
-    Motion m = {zero, zero, zero, zero};
-    return m;
+    return (Motion){zero, zero, zero, zero};
 }
 inline vec3 shape_point(Motion m, vec3 p) { return p; }
 inline vec3 shape_point_back(Motion m, vec3 p) { return p; }

@@ -2,7 +2,7 @@
 #define SPECTRUM_SIZE 3
 typedef struct { real x, y, z; } Spectrum;
 #define SPECTRUM_EACH(F) F(x) F(y) F(z)
-#define FOURTH(value)
+#define SPECTRUM(x, y, z, w) ((Spectrum){x, y, z})
 #define SPECTRUM_MAX(s) max_r(max_r((s).x, (s).y), (s).z)
 #define SPECTRUM_MEAN(s) (((s).x + (s).y + (s).z) * (1.0f / 3.0f))
 /* The value that directions or distances are sampled by: a channel's, chosen by the parts of `ratio`; u in [0, 1). */
@@ -15,11 +15,7 @@ inline real spectrum_pick(Spectrum s, Spectrum ratio, real u)
 typedef Spectrum Wavelengths;
 
 /* A value that stands in the row itself: linear rgb. */
-inline Spectrum spectrum_constant(vec4 words, Wavelengths lambdas)
-{
-    Spectrum r = {words.x, words.y, words.z};
-    return r;
-}
+inline Spectrum spectrum_constant(vec4 words, Wavelengths lambdas) { return (Spectrum){words.x, words.y, words.z}; }
 /* Whether it is 0, whatever the wavelength. */
 inline mask spectrum_constant_none(vec4 words) { return (words.x == 0.0f) & (words.y == 0.0f) & (words.z == 0.0f); }
 /* The same of a value without colour. */
@@ -30,23 +26,17 @@ inline Spectrum spectrum_table(Scene scene, vec4 words, integer source, Waveleng
     return spectrum_constant(words, lambdas);
 }
 /* What a texel of a bitmap means: linear rgb. */
-inline Spectrum spectrum_texel(real x, real y, real z, real w, Wavelengths lambdas)
-{
-    Spectrum r = {x, y, z};
-    return r;
-}
+inline Spectrum spectrum_texel(real x, real y, real z, real w, Wavelengths lambdas) { return (Spectrum){x, y, z}; }
 /* A texel of an emission image or environment map: linear rgb. */
 inline Spectrum spectrum_light_texel(Scene scene, real x, real y, real z, real w, Wavelengths lambdas)
 {
-    Spectrum r = {x, y, z};
-    return r;
+    return (Spectrum){x, y, z};
 }
 /* The same for a texel of three floats in a table. */
 inline Spectrum spectrum_texel_at(global const uint *table, integer at, Wavelengths lambdas)
 {
     vec3 rgb = gather3((global const float *)table, at);
-    Spectrum r = {rgb.x, rgb.y, rgb.z};
-    return r;
+    return (Spectrum){rgb.x, rgb.y, rgb.z};
 }
 inline Spectrum spectrum_light_texel_at(Scene scene, global const uint *table, integer at, Wavelengths lambdas)
 {
@@ -56,14 +46,12 @@ inline Spectrum spectrum_light_texel_at(Scene scene, global const uint *table, i
 typedef struct { integer rgb; } PackedTexel;
 inline PackedTexel spectrum_packed_words(global const uint *table, integer first, integer index)
 {
-    PackedTexel t = {gather_i(table, first + index)};
-    return t;
+    return (PackedTexel){gather_i(table, first + index)};
 }
 inline Spectrum spectrum_packed_texel(global const uint *table, PackedTexel t, integer decode, Wavelengths lambdas)
 {
-    Spectrum r = {gather_w(table, decode + (t.rgb & 255)), gather_w(table, decode + ((t.rgb >> 8) & 255)),
-                  gather_w(table, decode + ((t.rgb >> 16) & 255))};
-    return r;
+    return (Spectrum){gather_w(table, decode + (t.rgb & 255)), gather_w(table, decode + ((t.rgb >> 8) & 255)),
+                      gather_w(table, decode + ((t.rgb >> 16) & 255))};
 }
 /* Light of a grey: as bright in all channels. */
 inline Spectrum spectrum_grey_light(Scene scene, real value, Wavelengths lambdas) { return spectrum_of(value); }

@@ -2,7 +2,7 @@
 #define SPECTRUM_SIZE 4
 typedef struct { real x, y, z, w; } Spectrum;
 #define SPECTRUM_EACH(F) F(x) F(y) F(z) F(w)
-#define FOURTH(value) , value
+#define SPECTRUM(x, y, z, w) ((Spectrum){x, y, z, w})
 #define SPECTRUM_MAX(s) max_r(max_r(max_r((s).x, (s).y), (s).z), (s).w)
 #define SPECTRUM_MEAN(s) (((s).x + (s).y + (s).z + (s).w) * 0.25f)
 /* The value that directions or distances are sampled by: the hero's. */
@@ -86,8 +86,7 @@ typedef struct { integer p, q; } PackedTexel;
 inline PackedTexel spectrum_packed_words(global const uint *table, integer first, integer index)
 {
     integer at = first + 2 * index;
-    PackedTexel t = {gather_i(table, at), gather_i(table, at + 1)};
-    return t;
+    return (PackedTexel){gather_i(table, at), gather_i(table, at + 1)};
 }
 inline Spectrum spectrum_packed_texel(global const uint *table, PackedTexel t, integer decode, Wavelengths lambdas)
 {

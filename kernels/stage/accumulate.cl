@@ -1,6 +1,6 @@
-/* Makes the picture of the film for those who look on, pixel by pixel: means of sums, taken to the output space by the
+/* Makes a preview of the film, pixel by pixel: means of sums, taken to the output space by the
  * matrix in the settings; the fourth value of a pixel is its number of samples. The same steps as in
- * clpt/render/film/developed.py, which makes the pictures that are kept: so nothing is contracted. */
+ * clpt/render/film/developed.py, which makes the final pictures: so nothing is contracted. */
 #include "core/base.cl"
 #include "film/picture.cl"
 #pragma OPENCL FP_CONTRACT OFF

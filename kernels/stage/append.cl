@@ -1,6 +1,6 @@
 /* Gathers the paths that met a surface by the kind of its material, a queue for each, `slots` words each. A
- * group of work-items counts in local memory what it has of each kind, and reserves room for all of
- * them with one addition to a kind's count. The order of the groups does not matter to the picture. */
+ * group of work-items counts the paths of each kind in local memory, and reserves room for all of
+ * them with a single addition to a kind's count. The order of the groups does not matter to the picture. */
 #include "core/base.cl"
 #include "transport/queue.cl#waiting"
 
@@ -17,7 +17,7 @@ kernel void append(SLAB_ARGS, global uint *queue, global uint *queue_counts, uin
     SLABS
     local uint tally[BSDF_COUNT], begin[BSDF_COUNT];
     uint own = get_local_id(0), slot = get_global_id(0), rank = 0;
-    /* One work-item does this for all kinds: a group may be smaller than their number. */
+    /* A single work-item does this for all kinds: a group may be smaller than their number. */
     if (own == 0)
         for (uint k = 0; k < BSDF_COUNT; k++) tally[k] = 0;
     barrier(CLK_LOCAL_MEM_FENCE);

@@ -1,4 +1,4 @@
-/* What shading has in common for several kinds of materials, as a part of the loop (stage/loop.cl) that is compiled
+/* Shading that several kinds of materials share, as a part of the loop (stage/loop.cl) that is compiled
  * once for all of them: clpt/render/flow/common.py. No kind's flags reach it. */
 #include "core/base.cl"
 #include "generated/sampler.cl"

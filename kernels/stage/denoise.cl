@@ -1,8 +1,57 @@
-/* Takes noise away by averages over pixels that see the same light (clpt/denoise/statistical.py). All pictures are of
- * four floats a pixel, of which the fourth is padding but where it is named. */
+/* Averages over pixels that see the same light take noise away (clpt/denoise/statistical.py). All pictures are of four
+ * floats a pixel; the fourth is padding unless a comment names it.
+ *
+ * Each pixel has the mean of its samples and an estimate of that mean's variance. Welch's statistic of two means,
+ * (a - b)^2 / (var(a) + var(b)), is 1 on average where both have the same expected value (Sakai et al. 2024, "A
+ * Statistical Approach to Monte Carlo Denoising", use it to decide which neighbours to average). Here it is averaged
+ * over the 3x3 pixels around both and over three channels, which tells more than a single pixel, as non-local means do
+ * (Rousselle et al. 2012), and a pixel counts the less the larger the average is.
+ *
+ * Noise of light is as large as light, and has rare high values: statistics are those of asinh(v / scale), which is
+ * linear in the dark and logarithmic above (Sakai et al. take a Box-Cox transformation for the same purpose). */
 #include "core/lanes.cl"
 #include "core/math.cl"
-#include "film/likeness.cl"
+
+#define PATCH 1      /* pixels to each side of a pixel that are compared */
+#define PATCH_TERMS 27.0f
+
+/* LANES floats at any address. */
+typedef real unaligned_real __attribute__((aligned(4)));
+#define unaligned_load(p) (*(global const unaligned_real *)(p))
+
+/* The square of the difference of three planes here and `step` floats away. */
+inline real square_apart(global const float *image, size_t plane, int step)
+{
+    real x = unaligned_load(image) - unaligned_load(image + step);
+    real y = unaligned_load(image + plane) - unaligned_load(image + plane + step);
+    real z = unaligned_load(image + 2 * plane) - unaligned_load(image + 2 * plane + step);
+    return x * x + y * y + z * z;
+}
+
+/* A row of a patch: the sum of Welch's statistic, here and `step` floats away, over three channels and the pixels from
+ * PATCH to the left to PATCH to the right. guide: planes of transformed means; variance: of these. */
+inline real patch_row(global const float *guide, global const float *variance, size_t plane, int step)
+{
+    real sum = (real)(0.0f);
+    for (int x = -PATCH; x <= PATCH; x++)
+        for (int channel = 0; channel < 3; channel++) {
+            size_t i = channel * plane + x, j = i + step;
+            real apart = unaligned_load(guide + i) - unaligned_load(guide + j);
+            sum += apart * apart / (unaligned_load(variance + i) + unaligned_load(variance + j));
+        }
+    return sum;
+}
+
+/* How much of a neighbour's light counts, by a statistic: half at `limit`, then less by its power 2 * sharpness. */
+inline real likeness(real statistic, float limit, int sharpness)
+{
+    real ratio = statistic / limit, square = ratio * ratio, power = (real)(1.0f);
+    for (int i = 0; i < sharpness; i++) power *= square;
+    return 1.0f / (1.0f + power);
+}
+
+/* The mean of the square of a colour. */
+inline float colour_square(float4 v) { return (v.x * v.x + v.y * v.y + v.z * v.z) / 3.0f; }
 
 #define RADIUS 10      /* pixels, of the disk over which a pixel is averaged */
 #define BORDER (RADIUS + PATCH) /* pixels of planes beside the picture */
@@ -13,7 +62,7 @@
 #else
 #define ROWS 8
 #endif
-#define SURE 0.02f     /* no error is thought to be smaller, relative to the noise */
+#define SURE 0.02f     /* lower limit of an error, relative to the noise */
 
 /* Two halves' transformed mean and its variance, by their difference alone. */
 kernel void denoise_guide(global const float4 *first, global const float4 *second, global float4 *guide,
@@ -25,7 +74,7 @@ kernel void denoise_guide(global const float4 *first, global const float4 *secon
     variance[i] = half_apart * half_apart;
 }
 
-/* The mean over 2 * radius + 1 pixels of a row or column, or those of them that are there; step: (1, 0) or (0, 1).
+/* The mean over 2 * radius + 1 pixels of a row or column, as far as they are in the picture; step: (1, 0) or (0, 1).
  * least: is added. */
 kernel void denoise_blur(global const float4 *from, global float4 *into, int2 size, int2 step, int radius, float least)
 {
@@ -41,8 +90,8 @@ kernel void denoise_blur(global const float4 *from, global float4 *into, int2 si
     into[(size_t)y * size.x + x] = sum / count + least;
 }
 
-/* Planes of one float a pixel from a picture of `count` vectors a pixel: lanes read neighbours in one load. `extent`
- * is the size of a plane, BORDER pixels more than the picture to each side; a pixel near the border stands for those
+/* Planes of a float a pixel from a picture of `count` vectors a pixel: lanes read neighbours in a single load. `extent`
+ * is the size of a plane, BORDER pixels more than the picture to each side; a pixel near the border stands for pixels
  * beyond it. */
 kernel void denoise_planes(global const float *from, global float *planes, int2 size, int2 extent, int count)
 {
@@ -74,8 +123,8 @@ inline int near_surfaces(global const float *albedo, global const float *normal,
 
 /* The weighted mean of values over the pixels around each. A work-item has LANES pixels in each of ROWS rows. All but
  * `averaged` are planes. values, averaged: `count` vectors a pixel. features: how albedo and normal count, the squares
- * of their differences. A pixel counts itself as much as the neighbour that is most alike: so one with an outlier, like
- * nothing around it, still loses it. */
+ * of their differences. A pixel counts itself as much as the neighbour that is most alike: so a pixel with an outlier,
+ * unlike all around it, still loses it. */
 kernel void denoise_average(global const float *guide, global const float *variance, global const float *albedo,
                             global const float *normal, global const float *values, global float *averaged, int2 size,
                             int2 extent, int count, float2 features, float limit, int sharpness)
@@ -124,9 +173,9 @@ kernel void denoise_average(global const float *guide, global const float *varia
         }
 }
 
-/* The mean squares of what is wrong, relative to light, of two averages of halves and of the noisy picture: by how far
- * an average of one half is from the other half, whose noise is its own. halves, once, twice: two vectors a pixel.
- * dark: the square of light added. errors: of `once`, of `twice`, of the noisy picture, 0. */
+/* The mean squares of the errors, relative to light, of two averages of halves and of the noisy picture: by the
+ * distance of an average of a half from the other half, whose noise is independent. halves, once, twice: two vectors a
+ * pixel. dark: the square of light added. errors: of `once`, of `twice`, of the noisy picture, 0. */
 kernel void denoise_errors(global const float4 *halves, global const float4 *once, global const float4 *twice,
                            global float4 *errors, float dark)
 {
@@ -140,8 +189,8 @@ kernel void denoise_errors(global const float4 *halves, global const float4 *onc
     errors[i] = (float4)(first - 2.0f * noise, second - 2.0f * noise, noise, 0.0f); /* a half has twice the noise */
 }
 
-/* How much of both averages and of the noisy picture makes the least error: inverse to what each has. errors: around
- * each pixel; shares: of these three, then 0. */
+/* The shares of both averages and of the noisy picture with the least error: inverse to the error of each. errors:
+ * around each pixel; shares: of these three, then 0. */
 kernel void denoise_shares(global const float4 *errors, global float4 *shares)
 {
     size_t i = get_global_id(0);

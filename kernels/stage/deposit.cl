@@ -1,8 +1,6 @@
 /* Keeps as photons the light paths that meet a surface, or collide in a medium, after something sharp, before a
  * material is chosen there. Each vertex of each light path of a pass has a place of its own, so that nothing is dropped
  * and no order counts. */
-#include "core/base.cl"
-#include "core/octahedral.cl"
 #include "stage/stage.cl"
 #include "generated/deposit_args.cl"
 #include "generated/sampler.cl"
@@ -20,9 +18,7 @@
 
 STAGE(deposit)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     integer state = load_path_state(path, at), depth = state & PATH_DEPTH;
     integer pixel_index = load_path_pixel_index(path, at), kind = MATERIAL_KIND(load_hit_material(hit, at));
     mask active = ((state & PATH_ALIVE) != 0) & ((state & PATH_SHARP) != 0) & (load_hit_prim(hit, at) >= 0);

@@ -1,7 +1,6 @@
 /* Ends paths that are finished and begins those that come next, for integrators that start at lights: the twin of
- * stage/generate.cl. The work list only counts paths here: what a path leaves on the film is added by
- * stage/splat.cl to the pixel where the camera sees it. */
-#include "core/base.cl"
+ * stage/generate.cl. The work list only counts paths here: stage/splat.cl adds the light of a path to
+ * the pixel where the camera sees it. */
 #include "stage/stage.cl"
 #include "generated/begin_args.cl"
 #include "generated/sampler.cl"
@@ -28,7 +27,7 @@
 #include "generated/light_path_endless.cl"
 #include "generated/emit_steps.cl"
 
-/* The ray with which a light path begins, and the wavelengths that it has; sets the scene's time. */
+/* The first ray of a light path, and its wavelengths; sets the scene's time. */
 inline LightRay first_light_ray(Scene *scene, Sampler sampler, integer sample, Wavelengths *lambdas)
 {
     vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
@@ -46,8 +45,8 @@ inline real first_mis_ratio(Scene scene, LightRay r)
     return mis_ratio_aimed((real)(1.0f / scene.settings->light_paths), r);
 }
 
-/* Puts a ray from a light into the slots that `go` on, and, where the camera sees lights, one from it to the camera
- * into the shadow slab. Returns the bits of Path.state that follow. */
+/* Puts a ray from a light into the slots that `go` on, and, where the camera sees lights, a ray from there to the
+ * camera into the shadow slab. Returns the bits of Path.state that follow. */
 inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, mask ended, mask go, integer pixel_index,
                                 integer sample)
 {
@@ -89,9 +88,7 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
 
 STAGE(emit)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     PathEnd end = path_end(path, hit, at);
     if (path_end_of_half(end)) {
         light_path_endless(path, at, end, counters);

@@ -1,7 +1,6 @@
 /* Begins light paths that are ghosts of the camera's lens, and no more: each is a ray from a point of the lens's front
  * to a light, chosen as next-event estimation chooses it, and what its light adds to the film if nothing is between.
  * The twin of stage/emit.cl; stage/splat.cl tests the rays. */
-#include "core/base.cl"
 #include "stage/stage.cl"
 #include "generated/begin_args.cl"
 #include "generated/sampler.cl"
@@ -67,9 +66,7 @@ inline integer begin_ghost(Scene scene, Slab path, Slab shadow, uint at, mask en
 
 STAGE(flare)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     PathEnd end = path_end(path, hit, at);
     if (any(end.ended)) {
         NextSample next = next_light_path(scene, path, at, BEGIN_PASSED, end);

@@ -1,12 +1,10 @@
-/* Takes rays through media: a ray either comes to where it ends, or meets the medium before. Then that is where it
- * ends, and the medium's phase function is its material. Both are chosen by the extinction at the hero wavelength, and
- * weighed over all of the path's wavelengths (Miller, Georgiev and Jarosz 2019, with one sample): `ratio` does it as
- * for directions, see spectra/hero.cl. Light that is absorbed is a weight, never an end. Some flights end near lamps,
- * see media/equiangular.cl; both ways to choose are weighed by their sum. */
-#include "core/base.cl"
+/* Takes rays through media: a ray either comes to its end, or collides with the medium before. Then it ends there, and
+ * the medium's phase function is its material. Both are chosen by the extinction at the hero wavelength, and weighed
+ * over all of the path's wavelengths (Miller, Georgiev and Jarosz 2019, with a single sample): `ratio` does it as for
+ * directions, see spectra/hero.cl. Light that is absorbed is a weight, never an end. Some flights end near lamps, see
+ * media/equiangular.cl; both ways to choose are weighed by their sum. */
 #include "stage/stage.cl"
 #include "generated/sampler.cl"
-#include "transport/path_state.cl"
 #include "generated/scouts.cl"
 #include "generated/textures.cl"
 #include "generated/medium.cl"
@@ -26,9 +24,7 @@ typedef struct {
 
 STAGE(flight)(SLAB_ARGS, SCENE_ARGS FLIGHT_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     integer state = load_path_state(path, at);
     mask alive = (state & PATH_ALIVE) != 0, met = alive & (load_hit_prim(hit, at) >= 0);
     integer name = flight_medium(scene, path, hit, at, alive, met);

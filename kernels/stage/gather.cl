@@ -1,11 +1,9 @@
-/* Gathers photons along rays from the camera through media, for those whose phase function is of one kind: before
- * stage/flight.cl chooses where they collide. */
-#include "core/base.cl"
+/* Gathers photons along rays from the camera through media whose phase function is of a kind: before stage/flight.cl
+ * chooses where they collide. */
 #include "stage/stage.cl"
 #include "generated/merge_args.cl"
 #include "generated/gather_args.cl"
 #include "generated/sampler.cl"
-#include "transport/path_state.cl"
 #include "generated/scouts.cl"
 #include "shapes/surface.cl#flags"
 #include "generated/textures.cl"
@@ -22,9 +20,7 @@
 
 STAGE(gather_along)(SLAB_ARGS, SCENE_ARGS GATHER_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     integer state = load_path_state(path, at);
     mask alive = (state & PATH_ALIVE) != 0, met = alive & (load_hit_prim(hit, at) >= 0);
     mask merges = alive & !path_scouts(state) & merging_here(state, state & PATH_DEPTH);

@@ -1,7 +1,6 @@
 /* Ends paths that are finished and begins those that come next: a path that left the scene gathers the infinite
  * lights, a finished path is added to its pixel, and its slot starts the next sample of its work list with a ray
  * from the camera. */
-#include "core/base.cl"
 #include "stage/stage.cl"
 #include "generated/begin_args.cl"
 #include "generated/sampler.cl"
@@ -23,10 +22,9 @@
 #include "generated/first_ray.cl"
 #include "generated/first_cone.cl"
 #include "generated/layer_sums.cl"
-#include "transport/path_state.cl"
 #include "generated/scouts_begin.cl"
 
-/* What a sample begins with. */
+/* The beginning of a sample. */
 typedef struct {
     CameraRay ray;
     Spectrum beta;
@@ -115,9 +113,7 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
 
 STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     scene.time = load_path_time(path, at);
     PathEnd end = path_end(path, hit, at);
     if (sky_due(end)) {

@@ -1,17 +1,14 @@
 /* Finds where every ray in flight ends. Triangles go through a layout of kernels/bvh, as many
- * rays a work-item as it likes; analytic shapes through a tree of their own, one ray at a time. The hit takes
- * along what shading needs first: the normal and the material of the side that was met. */
-#include "core/base.cl"
+ * rays a work-item as it likes; analytic shapes through a tree of their own, a ray at a time. The hit includes the
+ * normal and the material of its side, which shading needs first. */
+#include "stage/stage.cl"
 #include "shapes/shape.cl"
 #include "shapes/surface.cl#flags"
 #include "generated/trace.cl"
-#include "stage/stage.cl"
 
 STAGE(intersect)(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     integer state = load_path_state(path, at);
     mask active = (state & PATH_ALIVE) != 0;
     if (any(active)) {

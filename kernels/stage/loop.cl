@@ -1,14 +1,54 @@
 /* The bounce loop on the device: every work-item takes `share` neighbouring slots through all stages, again and again
  * until they are at the end of their work lists, or `bounces` times. On a CPU it is a core's own small wavefront: its
  * paths stay in the core's cache, and are sorted by material before they are shaded. The host need not wait for a count
- * of what is left, so it can enqueue a whole exposure at once; `restart` begins the lists. `which` says what kind of
- * paths is traced, where a scene has paths from lights (0) and from the camera (1). The host raises `leave` while the
- * loop runs, if the paths are of no use any more; a null pointer is never raised. The stages are those of the other
- * files here, each compiled by itself as a function (stage/stage.cl), in its own number of lanes, and linked.
- */
-#include "core/base.cl"
+ * of the rest, so it can enqueue a whole exposure at once; `restart` begins the lists. `which` is the kind of paths,
+ * where a scene has paths from lights (0) and from the camera (1). The host raises `leave` while the loop runs, if the
+ * paths are of no use any more; a null pointer is never raised. The stages are those of the other files here, each
+ * compiled by itself as a function (stage/stage.cl), in its own number of lanes, and linked. */
 #include "stage/stage.cl"
-#include "stage/bounce.cl"
+#include "generated/loop_args.cl"
+#include "transport/queue.cl"
+#include "generated/bounce_stages.cl"
+
+/* A bounce of the paths of a work-item: the slots from `first` to `end` go through all stages but the beginning of
+ * paths. Each verb `bounce_...` takes slots through a stage for the kind of paths, and does nothing where no path of
+ * the scene has that stage. Before they are shaded, the slots are sorted by material, so that a block of LANES slots
+ * has a single kind; where nearly all wait for the same kind they are shaded as they lie. */
+#define BLOCK (settings->slots + get_global_id(0) * LANES) /* the first slot of the work-item's block */
+#define bounce_shade(kind, first, end)                 \
+    for (uint slot = first; slot < end; slot += LANES) \
+        bounce_shade_at(SLAB_PASSED, SCENE_PASSED, LOOP_PASSED, which, kind, slot)
+#include "generated/walk.cl"
+
+inline void bounce_paths(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uint *queue, uint first, uint end)
+{
+    SLABS
+    uint starts[BSDF_COUNT + 1], block = BLOCK;
+    constant BlockWords *words = BLOCK_WORDS(which);
+    bounce_show(first, end); /* light paths that begin where the camera sees */
+    bounce_intersect(first, end);
+    bounce_flight(first, end); /* through media, to where a path is scattered */
+    bounce_deposit(first, end); /* photons */
+    bounce_train(first, end); /* of guides */
+    bounce_mix(first, end); /* a material of a mixture is chosen */
+    if (PATHS_ARE_SHADED) {
+        queue_sort(path, hit, queue, starts, first, end);
+        if (PATHS_WALK) bounce_walk(SLAB_PASSED, SCENE_PASSED, LOOP_PASSED, which, queue, starts, first, end);
+        for (int kind = 0; kind < BSDF_COUNT; kind++) {
+            uint begins = starts[kind], ends = starts[kind + 1];
+            if (queue_is_dense(ends - begins, end - first)) {
+                bounce_shade(kind, first, end);
+                continue;
+            }
+            for (uint entry = begins; entry < ends; entry += LANES) {
+                queue_take(path, hit, shadow, words, queue, entry, ends, block);
+                bounce_shade(kind, block, block + LANES);
+                queue_return(path, shadow, words, words->shadow_words, words->shadow, queue, entry, ends, block);
+            }
+        }
+    }
+    bounce_join(first, end); /* to lights or, paths from lights, to the camera */
+}
 
 kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, global uint *queue, uint share, uint bounces,
                               uint restart, uint which, global const volatile uint *leave)

@@ -1,6 +1,6 @@
-/* What a kind of material has of its own, as a part of the loop (stage/loop.cl) for a vertex that several kinds share:
+/* The functions of a kind of material, as a part of the loop (stage/loop.cl) for a vertex that several kinds share:
  * materials/bsdf.cl. */
-#include "core/base.cl"
+#include "stage/stage.cl"
 #include "shapes/shape.cl"
 #include "lights/light.cl"
 #include "generated/textures.cl"
@@ -11,7 +11,7 @@
 #include "generated/hero_steps.cl"
 #include "materials/bsdf.cl#pair"
 
-/* What a vertex asks for, of LANES paths. */
+/* The answer to a vertex, of LANES paths. */
 inline BsdfAnswer material_answer(Bsdf m, vec3 wo, vec3 wi, vec3 u, int adjoint)
 {
     BsdfAnswer a;
@@ -23,5 +23,4 @@ inline BsdfAnswer material_answer(Bsdf m, vec3 wo, vec3 wi, vec3 u, int adjoint)
     return a;
 }
 
-#include "stage/apart.cl"
 #include "generated/material_part.cl"

@@ -1,7 +1,6 @@
-/* Chooses a leaf for every hit on a mixture (a mask or a blend), at random by its weight, so that what
- * follows shades one material. A row of `mixtures`: the weight (a number and 1 + its texture), and the
+/* Chooses a leaf for every hit on a mixture (a mask or a blend), at random by its weight, so that later
+ * stages shade a single material. A row of `mixtures`: the weight (a number and 1 + its texture), and the
  * material words taken where a random number is above and below it; these may be mixtures again. */
-#include "core/base.cl"
 #include "stage/stage.cl"
 #include "generated/sampler.cl"
 #include "shapes/shape.cl"
@@ -13,9 +12,7 @@
 
 STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     integer state = load_path_state(path, at), word = load_hit_material(hit, at);
     mask active = ((state & PATH_ALIVE) != 0) & (load_hit_prim(hit, at) >= 0);
     mask open = active & (MATERIAL_KIND(word) == MATERIAL_MIXTURE);
@@ -33,7 +30,7 @@ STAGE(mix_materials)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG)
             integer row = sel_i(open, MATERIAL_ROW(word), (integer)(0));
             real w = mixture_weight(scene, row, surface_texture_point(s), lambdas);
             mask second = u < w;
-            /* What is left of u is as good as new. */
+            /* The rest of u is as good as a new number. */
             u = min_r(sel(second, u / max_r(w, (real)(1e-20f)), (u - w) / max_r(1.0f - w, (real)(1e-20f))),
                       (real)(0.9999999f));
             integer next = sel_i(second, gather_i(scene.mixtures, row + 3), gather_i(scene.mixtures, row + 2));

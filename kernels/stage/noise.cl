@@ -1,4 +1,4 @@
-/* How much the film has changed since it was measured last, for adaptive sampling
+/* The change of the film since its last measurement, for adaptive sampling
  * (clpt/render/wavefront/adaptive.py). If a pixel's mean was a after n samples and is b after m, (b - a)^2 n / (m - n)
  * is an estimate of the variance of b, without bias where samples are independent; for samples that are spread evenly
  * it is above the variance. A work-item takes a 4x4 tile; the pixels of the two colours of a chessboard are summed
@@ -7,7 +7,7 @@
 #include "core/base.cl"
 #include "film/picture.cl"
 
-/* A cell is the pixels of one colour in a square of `side` times `side` pixels. active_cells: which cells to measure,
+/* A cell is the pixels of a colour in a square of `side` times `side` pixels. active_cells: the cells to measure,
  * a square's two colours after each other; previous_mean: luminance of every pixel when it was measured last, then
  * the samples that it had, then likewise of light paths; noise_sums: variance, luminance and number of pixels, per
  * tile and colour. */

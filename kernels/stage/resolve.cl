@@ -3,7 +3,7 @@
  * the least linear value of each, clpt.images.transfer.srgb8_steps, so they are those of a written .png to the bit.
  * With a table of a display's codes (`size` points on an axis, else 0) these take the place of curve and
  * transfer. */
-#include "film/table.cl"
+#include "film/tone.cl"
 #include "film/tone.cl"
 
 /* The colour of a pixel in linear Rec. 709; rows: of the matrix to it, used where `converted`. */
@@ -23,8 +23,8 @@ inline float4 shown(float4 v, int tone, global const float4 *table, int size, fl
 
 inline float srgb_transfer(float v) { return v <= 0.0031308f ? 12.92f * v : 1.055f * pow(v, 1.0f / 2.4f) - 0.055f; }
 
-/* The codes of a colour: near ones, by a fit to the transfer that is right to 0.1 of a code (minimax over
- * [0.0031308, 1], our own), then by the steps of a code and the next one; these go from -inf to inf. */
+/* The codes of a colour: near codes, by a fit to the transfer that is right to 0.1 of a code (minimax over
+ * [0.0031308, 1], our own), then by the steps of a code and the next code; these go from -inf to inf. */
 inline uint4 srgb_codes(global const float *steps, float4 v)
 {
     v = clamp(v, 0.0f, 1.0f);

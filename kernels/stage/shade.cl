@@ -1,7 +1,6 @@
-/* Shades the paths that met one kind of material. Built once per kind, so it holds no switch: LANES neighbouring slots,
- * in which other kinds are masked out, or, where QUEUED, one slot of the kind's queue. Where a text is whole, read it
+/* Shades the paths that met a kind of material. Built once per kind, so it holds no switch: LANES neighbouring slots,
+ * with other kinds masked out, or, where QUEUED, a slot of the kind's queue. Where a text is whole, read it
  * from its end: first the stage, then `integrator_vertex` above it, whose steps stand above that in their order. */
-#include "core/base.cl"
 #include "stage/stage.cl"
 #include "generated/merge_args.cl"
 #include "generated/shade_args.cl"
@@ -39,7 +38,7 @@
 #define WHICH_PASSED
 #endif
 
-#if SHADES_SEVERAL /* kinds, LANES paths of one at a time */
+#if SHADES_SEVERAL /* kinds, LANES paths of the same kind at a time */
 #define KIND_ARG , uint kind
 #else
 #define KIND_ARG

@@ -1,5 +1,4 @@
-/* Tests the rays that wait to reach a light, and adds to their paths' radiance what arrives of what they carry. */
-#include "core/base.cl"
+/* Tests the rays that wait to reach a light, and adds the part of their light that arrives to their paths' radiance. */
 #include "stage/stage.cl"
 #include "generated/join_args.cl"
 #include "generated/shadow_ray.cl"
@@ -7,9 +6,7 @@
 
 STAGE(shadow)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     real t = load_shadow_t(shadow, at);
     mask active = t > 0.0f;
     if (any(active)) {

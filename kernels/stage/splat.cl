@@ -1,18 +1,15 @@
-/* Tests the rays that wait to reach the camera, and adds what arrives of what they carry to the pixels whose
- * filters hold the point where it is seen. No sample is counted here: stage/emit.cl counts paths. */
-#include "core/base.cl"
+/* Tests the rays that wait to reach the camera, and adds the part of their light that arrives to the pixels whose
+ * filters hold its point on the film. No sample is counted here: stage/emit.cl counts paths. */
 #include "stage/stage.cl"
 #include "generated/join_args.cl"
 #include "generated/shadow_ray.cl"
-#include "film/spread.cl"
+#include "film/filter.cl#spread"
 #include "film/work_list.cl"
 #include "generated/light_layers.cl"
 
 STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     real t = load_shadow_t(shadow, at);
     mask active = t > 0.0f;
     if (any(active)) {

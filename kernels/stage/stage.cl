@@ -1,8 +1,9 @@
 /* A stage: a kernel whose work-items serve LANES slots each. Where PART names it, it is a function that
  * serves the LANES slots from `at` on, for the loop of all stages in stage/loop.cl.
  *
- *     STAGE(name)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG) { SLABS SCENE STAGE_AT ... } */
+ *     STAGE(name)(SLAB_ARGS, SCENE_ARGS STAGE_AT_ARG) { STAGE_BEGIN ... } */
 #include "bvh/hints.cl"
+#include "core/base.cl"
 
 #ifdef PART
 #define STAGE(name) void PART
@@ -13,3 +14,7 @@
 #define STAGE_AT_ARG
 #define STAGE_AT uint at = get_global_id(0) * LANES;
 #endif
+#define STAGE_BEGIN SLABS SCENE STAGE_AT
+
+/* A function that other parts of a loop call, so that it is compiled once. */
+#define APART(type, name) __attribute__((noinline)) type name

@@ -1,5 +1,4 @@
-/* What parameters look up in textures, as a part of the loop (stage/loop.cl) that is compiled once for all others:
+/* Look-ups of textures for parameters, as a part of the loop (stage/loop.cl) that is compiled once for all others:
  * clpt/render/textures/cases.py. */
-#include "core/base.cl"
-#include "stage/apart.cl"
+#include "stage/stage.cl"
 #include "generated/textures.cl"

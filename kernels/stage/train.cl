@@ -1,6 +1,5 @@
-/* Adds what light paths carry to the guide where they meet a surface, or collide. In whole
+/* Adds the power of light paths to the guide where they meet a surface, or collide. In whole
  * numbers, whose sums do not depend on the order. */
-#include "core/base.cl"
 #include "stage/stage.cl"
 #include "generated/deposit_args.cl"
 #include "shapes/shape.cl"
@@ -9,13 +8,11 @@
 #include "transport/guiding/guide.cl"
 #include "generated/train_steps.cl"
 
-#define TRAIN_UNIT 256.0f /* of what a light path begins with */
+#define TRAIN_UNIT 256.0f /* relative to a light path's first power */
 
 STAGE(train)(SLAB_ARGS, SCENE_ARGS DEPOSIT_ARGS STAGE_AT_ARG)
 {
-    SLABS
-    SCENE
-    STAGE_AT
+    STAGE_BEGIN
     integer state = load_path_state(path, at);
     mask active = ((state & PATH_ALIVE) != 0) & ((state & PATH_DEPTH) > 0) & (load_hit_prim(hit, at) >= 0);
     if (any(active)) {

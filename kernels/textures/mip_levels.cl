@@ -13,8 +13,7 @@ inline MipLevels mip_levels(TexturePoint point, vec3 to_u, vec3 to_v, integer ma
     real across = sel(mapping == MAPPING_UV, point.footprint * density, (real)(0.0f));
     real most = to_real(max_i(levels - 1, (integer)(0)));
     real detail = clamp_r(log2_r(max_r(across, (real)(1.0f))), (real)(0.0f), most), below = floor(detail);
-    MipLevels found = {to_integer(below), detail - below};
-    return found;
+    return (MipLevels){to_integer(below), detail - below};
 }
 
 /* A random level of both, with its weight as its chance; u: uniform, and so again afterwards. */

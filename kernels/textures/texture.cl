@@ -86,7 +86,7 @@ inline vec3 texture_uv(Scene scene, integer mapping, integer transform, TextureP
  * copy of every look-up for each level of a tree would take minutes to build. An instruction is two words: what to do,
  * and an argument. It takes an operand (what is looked up, or if none the top of the stack), and pushes it, multiplies
  * the top by it, or mixes the two topmost values by it. All lanes go through the loop together, each along its own
- * program. clpt/render/textures/programs.py writes programs; generated are the names of their codes, TEXTURE_DEPTH,
+ * program. clpt/render/textures/encode.py writes programs; generated are the names of their codes, TEXTURE_DEPTH,
  * how deep they go, and `texture_operand`. */
 #define OPERAND_OF(code) ((code) & 7)
 #define OPERATION_OF(code) ((code) & 24)

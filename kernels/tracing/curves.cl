@@ -55,7 +55,7 @@ inline ShapeHit curve_others(Scene scene, integer prim, mask active, vec3 o, vec
 /* Step interleaved: a work-item's rays in scenes with curves, triangles and few other shapes. Rays step in turn from
  * node to node of the tree over pieces, with prefetches, until each reaches a piece that it does not pass beside, or
  * ends. Then these pieces are tested in lanes. Triangles are traced before, ray by ray. Hits equal the hits of
- * tracing/trace.cl's step `one` to the bit. */
+ * tracing/trace.cl's step `single` to the bit. */
 #include "tracing/trace.cl"
 #include "generated/layout.cl"
 #include "generated/trace_args.cl"
@@ -87,8 +87,7 @@ inline CurveTree curve_tree(global const float *nodes, global const uint *indice
 {
     ShapeRow row = shape_row_row(scene.shapes, curve_row_first(scene));
     TraceInteger first = {curve_row(scene.geometry, row.params).first};
-    CurveTree tree = {nodes, indices, scene.spheres + first.at[0]};
-    return tree;
+    return (CurveTree){nodes, indices, scene.spheres + first.at[0]};
 }
 
 /* Move a ray to a node or a leaf, and fetch its memory. */

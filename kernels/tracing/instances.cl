@@ -15,8 +15,7 @@ inline InstanceFrame instance_frame(Scene scene, mask placed, integer instance)
     i = motion_of_instance(scene, i);
 #endif
     real size = instance_size(i.x) + instance_size(i.y) + instance_size(i.z), scale = 1.0f / size;
-    InstanceFrame f = {scale3(i.x, scale), scale3(i.y, scale), scale3(i.z, scale), i.origin, scale};
-    return f;
+    return (InstanceFrame){scale3(i.x, scale), scale3(i.y, scale), scale3(i.z, scale), i.origin, scale};
 }
 
 /* A normal, by the inverse transpose, which keeps the front side but not the length. */

@@ -50,7 +50,7 @@ inline mask trace_occluded(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, mask
     return met;
 }
 
-/* Step one: a ray a work-item: triangles through LAYOUT(verb), analytic shapes through bvh/shapes.cl. */
+/* Step single: a ray a work-item: triangles through LAYOUT(verb), analytic shapes through bvh/shapes.cl. */
 #include "generated/layout.cl"
 #include "generated/trace_args.cl"
 #include "generated/shape_tree.cl"
@@ -125,8 +125,7 @@ typedef struct { TraceReal t, u, v, nx, ny, nz, plane, side; TraceInteger prim, 
 
 inline TraceRays trace_rays(vec3 o, vec3 d, real far)
 {
-    TraceRays r = {{o.x}, {o.y}, {o.z}, {d.x}, {d.y}, {d.z}, {far}};
-    return r;
+    return (TraceRays){{o.x}, {o.y}, {o.z}, {d.x}, {d.y}, {d.z}, {far}};
 }
 
 /* The lanes with a ray, in order, and their number. */
@@ -142,8 +141,7 @@ inline uint trace_active(mask active, uint *rays)
 inline TraceHits trace_missed(real far)
 {
     TraceReal none = {(real)(0.0f)};
-    TraceHits h = {{far}, none, none, none, none, none, none, none, {(integer)(-1)}, {(integer)(0)}};
-    return h;
+    return (TraceHits){{far}, none, none, none, none, none, none, none, {(integer)(-1)}, {(integer)(0)}};
 }
 
 inline void trace_put(TraceHits *h, uint i, TriHit hit)
@@ -162,8 +160,7 @@ inline void trace_put(TraceHits *h, uint i, TriHit hit)
 
 inline TraceHit trace_together(TraceHits h)
 {
-    TraceHit hit = {h.t.v, h.u.v, h.v.v, {h.nx.v, h.ny.v, h.nz.v}, h.plane.v, h.side.v, h.prim.v, h.tag.v};
-    return hit;
+    return (TraceHit){h.t.v, h.u.v, h.v.v, {h.nx.v, h.ny.v, h.nz.v}, h.plane.v, h.side.v, h.prim.v, h.tag.v};
 }
 
 /* Step interleaved: the rays of a work-item in turn through the 8-wide tree, where trees of triangles are larger than a

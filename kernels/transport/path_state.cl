@@ -2,7 +2,7 @@
 #include "generated/path_bits.cl"
 #define PATH_DEPTH 0x0fff
 #define PATH_SHADOW 0x10000
-#define PATH_SEEN 0x10000000 /* layers for denoisers have the path, see film/layers_record.cl */
+#define PATH_SEEN 0x10000000 /* layers for denoisers have the path, see film/layers.cl */
 #define PATH_GHOST 0x20000000 /* of a lens's samples, of light that two of its surfaces have reflected */
 
 /* Null surfaces (holes, null boundaries, panes) add no depth. Across more, paths and shadow rays end. */

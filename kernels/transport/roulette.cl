@@ -21,7 +21,7 @@ inline mask roulette(mask next, mask play, real strength, real u, Spectrum *beta
  * transport/mis_ratio.cl.
  *
  * Next-event estimation of the camera's paths finds the light of a diffuse surface well. So an eighth of such light
- * paths continues (integrator/steps/dull_goes_on.cl), and the density of light paths is an eighth if the last surface
+ * paths continues (integrator/steps/roulette.cl), and the density of light paths is an eighth if the last surface
  * before the light is diffuse. Both sides decide by p, the density of the direction to the light for a camera's path
  * [1/sr]; below 0 is a delta lobe. */
 #define DIFFUSE_PDF 1.0f /* an even hemisphere has 0.16, a metal of roughness 0.2 has 2 */

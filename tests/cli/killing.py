@@ -23,7 +23,7 @@ from clpt.cli.files import checkpoints
 from clpt.cli.files.targets import CHECKPOINT
 from clpt.files.output_files import PARTIAL
 from clpt.render.film import film_file
-from clpt.render.film.saved_film import SavedFilm
+from clpt.render.film.film_file import SavedFilm
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = str(ROOT / "scenes" / "cornell_box")

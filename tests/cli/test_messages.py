@@ -13,7 +13,7 @@ import clpt
 from clpt.__main__ import run
 from clpt.cli.options.records import Handler
 from clpt.cli.options.values import MOST_SAMPLES, Count, Noise
-from clpt.device import context
+from clpt.device import choosing
 from clpt.errors import SceneError
 from clpt.render.flow.scene_to_tables import lower
 
@@ -121,7 +121,7 @@ def test_a_syntax_error_is_quoted(tmp_path):
 
 
 def test_no_device_is_one_line(monkeypatch, capsys):
-    monkeypatch.setattr(context, "devices", lambda: ())
+    monkeypatch.setattr(choosing, "devices", lambda: ())
     monkeypatch.setattr("clpt.device.devices", lambda: ())
     assert run(["devices"]) == 2
     told = capsys.readouterr().err

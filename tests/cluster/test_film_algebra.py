@@ -28,8 +28,8 @@ from clpt.cli.options.grading import Grading
 from clpt.cluster import crew, tasks
 from clpt.errors import SceneError
 from clpt.render.film import film_file
+from clpt.render.film.film_file import SavedFilm
 from clpt.render.film.pictures import Pictures
-from clpt.render.film.saved_film import SavedFilm
 from clpt.render.resumable import ResumableRenderer
 from clpt.render.wavefront.wavefront import Counts
 from clpt.scene import Scene, shapes

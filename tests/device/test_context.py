@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pyopencl as cl
 import pytest
 
-from clpt.device import Device, choose, context, devices
+from clpt.device import Device, choose, choosing, context, devices
 from clpt.errors import DeviceError
 
 
@@ -28,8 +28,8 @@ def machine(monkeypatch, device):
         )
         for i, (kind, platform, name, version) in enumerate(kinds)
     )
-    monkeypatch.setattr(context, "devices", lambda: there)
-    monkeypatch.setattr(context, "_opened", {})
+    monkeypatch.setattr(choosing, "devices", lambda: there)
+    monkeypatch.setattr(choosing, "_opened", {})
     monkeypatch.delenv("CLPT_DEVICE", raising=False)
     return there
 
@@ -43,7 +43,7 @@ def test_devices_tell_what_they_are(device):
 
 
 def test_a_gpu_is_preferred(machine):
-    choice = context.selection()
+    choice = choosing.selection()
     assert choice.info.name == "Fast 1"
     assert "first GPU" in choice.reason
 
@@ -65,7 +65,7 @@ def test_by_index_or_name(machine, which, name):
 
 def test_by_the_environment(machine, monkeypatch):
     monkeypatch.setenv("CLPT_DEVICE", "core")
-    choice = context.selection()
+    choice = choosing.selection()
     assert choice.info.name == "Old Core"
     assert "CLPT_DEVICE=core" in choice.reason
     assert choose("Fast 2").info.name == "Fast 2"  # what is asked for in the call wins
@@ -81,9 +81,9 @@ def test_an_unknown_one_lists_what_there_is(machine, which):
 
 def test_a_driver_that_fails_is_passed_over(machine, monkeypatch, caplog):
     failing = {"Fast 1": "the compiler is broken"}
-    monkeypatch.setattr(context, "trial", lambda info: failing.get(info.name))
+    monkeypatch.setattr(choosing, "trial", lambda info: failing.get(info.name))
     with caplog.at_level(logging.WARNING):
-        choice = context.selection()
+        choice = choosing.selection()
     assert choice.info.name == "Fast 2"
     assert "passed over Beta Fast 1 (the compiler is broken)" in choice.reason
     assert "the compiler is broken" in caplog.text
@@ -93,29 +93,29 @@ def test_a_gpu_of_two_platforms_is_taken_once(machine, monkeypatch):
     """As rusticl and a vendor's driver may both have it; the first that works."""
     gpus = property(lambda info: (0, 1, 0, 0) if info.kind == "gpu" else None)
     monkeypatch.setattr(context.DeviceInfo, "slot", gpus)
-    monkeypatch.setattr(context, "trial", lambda info: "no" if info.name == "Fast 1" else None)
-    assert [one.info.name for one in context.choose_all("gpu")] == ["Fast 2"]
-    monkeypatch.setattr(context, "trial", lambda info: None)
-    assert [one.info.name for one in context.choose_all("gpu")] == ["Fast 1"]
-    assert [one.info.name for one in context.choose_all("all")] == ["Fast 1", "Old Core"]
+    monkeypatch.setattr(choosing, "trial", lambda info: "no" if info.name == "Fast 1" else None)
+    assert [one.info.name for one in choosing.choose_all("gpu")] == ["Fast 2"]
+    monkeypatch.setattr(choosing, "trial", lambda info: None)
+    assert [one.info.name for one in choosing.choose_all("gpu")] == ["Fast 1"]
+    assert [one.info.name for one in choosing.choose_all("all")] == ["Fast 1", "Old Core"]
     monkeypatch.setattr(context.DeviceInfo, "slot", None)
-    assert [one.info.name for one in context.choose_all("gpu")] == ["Fast 1", "Fast 2"]
+    assert [one.info.name for one in choosing.choose_all("gpu")] == ["Fast 1", "Fast 2"]
 
 
 def test_no_driver_works(machine, monkeypatch):
-    monkeypatch.setattr(context, "trial", lambda info: "it is broken")
+    monkeypatch.setattr(choosing, "trial", lambda info: "it is broken")
     with pytest.raises(DeviceError, match="no OpenCL device works: Beta Fast 1"):
         choose()
 
 
 def test_the_trial_reports_instead_of_raising(device, monkeypatch):
-    assert context.trial(device.info) is None
-    monkeypatch.setattr(context, "_TRIAL", "__kernel void trial(__global uint *out) { broken }")
-    assert "broken" in context.trial(device.info)
+    assert choosing.trial(device.info) is None
+    monkeypatch.setattr(choosing, "_TRIAL", "__kernel void trial(__global uint *out) { broken }")
+    assert "broken" in choosing.trial(device.info)
     monkeypatch.setattr(
-        context, "_TRIAL", "__kernel void trial(__global uint *out) { out[0] = 1; }"
+        choosing, "_TRIAL", "__kernel void trial(__global uint *out) { out[0] = 1; }"
     )
-    assert context.trial(device.info) == "a trivial kernel gave a wrong result"
+    assert choosing.trial(device.info) == "a trivial kernel gave a wrong result"
 
 
 def test_threads_are_limited(device):
@@ -126,7 +126,7 @@ def test_threads_are_limited(device):
     assert one.info.compute_units == one.queue.device.max_compute_units == 1
     assert one.context == choose(device.info.index, threads=1).context
     assert choose(device.info.index, threads=10**6).info == device.info
-    assert context.trial(one.info) is None
+    assert choosing.trial(one.info) is None
 
 
 @pytest.mark.parametrize("threads", [0, True, "2"])
@@ -136,7 +136,7 @@ def test_threads_that_make_no_sense(device, threads):
 
 
 def test_no_device_tells_what_to_do(monkeypatch):
-    monkeypatch.setattr(context, "devices", lambda: ())
+    monkeypatch.setattr(choosing, "devices", lambda: ())
     with pytest.raises(DeviceError, match="pocl-opencl-icd"):
         choose()
 
@@ -181,7 +181,7 @@ def test_a_process_has_one_context(device):
 
 
 def test_threads_share_the_context(device, monkeypatch):
-    monkeypatch.setattr(context, "_opened", {})
+    monkeypatch.setattr(choosing, "_opened", {})
     with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda _: choose(device.info.index), range(8)))
     assert len({one.context.int_ptr for one in found}) == 1
@@ -189,7 +189,7 @@ def test_threads_share_the_context(device, monkeypatch):
 
 def test_a_forked_process_has_its_own(device, monkeypatch):
     """What a parent has opened is not used in the child: its driver's threads are gone there."""
-    monkeypatch.setattr(context, "_opened", {})
+    monkeypatch.setattr(choosing, "_opened", {})
     first = choose(device.info.index)
     monkeypatch.setattr(os, "getpid", lambda: -1)
     assert choose(device.info.index).context != first.context

@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 
-from clpt.device import DeviceInfo, context, disk_cache, speed_trial
+from clpt.device import DeviceInfo, choosing, disk_cache, speed_trial
 
 SECONDS = {"Alpha": 0.003, "Beta": 0.001, "Gamma": 0.002}
 
@@ -19,8 +19,8 @@ def runtimes(monkeypatch, device, cache_folder) -> tuple[DeviceInfo, ...]:
         dataclasses.replace(device.info, index=i, kind="cpu", platform=platform, name=name)
         for i, (platform, name) in enumerate(names.items())
     )
-    monkeypatch.setattr(context, "devices", lambda: there)
-    monkeypatch.setattr(context, "_opened", {})
+    monkeypatch.setattr(choosing, "devices", lambda: there)
+    monkeypatch.setattr(choosing, "_opened", {})
     monkeypatch.delenv("CLPT_DEVICE", raising=False)
     return there
 
@@ -34,7 +34,7 @@ def tried(monkeypatch) -> list[str]:
         platforms.extend(info.platform for info in infos)
         return [SECONDS[info.platform] for info in infos]
 
-    monkeypatch.setattr(context, "_measured", measured)
+    monkeypatch.setattr(choosing, "_measured", measured)
     return platforms
 
 
@@ -44,7 +44,7 @@ def fails(infos: list[DeviceInfo]) -> list[float]:
 
 def test_the_fastest_runtime_is_taken_and_remembered(runtimes, tried):
     for _ in range(2):
-        choice = context.selection()
+        choice = choosing.selection()
         assert choice.info.platform == "Beta"
         assert "3.00 ms by Alpha, 1.00 ms by Beta" in choice.reason
     assert tried == ["Alpha", "Beta"]
@@ -64,15 +64,15 @@ def test_of_two_that_are_as_fast_chance_does_not_choose(
         dataclasses.replace(info, version="OpenCL 3.0 PoCL 7" if info.index == 1 else "OpenCL 3.0")
         for info in runtimes
     ]
-    monkeypatch.setattr(context, "devices", lambda: tuple(there))
-    assert context.selection().info.platform == taken
+    monkeypatch.setattr(choosing, "devices", lambda: tuple(there))
+    assert choosing.selection().info.platform == taken
 
 
 def test_a_new_driver_is_tried(runtimes, tried, monkeypatch):
-    context.selection()
+    choosing.selection()
     newer = tuple(dataclasses.replace(info, driver="newer") for info in runtimes)
-    monkeypatch.setattr(context, "devices", lambda: newer)
-    context.selection()
+    monkeypatch.setattr(choosing, "devices", lambda: newer)
+    choosing.selection()
     assert len(tried) == 4
 
 
@@ -81,25 +81,25 @@ def test_without_a_question_there_is_no_trial(runtimes, tried, monkeypatch, case
     if case == "environment":
         monkeypatch.setenv("CLPT_DEVICE", "alpha")
     elif case == "one processor each":
-        monkeypatch.setattr(context, "devices", lambda: runtimes[1:])
+        monkeypatch.setattr(choosing, "devices", lambda: runtimes[1:])
     elif case == "a GPU":
         gpu = dataclasses.replace(runtimes[0], kind="gpu", index=3)
-        monkeypatch.setattr(context, "devices", lambda: (*runtimes, gpu))
-    choice = context.selection("alpha" if case == "named" else None)
+        monkeypatch.setattr(choosing, "devices", lambda: (*runtimes, gpu))
+    choice = choosing.selection("alpha" if case == "named" else None)
     assert choice.info.platform == ("Beta" if case == "one processor each" else "Alpha")
     assert not tried
 
 
 def test_a_trial_that_failed_leaves_the_first_and_is_not_made_again(runtimes, monkeypatch):
-    monkeypatch.setattr(context, "_measured", fails)
-    assert context.selection().info.platform == "Alpha"
-    monkeypatch.setattr(context, "_measured", lambda infos: pytest.fail("tried again"))
-    assert context.selection().info.platform == "Alpha"
+    monkeypatch.setattr(choosing, "_measured", fails)
+    assert choosing.selection().info.platform == "Alpha"
+    monkeypatch.setattr(choosing, "_measured", lambda infos: pytest.fail("tried again"))
+    assert choosing.selection().info.platform == "Alpha"
 
 
 def test_without_a_cache_there_is_no_trial(runtimes, tried, monkeypatch):
     monkeypatch.setattr(disk_cache, "store", lambda *content: None)
-    assert context.selection().info.platform == "Alpha"
+    assert choosing.selection().info.platform == "Alpha"
     assert not tried
 
 

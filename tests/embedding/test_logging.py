@@ -32,7 +32,7 @@ np.random.seed(1), random.seed(1)
 drawn = np.random.random(), random.random()
 np.random.seed(1), random.seed(1)
 import clpt
-from clpt.device import context
+from clpt.device import choosing
 logging.getLogger("clpt.device").warning("not heard")
 assert drawn == (np.random.random(), random.random())
 after = list(warnings.filters), signal.getsignal(signal.SIGINT), logging.root.level

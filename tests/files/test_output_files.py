@@ -111,10 +111,10 @@ WRITES = {
 MODULES = {"np", "shutil", "os", "tempfile"}  # whose functions of these names write
 ELSEWHERE = {
     ("bench/apart.py", "fdopen"),  # to a pipe
-    ("cli/files/standard_output.py", "copyfileobj"),  # to the standard output
+    ("cli/files/targets.py", "copyfileobj"),  # to the standard output
     ("cluster/bundle.py", "copyfile"),  # into a folder of its own, in the place of a link
-    ("cluster/keys.py", "mkstemp"),  # which nobody else may read, not even in part
-    ("cluster/keys.py", "open"),
+    ("cluster/processes.py", "mkstemp"),  # which nobody else may read, not even in part
+    ("cluster/processes.py", "open"),
     ("device/compiler_process.py", "fdopen"),  # to a pipe
     ("device/disk_cache.py", "open"),  # of locks, which are empty
     ("images/exr_files.py", "write"),  # of films, in their `replacing`

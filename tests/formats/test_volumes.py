@@ -13,7 +13,7 @@ import pytest
 
 from clpt.errors import SceneError
 from clpt.formats import load, save, volumes
-from clpt.formats.volumes import nvdb, vol
+from clpt.formats.volumes import nvdb
 from clpt.scene import media
 from clpt.spectra import RGB, RGBUnbounded
 
@@ -241,7 +241,7 @@ def test_every_byte_may_be_wrong(written) -> None:
 
 def vol_bytes(values: np.ndarray, box=(0, 0, 0, 1, 1, 1), version: int = 3) -> bytes:
     nx, ny, nz, channels = values.shape
-    head = vol.HEADER.pack(b"VOL", version, 1, nx, ny, nz, channels, *box)
+    head = volumes.VOL_HEADER.pack(b"VOL", version, 1, nx, ny, nz, channels, *box)
     return head + np.ascontiguousarray(values.transpose(2, 1, 0, 3), "<f4").tobytes()
 
 

@@ -64,7 +64,7 @@ def test_sums_as_floats():
     sums[1::2, 2] = np.where(sums[1::2, 2] > 0x80000000, 0xFFFFFFFF, 0)
     body = "r[0] = sums_float(as_uint(x[0]), as_uint(x[1]), as_uint(x[2]));"
     got = run(
-        map_text(body, 3, 1, files=("film/sums.cl",)),
+        map_text(body, 3, 1, files=("core/fixed.cl",)),
         1,
         np.ascontiguousarray(sums.T).view(np.float32),
         1,

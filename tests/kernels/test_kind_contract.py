@@ -21,7 +21,7 @@ from clpt.scene.cameras import KINDS, Perspective
 from clpt.scene.integrators import Path as PathIntegrator
 from clpt.scene.params import factor, host, real
 from clpt.scene.roles import Role
-from clpt.scene.texture_values import Attributes, Operation, Texture, Use, brightness_at
+from clpt.scene.values import Attributes, Operation, Texture, Use, brightness_at
 from clpt.spectra import Constant
 from clpt.view import probe
 from tests.kernels import kind_contract, strangers

@@ -14,7 +14,7 @@ from clpt import transforms as T
 from clpt.records import LIGHT
 from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights import tree as light_tree
-from clpt.render.lights.tree_nodes import Lobes
+from clpt.render.lights.tree import Lobes
 from clpt.render.records import lights as light_records
 from clpt.render.records.lights import LINE, WIDTH
 from clpt.scene.lights import Area, Constant, Directional, Goniometric, Point, Projector, Spot

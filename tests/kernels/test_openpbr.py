@@ -75,6 +75,18 @@ def test_metal_is_tinted_at_its_edge() -> None:
     np.testing.assert_allclose(tinted / plain, edge, rtol=5e-3)
 
 
+def test_the_tangent_turns() -> None:
+    """A lobe along x turned by 90 degrees lies along y."""
+    across = np.stack([tilted(40.0, azimuth) for azimuth in (0.0, np.pi / 2)])
+    lobe = {"base_metalness": 1.0, "specular_roughness": 0.4, "specular_roughness_anisotropy": 0.8}
+    plain = _probe()(_params(**lobe), UP, across, across)["eval"][:, 0]
+    turned = _params(**lobe, anisotropy_rotation=90.0)
+    np.testing.assert_allclose(
+        _probe()(turned, UP, across, across)["eval"][:, 0], plain[::-1], rtol=1e-3
+    )
+    assert plain[0] > 10.0 * plain[1]  # wider along the tangent
+
+
 FURNACE = {
     "diffuse": ({}, 0.012),
     "rough diffuse": ({"base_diffuse_roughness": 1.0}, 0.03),

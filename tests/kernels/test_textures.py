@@ -18,7 +18,7 @@ from clpt.render.textures.cases import dispatch_text
 from clpt.render.textures.texels import texels
 from clpt.scene import textures as scene
 from clpt.scene.roles import EMISSION, NAMED, REAL, REFLECTANCE, Param
-from clpt.scene.texture_values import folded
+from clpt.scene.values import folded
 from clpt.spectra import cie
 from clpt.spectra.spectrum import d65
 from clpt.spectra.upsampling import evaluate

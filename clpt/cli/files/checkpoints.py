@@ -12,7 +12,7 @@ from clpt.files import output_files
 
 from ...errors import MemoryBudgetError, SceneError
 from ...render.film import film_file
-from ...render.film.saved_film import SavedFilm, differences_text, ranges_text
+from ...render.film.film_file import SavedFilm, differences_text, ranges_text
 from ...render.resumable import ResumableRenderer
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint

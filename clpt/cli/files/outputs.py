@@ -14,7 +14,7 @@ from ...device import disk_cache
 from ...errors import ClptError, SceneError
 from ...render.film import film_file, layer_channels
 from ...render.film.denoised_picture import DenoisedPicture
-from ...render.film.saved_film import SavedFilm
+from ...render.film.film_file import SavedFilm
 from ...render.resumable import ResumableRenderer
 from ...version import VERSION
 from ..display import Display

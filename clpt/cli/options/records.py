@@ -12,7 +12,7 @@ from typing import Any, Protocol, TypeVar, cast
 
 import click
 
-from ... import clean_logs
+from ... import errors
 from ..process import terminal
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -159,7 +159,7 @@ class Handler(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print a message, which has more lines where it tells a traceback."""
-        clean_logs.clean(record)  # another library's too
+        errors.clean(record)  # another library's too
         terminal.clear_line()
         terminal.say_lines(f"clpt: {record.levelname.lower()}: {self.format(record)}", err=True)
 

@@ -10,8 +10,7 @@ import click
 
 from clpt.files import output_files
 
-from ...clean_logs import traceback_of
-from ...errors import ClptError, one_line
+from ...errors import ClptError, one_line, traceback_of
 from . import terminal
 
 BAD_INPUT, BUG = 2, 1

@@ -21,6 +21,7 @@ from clpt.render.flow.check import check
 from ... import images
 from ...device import share_compilers
 from ...errors import ClusterError, SceneError
+from ...formats import prepare
 from ...render.resumable import ResumableRenderer
 from ...scene import Scene
 from ...scene.fingerprint import fingerprint
@@ -132,6 +133,7 @@ def _factories(
         together = 1 if job.until.limit is not None else frames  # its time is a frame's own
         several = cluster_factories(job.workers, job.options, together, shown)
         return resources.enter_context(several)
+    prepare(job.scene)
     devices = choose_devices(job.options.machine)
     share_compilers(devices, job.options.machine.threads, resources)
     return device_factories(devices, job.options, frames)

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ClusterError
+from ...render.film.film_file import SavedFilm
 from ...render.film.layer_channels import channels_of
-from ...render.film.saved_film import SavedFilm
 from ...render.progress import Progress
 from ...render.resumable import ResumableRenderer
 from ...scene import Scene

@@ -18,7 +18,7 @@ from ...render.resumable import ResumableRenderer
 from ...scene import Scene
 from ...scene.lights import Light, PoweredLamp
 from ...scene.shapes import Shape
-from ...scene.texture_values import mean
+from ...scene.values import mean
 from ...spectra import RGBIlluminant, Spectrum, watts
 from ..options.grading import Grading, for_screens
 from ..process import terminal

@@ -190,11 +190,7 @@ def scene_over_shutter(load: Callable[[float], Scene], time: float, length: floa
 
 
 def _deforming(
-    shape: object,
-    ways: Sequence[Any],
-    times: Matrix,
-    warnings: list[str],
-    groups: dict[int, Group],
+    shape: object, ways: Sequence[Any], times: Matrix, warnings: list[str], groups: dict[int, Group]
 ) -> Any:
     """A shape with keys of its vertices, if they are elsewhere at other times.
 

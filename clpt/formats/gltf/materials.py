@@ -19,9 +19,8 @@ from clpt.scene.insides import absorbed, dispersed
 from clpt.scene.lights import Area
 from clpt.scene.materials import Diffuse, GltfSurface, Material
 from clpt.scene.media import Homogeneous
-from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap, MeshAttribute, Mix, Product, turned
-from clpt.scene.values import Textured, TexturedNumber
+from clpt.scene.values import Texture, Textured, TexturedNumber
 
 CLEARCOAT = "KHR_materials_clearcoat"
 DIFFUSE_TRANSMISSION = "KHR_materials_diffuse_transmission"

@@ -165,7 +165,7 @@ def _shapes(posed: Posed, instances: bool) -> list[Shape]:
         return [mesh for mesh in meshes if mesh is not None]
     group = Group(tuple(posed.parts), posed.parts[0].name)
     result: list[Shape] = []
-    flat = _singular(np.stack([to_world for _, to_world in posed.copies]))
+    flat = transforms.are_singular(np.stack([to_world for _, to_world in posed.copies]))
     for (node, to_world), is_flat in zip(posed.copies, flat.tolist(), strict=True):
         if is_flat:
             meshes = [_transformed(part, node, to_world) for part in posed.parts]
@@ -173,13 +173,6 @@ def _shapes(posed: Posed, instances: bool) -> list[Shape]:
         else:
             result.append(Instance(group=group, to_world=to_world))
     return result
-
-
-def _singular(matrices: Matrix) -> NDArray[np.bool_]:
-    """Return which affine matrices (n, 4, 4) flatten space, as `transforms.is_singular`."""
-    lengths = np.linalg.norm(matrices[:, :3, :3], axis=1, keepdims=True)
-    unit = matrices[:, :3, :3] / np.where(lengths > 0.0, lengths, 1.0)
-    return np.abs(np.linalg.det(unit)) < transforms.SINGULAR_BELOW
 
 
 def _weights(graph: Graph, index: int, node: Element, mesh: Element) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from clpt.errors import SceneError
-from clpt.formats.materialx.graph import Node
+from clpt.formats.materialx.graph import LeftOut, Node
 
 MISSING = "MaterialX is read with `materialx`: pip install 'clpt[materialx]'"
 TRANSLATED = {"standard_surface": "standard_surface_to_open_pbr_surface"}
@@ -169,9 +169,12 @@ def _of_surface(definition: Any, name: str, path: str) -> tuple[Node, str] | Non
 def inner(node: Node, output: str) -> tuple[Node, str] | None:
     """Return the node and output in the graph of a node's definition; None without a graph.
 
-    Raises SceneError where `materialx` is not installed.
+    Raises LeftOut where `materialx` is not installed.
     """
-    definition = standard().getNodeDef(node.kind)
+    try:
+        definition = standard().getNodeDef(node.kind)
+    except SceneError as error:
+        raise LeftOut(f"{node.kind}: {error.message}") from None
     if definition is None and isinstance(node, Element):
         definition = node.node.getNodeDef()
     graph = definition.getImplementation() if definition else None

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from clpt import images
 from clpt.arrays import Floats
-from clpt.scene.textures import Bitmap, MeshAttribute
+from clpt.scene.textures import Bitmap
+from clpt.scene.values import Texture
 
 LEAST, MOST = 256, 2048  # pixels along a side of a baked image
 PATTERN = 1024  # of a baked pattern without images
@@ -58,6 +59,9 @@ class Host(Protocol):
 
     def image(self, asset: object, path: str) -> images.Stored | None:
         """Return the image of an input `file`; None, after a warning, where there is none."""
+
+    def attribute(self, name: str, count: int) -> Texture:
+        """Return a property of a mesh, of a count of numbers for each place."""
 
     def uv_mapping(self, name: str) -> str:
         """Return "uv" or "uv1" for a set of texture coordinates; "" is the usual one."""
@@ -219,7 +223,7 @@ class Graph:
                 return None
             node, output = source
         if kind == "geompropvalue" and width(node.kind) == (3 if wide else 1):
-            return MeshAttribute(name=f"vertex_{node.value('geomprop', '')}")
+            return self.host.attribute(str(node.value("geomprop", "")), width(node.kind))
         if kind != "image" or (wide and width(node.kind) < 3):
             return None
         probe = probing()

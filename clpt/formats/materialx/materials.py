@@ -13,6 +13,8 @@ from clpt.formats import framing
 from clpt.formats.materialx import document
 from clpt.formats.materialx.surfaces import Surface, surface
 from clpt.scene import Scene, shapes
+from clpt.scene.textures import MeshAttribute
+from clpt.scene.values import Texture
 
 
 @dataclass
@@ -37,6 +39,9 @@ class Folder:
         except SceneError as error:
             self.warn(f"{error}; the default stands for it", path)
             return None
+
+    def attribute(self, name: str, count: int) -> Texture:
+        return MeshAttribute(name=f"vertex_{name}")
 
     def uv_mapping(self, name: str) -> str:
         return "uv1" if name == "uv1" else "uv"

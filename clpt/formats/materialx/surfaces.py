@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from clpt.errors import SceneError
 from clpt.formats.materialx import document, scattering, solids
 from clpt.formats.materialx.graph import Graph, Host, Node, category
 from clpt.formats.materialx.nodes import FUNCTIONS
@@ -48,11 +50,15 @@ def surface(node: Node, host: Host, name: str = "", *, walk: bool = True) -> Sur
 
     node: of a document, or what a reader of stages has for a shader. walk: light goes into bodies
     with subsurface scattering; else it is scattered where it enters. What is left out is told to
-    the host once. Raises SceneError where a node asks for the library and it is not installed.
+    the host once.
     """
     kind = category(node.kind)
     if kind in document.TRANSLATED:
-        node, kind = document.Translated(node), "open_pbr_surface"
+        try:
+            document.standard()
+            node, kind = document.Translated(node), "open_pbr_surface"
+        except SceneError as error:
+            host.warn(error.message, node.path)
     if kind not in READERS:
         named = node.kind or "a shader without a kind"
         host.warn(f"{named} is not read; grey stands for it", node.path)
@@ -92,6 +98,8 @@ def _openpbr(graph: Graph, node: Node, name: str, walk: bool) -> Surface:
     values |= {key: _color(graph, node, key, usual.get(key, 1.0)) for key in COLORS}
     values["thin_walled"] = thin = bool(_one(graph, node, "geometry_thin_walled", 0.0))
     values["thin_film_ior"] = min(max(_one(graph, node, "thin_film_ior", 1.4), 1.0), 5.0)
+    if values["specular_roughness_anisotropy"] != 0.0:
+        values["anisotropy_rotation"] = _turn(graph, node)
     ior = max(_one(graph, node, "specular_ior", 1.5), 0.1)
     scale = _one(graph, node, "transmission_dispersion_scale", 0.0)
     abbe = _one(graph, node, "transmission_dispersion_abbe_number", 20.0)
@@ -107,6 +115,15 @@ def _openpbr(graph: Graph, node: Node, name: str, walk: bool) -> Surface:
     share = graph.texture(node, "geometry_opacity", 1.0, wide=False)
     emission = _emission(graph, node, "emission_color", "emission_luminance", values)
     return _finished(graph, node, "geometry_normal", inner, share, emission, interior)
+
+
+def _turn(graph: Graph, node: Node) -> float:
+    """Return how far a tangent is turned about the normal [degrees]."""
+    source, turn = node.source("geometry_tangent"), 0.0
+    while source is not None and (kind := category(source[0].kind)) in ("normalize", "rotate3d"):
+        turn += _one(graph, source[0], "amount", 0.0) if kind == "rotate3d" else 0.0
+        source = source[0].source("in")
+    return math.remainder(turn, 180.0)
 
 
 def _transmission(graph: Graph, node: Node, values: dict[str, Any]) -> Homogeneous | None:

@@ -72,10 +72,10 @@ NEUTRAL = {  # values that ask for nothing
 
 @dataclass
 class Statement:
-    """A line of a material: its first word, and the rest."""
+    """A line of a material: its first word `key`, and the words after it."""
 
     key: str
-    rest: str
+    value: str
     file: Path
     line: int
 
@@ -85,7 +85,7 @@ class Statement:
 
     def words(self) -> list[str]:
         """Return the words before a comment."""
-        return uncommented(self.rest).split()
+        return uncommented(self.value).split()
 
     def numbers(self, words: list[str] | None = None) -> list[float]:
         """Return the words as finite numbers. Raises SceneError."""
@@ -93,10 +93,10 @@ class Statement:
         try:
             values = [float(word) for word in words]
         except ValueError:
-            message = text.comma_message(self.rest) or f"needs numbers, not {self.rest[:60]!r}"
+            message = text.comma_message(self.value) or f"needs numbers, not {self.value[:60]!r}"
             raise self.error(message) from None
         if not values or not all(map(math.isfinite, values)):
-            raise self.error(f"needs finite numbers, not {self.rest[:60]!r}")
+            raise self.error(f"needs finite numbers, not {self.value[:60]!r}")
         return values
 
 
@@ -137,7 +137,7 @@ class Library:
     absent: list[str] = field(default_factory=list)
     left_out: dict[str, None] = field(default_factory=dict)
     remarks: dict[str, list[str]] = field(default_factory=dict)  # to the materials' names
-    made: dict[str, tuple[Material, Area | None]] = field(default_factory=dict)
+    read_materials: dict[str, tuple[Material, Area | None]] = field(default_factory=dict)
 
     def add(self, names: str) -> None:
         """Read the libraries that a line names; a name may have blanks. Raises SceneError."""
@@ -168,9 +168,9 @@ class Library:
 
     def material(self, name: str) -> tuple[Material, Area | None]:
         """Return a known material, and what it emits. Raises SceneError."""
-        if name not in self.made:
-            self.made[name] = _Maker(self, name, self.statements[name]).material()
-        return self.made[name]
+        if name not in self.read_materials:
+            self.read_materials[name] = _Maker(self, name, self.statements[name]).material()
+        return self.read_materials[name]
 
     def warnings(self) -> list[str]:
         """Return what was left out, in a line for each kind."""
@@ -208,7 +208,7 @@ class _Maker:
 
     def tell_rest(self) -> None:
         """Take note of the statements that were not used."""
-        same = [self.statements[k].rest for k in ("map_ka", "map_kd") if k in self.statements]
+        same = [self.statements[k].value for k in ("map_ka", "map_kd") if k in self.statements]
         if len(same) == 2 and same[0] == same[1]:
             self.used.add("map_ka")
         for key, statement in self.statements.items():
@@ -444,7 +444,7 @@ class _Maker:
 
     def curve(self, statement: Statement) -> Spectrum:
         """Return a spectrum from a file, times a factor."""
-        operands = uncommented(statement.rest).split(None, 1)[1:]
+        operands = uncommented(statement.value).split(None, 1)[1:]
         name, factor = (operands or [""])[0], 1.0
         path = self.find(statement, name)
         if path is None and len(words := name.rsplit(None, 1)) == 2:
@@ -503,7 +503,7 @@ class _Maker:
 
         even: the stand-in is a flat normal map.
         """
-        name, options = _options(statement, statement.rest)
+        name, options = _options(statement, statement.value)
         path = self.find(statement, name)
         if path is None and (behind := BEHIND.search(name)):
             options |= _options(statement, name[behind.end() :])[1]

@@ -96,7 +96,7 @@ class _Reader:
     path: Path
     data: bytes
     rows: dict[int, list[Floats32]] = field(default_factory=lambda: {key: [] for key in NAMES})
-    found: dict[int, int] = field(default_factory=lambda: dict.fromkeys(NAMES, 0))
+    counted: dict[int, int] = field(default_factory=lambda: dict.fromkeys(NAMES, 0))
     colours: list[tuple[int, Floats32]] = field(default_factory=list)
     counts: list[Integers] = field(default_factory=list)
     corners: list[NDArray[np.int32]] = field(default_factory=list)
@@ -130,7 +130,7 @@ class _Reader:
         """Return what was read, checked."""
         colours = None
         if self.colours:
-            colours = np.full((self.found[VERTEX], 3), np.nan, np.float32)
+            colours = np.full((self.counted[VERTEX], 3), np.nan, np.float32)
             for start, values in self.colours:
                 colours[start : start + len(values)] = values
         contents = Contents(
@@ -158,16 +158,16 @@ class _Reader:
         """Raise SceneError for indices out of range and vertices that are not finite."""
         for column, kind in enumerate(NAMES):
             named = contents.corners[:, column]
-            if not len(named) or named.max() < self.found[kind]:
+            if not len(named) or named.max() < self.counted[kind]:
                 continue
-            if kind != VERTEX and not self.found[kind]:
+            if kind != VERTEX and not self.counted[kind]:
                 contents.warnings.append(
                     f"left out the numbers of {NAMES[kind]!r}: the file has none"
                 )
                 named[:] = -1
                 continue
-            bad = int(np.argmax(named >= self.found[kind]))
-            count = self.found[kind]
+            bad = int(np.argmax(named >= self.counted[kind]))
+            count = self.counted[kind]
             message = f"'f' names the {NAMES[kind]!r} {named[bad] + 1} of {count}"
             face = int(np.searchsorted(np.cumsum(contents.counts), bad, "right"))
             self.fail(self.place(FACE, face), message)
@@ -194,7 +194,7 @@ class _Reader:
         for letter in (0, 1):
             heads = lines.head[known] + letter
             plain[heads[plain[heads] != NEWLINE]] = BLANK
-        before = dict(self.found)
+        before = dict(self.counted)
         changes = self.names(piece, lines)
         for kind in NAMES:
             self.numbers(at, kind, plain, lines)
@@ -215,8 +215,8 @@ class _Reader:
         if kind == VERTEX and words.max() >= 6:
             colours = _columns(values, words, 3, 6)
             colours[words < 6] = np.nan
-            self.colours.append((self.found[kind], colours))
-        self.found[kind] += len(rows)
+            self.colours.append((self.counted[kind], colours))
+        self.counted[kind] += len(rows)
 
     def each_number(
         self, at: int, kind: int, plain: Bytes, lines: _Lines, rows: Integers
@@ -370,6 +370,8 @@ def _cut(plain: Bytes, lines: _Lines, rows: Integers) -> bytes:
     """Return the text of some lines."""
     start, stop = lines.start[rows], lines.stop[rows]
     breaks = np.flatnonzero(start[1:] != stop[:-1])
+    if not len(breaks):
+        return plain[start[0] : stop[-1]].tobytes()
     begins, ends = start[np.r_[0, breaks + 1]].tolist(), stop[np.r_[breaks, len(rows) - 1]].tolist()
     view = plain.data
     return b"".join([view[a:b] for a, b in zip(begins, ends, strict=True)])
@@ -412,9 +414,11 @@ def _fields(cut: bytes) -> tuple[NDArray[np.int8], Integers]:
     fields = slash.astype(np.int8)
     if slash.any():
         twice = slash & (letters[starts - 2] == SLASH)
-        after = np.r_[False, slash[:-1] & ~twice[:-1]]  # a number behind a single slash precedes
+        after = np.zeros_like(slash)  # a number behind a single slash precedes
+        after[1:] = slash[:-1] & ~twice[:-1]
         fields[twice | (slash & after)] = 2
-        before = np.r_[np.int8(0), fields[:-1]]
+        before = np.zeros_like(fields)
+        before[1:] = fields[:-1]
         fields[(slash & (before == 2)) | (twice & (before != 0))] = -1
     if b"///" in cut or b" /" in cut or b"\t/" in cut:
         fields[:1] = -1

@@ -9,14 +9,10 @@ import numpy as np
 
 from clpt import measured, spectra
 from clpt.formats.colours import EVEN, GREY
+from clpt.formats.mitsuba.coating import KINDS as COATS
+from clpt.formats.mitsuba.coating import SMOOTHEST, Coat
 from clpt.formats.mitsuba.limits import within
-from clpt.formats.mitsuba.principled import (
-    at_yellow,
-    fluorescent,
-    hair,
-    principled,
-    principled_thin,
-)
+from clpt.formats.mitsuba.principled import fluorescent, hair, principled, principled_thin
 from clpt.formats.mitsuba.properties import Context, PluginReader, Properties, numbers, unknown
 from clpt.formats.mitsuba.spectra import (
     coefficient,
@@ -30,28 +26,21 @@ from clpt.formats.mitsuba.spectra import (
     texture,
 )
 from clpt.formats.mitsuba.xml import Element
-from clpt.formats.pbrt import scattering
 from clpt.formats.pbrt.textures import map_values
 from clpt.formats.reading import attempt
 from clpt.scene import materials
 from clpt.scene.materials import Material
-from clpt.scene.params import defaults, fields_of, params
+from clpt.scene.params import defaults, params
 from clpt.scene.textures import Bitmap, Product, Texture
 from clpt.spectra import Constant, RGBUnbounded, Spectrum
 
 Parameters = dict[str, Any]
-SMOOTHEST = 1e-4  # Mitsuba's own floor of a roughness
+
 # metals of Mitsuba without free data
 WITHOUT_DATA = ("Cu2O", "CuO", "HgTe", "Se", "Se-e", "SnTe", "Ta")
 GREY_METAL = 0.3  # what they reflect head-on
 PHONG = ("phong", "as")  # distributions of Mitsuba 0.6, of exponent 2 / alpha^2 - 2
-COATINGS = ("coating", "roughcoating")
-COATED_METALS = {
-    "conductor": ("eta", "k", "specular_reflectance"),
-    "rough_conductor": (
-        "eta", "k", "specular_reflectance", "distribution", "alpha_u", "alpha_v",
-    ),
-}  # fmt: skip
+STAND_IN: Material = materials.Diffuse()  # stands for a material with an error
 MOST_PARTS = 32  # of a `mixturebsdf`
 TINY = 1e-30
 AIR = 1.000277  # the default of `ext_eta`: src/bsdfs/ior.h
@@ -59,13 +48,12 @@ AIR = 1.000277  # the default of `ext_eta`: src/bsdfs/ior.h
 
 def bsdf(element: Element, context: Context) -> Material:
     """Make the material that a <bsdf> describes, once for all references to it."""
-    grey: Material = materials.Diffuse()
-    return context.once(element, lambda _: attempt(lambda: _bsdf(element, context), grey))
+    return context.once(element, lambda _: attempt(lambda: _bsdf(element, context), STAND_IN))
 
 
 def _bsdf(element: Element, context: Context) -> Material:
     name = element.attributes.get("id", "")
-    if element.type in COATINGS:
+    if element.type in COATS:
         return _coated(element, context)
     if element.type not in PLUGINS:
         return context.stand_in(unknown(element, PLUGINS), element, materials.Diffuse(name=name))
@@ -151,10 +139,7 @@ def _old_metal(props: Properties, around: float) -> Parameters:
     else:
         with child.locating():
             eta, k = _named_metal(child, props.context)
-    return {
-        "eta": over(index(props, "eta", eta), around),
-        "k": over(index(props, "k", k), around),
-    }
+    return {"eta": over(index(props, "eta", eta), around), "k": over(index(props, "k", k), around)}
 
 
 def _around(props: Properties) -> float:
@@ -364,40 +349,26 @@ def _ward(props: Properties) -> Parameters:
 
 
 def _coated(element: Element, context: Context) -> Material:
-    """Read Mitsuba 0.6's `coating` and `roughcoating`, which send no light back to the base.
-
-    A coat over a diffuse base is Plastic, whose base is the darker by the light that ours sends
-    back; over metal it is CoatedConductor. Over others it is left out, with a warning.
-    """
+    """Read Mitsuba 0.6's `coating` and `roughcoating`, see coating.py."""
     props = Properties(element, context)
     (inner,) = _nested(props, 1, 1)
-    indices = {"int_ior": ior(props, "int_ior", "bk7"), "ext_ior": ior(props, "ext_ior", "air")}
     rough = element.type == "roughcoating"
     kept: Parameters = {"name": element.attributes.get("id", "")}
     if rough:
         kept["distribution"] = _distribution(props)
-    alpha = _alpha(props, "alpha", 0.1) if rough else SMOOTHEST
-    specular = reflectance(props, "specular_reflectance", 1.0)
-    if coefficient(props, "sigma_a") not in (0.0, Constant(0.0)):
-        context.warn(element, "'sigma_a' of the coat is left out: it absorbs nothing")
-    props.ignore("thickness")
+    thickness = props.number("thickness", 1.0)
+    coat = Coat(
+        element=element,
+        context=context,
+        indices={"int_ior": ior(props, "int_ior", "bk7"), "ext_ior": ior(props, "ext_ior", "air")},
+        specular=reflectance(props, "specular_reflectance", 1.0),
+        alpha=_alpha(props, "alpha", 0.1) if rough else SMOOTHEST,
+        rough=rough,
+        depth=map_values(coefficient(props, "sigma_a"), lambda sigma: sigma * thickness),
+        kept=kept,
+    )
     props.finish()
-    parts = fields_of(inner)
-    if inner.kind in COATED_METALS:
-        metal = {name: parts[name] for name in COATED_METALS[inner.kind]}
-        smooth = {} if "alpha_u" in metal else {"alpha_u": SMOOTHEST, "alpha_v": SMOOTHEST}
-        coat = {"coat_ior": indices["int_ior"], "ext_ior": indices["ext_ior"], "coat_alpha": alpha}
-        return materials.CoatedConductor(**{**kept, **coat, **metal, **smooth})
-    if inner.kind != "diffuse":
-        context.warn(element, f"a coat over {inner.kind} is left out: it would darken it")
-        return inner
-    relative = at_yellow(indices["int_ior"]) / at_yellow(indices["ext_ior"])
-    inside = float(scattering.EVEN @ scattering.internal_fresnel(relative))
-    base = map_values(parts["reflectance"], lambda r: r / (1.0 + inside * r))
-    plastic = {**kept, **indices, "diffuse_reflectance": base, "specular_reflectance": specular}
-    if rough:
-        return materials.RoughPlastic(**plastic, alpha=alpha, nonlinear=True)
-    return materials.Plastic(**plastic, nonlinear=True)
+    return coat.over(inner)
 
 
 def _share(props: Properties, name: str) -> Any:

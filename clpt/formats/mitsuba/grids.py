@@ -17,7 +17,6 @@ from clpt import transforms
 from clpt.formats import volumes
 from clpt.formats.mitsuba.properties import Context, Properties
 from clpt.formats.mitsuba.xml import Element
-from clpt.formats.volumes import vol
 from clpt.scene.volumes import Volume, resampled
 
 Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -82,7 +81,7 @@ def _read(element: Element, context: Context) -> Volume:
     if array is None:
         path = props.file()
         with element.locating():
-            values, box = vol.read_channels(path)
+            values, box = volumes.read_channels(path)
     else:  # (z, y, x) or (z, y, x, channels), as Mitsuba's tensors
         values, box = (
             (array if array.ndim == 4 else array[..., None]).transpose(2, 1, 0, 3),

@@ -20,6 +20,7 @@ from clpt.scene.textures import Texture
 from clpt.scene.volumes import Volume
 from clpt.spectra import RGBUnbounded
 
+PRESET_UNIT = 100.0  # factor on the coefficients [1/mm] of presets in Mitsuba 0.6
 SUBSURFACE = ("dipole", "singlescatter")
 
 
@@ -128,9 +129,11 @@ def body(element: Element, context: Context) -> tuple[Medium, Any, Any]:
 
 
 def _old_coefficients(props: Properties) -> dict[str, Any] | None:
-    """Take Mitsuba 0.6's `sigma_a` and `sigma_s`, or a preset (src/medium/materials.h).
+    """Take Mitsuba 0.6's `sigma_a` and `sigma_s`, or a preset; Skin1 is the default.
 
-    None where the file gives `sigma_t` or `albedo`. The preset Skin1 is the default.
+    None if the file gives `sigma_t` or `albedo`. A preset has the coefficients measured per mm,
+    times PRESET_UNIT (src/medium/materials.h); its scattering is the reduced coefficient
+    (src/librender/medium.cpp).
     """
     if props.element.type not in ("homogeneous", *SUBSURFACE):
         return None
@@ -144,13 +147,11 @@ def _old_coefficients(props: Properties) -> dict[str, Any] | None:
     if _plain_name(name) not in presets:
         raise UnknownKindError("medium", name, MEASURED, **props.element.location())
     scattering, absorption = presets[_plain_name(name)]
-    props.context.warn(
-        props.element, f"has the measured coefficients of {name} per metre, times its scale"
-    )
-    per_metre = {"sigma_a": absorption, "sigma_s": scattering}
+    message = f"has {PRESET_UNIT:g} times the coefficients of {name} per mm, as in Mitsuba 0.6"
+    props.context.warn(props.element, f"{message}: in metres a `scale` of 10 is true to nature")
     return {
-        name: RGBUnbounded(*(1000.0 * value for value in values))
-        for name, values in per_metre.items()
+        "sigma_a": RGBUnbounded(*(PRESET_UNIT * value for value in absorption)),
+        "sigma_s": RGBUnbounded(*(PRESET_UNIT * value for value in scattering)),
     }
 
 

@@ -131,9 +131,12 @@ def shape(element: Element, context: Context) -> Shape:
     for sensor in props.objects("sensor"):
         raise sensor.error(METER)
     media = {name: side(props, name) for name in ("interior", "exterior")}
-    default = _default_material(emitter, in_medium=context.old and any(media.values()))
+    if material is None:
+        surface = _default_material(emitter, in_medium=context.old and any(media.values()))
+    else:
+        surface = bsdf(material, context)
     parameters: Parameters = {
-        "material": default if material is None else bsdf(material, context),
+        "material": surface,
         "emission": None if emitter is None else area(emitter, context),
         **media,
         **_body(props),
@@ -146,11 +149,12 @@ def shape(element: Element, context: Context) -> Shape:
         # A mirror turns Mitsuba's spheres inside out, and no other shape.
         parameters["flip_normals"] = not parameters["flip_normals"]
     with element.locating():
-        result: Shape = cls(**parameters)
-        if stretch is not None:
-            group = Group((result,), result.name or result.kind)
-            result = Instance(group=group, to_world=stretch, name=result.name)
-        result = replace(result, motion=props.motion)
+        if stretch is None:
+            result: Shape = cls(**parameters, motion=props.motion)
+        else:
+            inner = cls(**parameters)
+            group = Group((inner,), inner.name or inner.kind)
+            result = Instance(group=group, to_world=stretch, name=inner.name, motion=props.motion)
     props.finish()
     return result
 
@@ -292,24 +296,21 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
         props.context.warn(props.element, f"{path.name}: {warning}")
     if crease >= 0.0 and not flat:
         whole = creased(whole, crease)
-    vertices = transforms.transform_points(to_world, whole.vertices).astype(np.float32)
+    vertices, moves = whole.vertices, not np.array_equal(to_world, transforms.IDENTITY)
+    if moves:
+        vertices = transforms.transform_points(to_world, vertices).astype(np.float32)
     uvs = whole.uvs
     if uvs is not None and flip_v:
         uvs = np.column_stack([uvs[:, 0], 1.0 - uvs[:, 1]]).astype(np.float32)
-    normals, faces = None, whole.faces
-    if not flat and whole.normals is None:
+    normals, faces = None if flat else whole.normals, whole.faces
+    if not flat and normals is None:
         normals = smooth_normals(vertices, faces)
-    elif not flat:
+    elif not flat and moves:
         normals = transforms.transform_normals(to_world, whole.normals).astype(np.float32)
         if transforms.flips_handedness(to_world):
             faces = faces[:, ::-1].copy()  # the file's normals decide the front, not the winding
-    return {
-        "vertices": vertices,
-        "faces": faces,
-        "normals": normals,
-        "uvs": uvs,
-        "attributes": whole.attributes,
-    }
+    arrays = {"vertices": vertices, "faces": faces, "normals": normals, "uvs": uvs}
+    return {**arrays, "attributes": whole.attributes}
 
 
 def _bspline_curve(props: Properties) -> Parameters:

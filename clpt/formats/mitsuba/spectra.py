@@ -36,15 +36,7 @@ from clpt.scene.textures import (
     Product,
     Texture,
 )
-from clpt.spectra import (
-    RGB,
-    Blackbody,
-    Constant,
-    RGBIlluminant,
-    RGBUnbounded,
-    Spectrum,
-    Tabulated,
-)
+from clpt.spectra import RGB, Blackbody, Constant, RGBIlluminant, RGBUnbounded, Spectrum, Tabulated
 from clpt.spectra.spectrum import WIDEST, Outside
 
 LUMINANCE = (0.212671, 0.715160, 0.072169)  # of Rec. 709, as Mitsuba has it

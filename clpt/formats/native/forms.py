@@ -327,9 +327,7 @@ FORMS: dict[str, Form] = {
         _integers,
     ),
     "number_or_auto": _of_cursor(
-        f"number, or `{AUTO}`",
-        {"anyOf": [NUMBER, {"const": AUTO}]},
-        _number_or_auto,
+        f"number, or `{AUTO}`", {"anyOf": [NUMBER, {"const": AUTO}]}, _number_or_auto
     ),
     "grid": _of_cursor(
         "rows of rows of numbers",

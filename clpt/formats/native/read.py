@@ -213,7 +213,7 @@ class _Reader:
         return self.kind(cursor, "material")
 
     def materialx(self, cursor: Cursor) -> Any:
-        """Read a material of a document of MaterialX; null chooses the only one."""
+        """Read a material of a document of MaterialX; null chooses its only material."""
         cursor.check_keys(MATERIALX, ("type", "file", "material"))
         if "file" not in cursor.value:
             raise cursor.error("needs a 'file'")

@@ -38,8 +38,8 @@ class ShapeFile:
     meaning: str
     replaces: tuple[str, ...] = ()
     read: Callable[[Path], dict[str, Any]] | None = None
-    join: Callable[[Any, dict[str, Any]], Any] = lambda made, values: dataclasses.replace(
-        made, **values
+    join: Callable[[Any, dict[str, Any]], Any] = lambda kind, values: dataclasses.replace(
+        kind, **values
     )
 
 

@@ -172,11 +172,7 @@ def _realistic(params: Parameters, state: State, film: Film, diagonal: float) ->
     )
 
 
-CAMERAS = {
-    "perspective": _perspective,
-    "orthographic": _orthographic,
-    "spherical": _spherical,
-}
+CAMERAS = {"perspective": _perspective, "orthographic": _orthographic, "spherical": _spherical}
 
 
 FILMS = ("rgb", "gbuffer", "spectral")

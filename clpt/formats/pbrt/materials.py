@@ -113,7 +113,7 @@ def _metal(params: Parameters, state: State, prefix: str) -> dict[str, Any]:
 
 def _damped(metal: dict[str, Any], ior: float, thickness: float) -> dict[str, Any]:
     """A metal under a coat that absorbs, which is a factor on its reflection."""
-    return {**metal, "specular_reflectance": scattering.transmitted(ior, thickness) ** 2}
+    return {**metal, "specular_reflectance": float(scattering.transmitted(ior, thickness)) ** 2}
 
 
 def _extinction(r: Any) -> Any:

@@ -12,13 +12,7 @@ from clpt.files import text
 from clpt.formats.pbrt import old_words
 from clpt.formats.pbrt.lexer import UPGRADE
 from clpt.formats.pbrt.params import Parameter, Parameters
-from clpt.formats.pbrt.state import (
-    TARGETS,
-    Contents,
-    Definition,
-    State,
-    TransformDirectives,
-)
+from clpt.formats.pbrt.state import TARGETS, Contents, Definition, State, TransformDirectives
 
 COLOUR_SPACES = ("srgb", "rec2020", "aces2065-1", "dci-p3")
 OPTIONS = ("Camera", "Film", "PixelFilter", "Sampler", "Integrator", "Accelerator")

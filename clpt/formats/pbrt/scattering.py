@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError
@@ -49,8 +49,8 @@ def internal_fresnel(ior: float) -> np.ndarray:
     return np.where(sin2 < 1.0, 0.5 * (across**2 + along**2), 1.0)
 
 
-def under_coat(ior: float, thickness: float) -> Callable[[Values], Values]:
-    """Return how a base of albedo r looks below an absorbing coat, `thickness` in mean free paths.
+def under_coat(r: Values, ior: float, thickness: float) -> Values:
+    """Return a base of albedo r as below an absorbing coat, `thickness` in mean free paths.
 
     pbrt's coats let exp(-thickness / cos) through even where nothing scatters. With f_d the share
     that is reflected back after two passes, and t the mean of a pass of refracted light:
@@ -58,25 +58,24 @@ def under_coat(ior: float, thickness: float) -> Callable[[Values], Values]:
     """
     fresnel, passes = internal_fresnel(ior), np.exp(-thickness / COSINES)
     inside, damped = float(EVEN @ fresnel), float(EVEN @ (fresnel * passes**2))
-    twice = transmitted(ior, thickness) ** 2
-
-    def looks(r: Values) -> Values:
-        seen = twice * r / (1.0 - damped * r)
-        return seen / (1.0 + inside * seen)
-
-    return looks
+    seen = transmitted(ior, thickness) ** 2 * r / (1.0 - damped * r)
+    return seen / (1.0 + inside * seen)
 
 
-def transmitted(ior: float, thickness: float) -> float:
-    """The share of even light, refracted into a coat, that arrives at its other side."""
+def transmitted(ior: float, depth: ArrayLike) -> Values:
+    """Return the mean transmittance of a coat for even light that is refracted into it.
+
+    ior: relative index; depth: optical depth along the normal, of any shape, which is returned.
+    """
     refracted = EVEN * (1.0 - internal_fresnel(ior))
-    return float(refracted @ np.exp(-thickness / COSINES) / max(refracted.sum(), 1e-9))
+    passes = np.exp(-np.multiply.outer(np.asarray(depth, np.float64), 1.0 / COSINES))
+    return passes @ refracted / max(refracted.sum(), 1e-9)
 
 
-def from_body_reflectance(ior: float) -> Callable[[Values], Values]:
-    """Return how the reflectance of a body below its boundary, as pbrt has it, makes a base."""
+def from_body_reflectance(r: Values, ior: float) -> Values:
+    """Return the albedo of a base for pbrt's reflectance of a body below its boundary."""
     inside = float(EVEN @ internal_fresnel(ior))
-    return lambda r: r / (1.0 - inside * (1.0 - r))
+    return r / (1.0 - inside * (1.0 - r))
 
 
 def body_albedo(scattering: Values, absorption: Values, g: float) -> Values:
@@ -147,7 +146,7 @@ def coated_diffuse(params: Parameters, state: State) -> Material:
     base = textured(params, "reflectance", REFLECTANCE, state, 0.5)
     thickness = coat(params, state)
     if thickness > 0.0:
-        looks = under_coat(index_at_550(eta), thickness)
+        looks = partial(under_coat, ior=index_at_550(eta), thickness=thickness)
         key = ("coat", base, index_at_550(eta), thickness)
         base = state.shared.once(key, params, partial(map_values, base, looks, bytes_stay=True))
     return plastic(base, eta, isotropic(alphas(params, state), params, state))
@@ -200,7 +199,7 @@ def subsurface(params: Parameters, state: State) -> Material:
     if reflectance is None:
         base = _layer_albedo(scattering, absorption, g)
     else:
-        looks = from_body_reflectance(index_at_550(eta))
+        looks = partial(from_body_reflectance, ior=index_at_550(eta))
         base = map_values(reflectance, looks, bytes_stay=True)
     state.warn(
         params, "light leaves a 'subsurface' body where it entered: a diffuse base of its albedo"
@@ -222,7 +221,7 @@ def body(params: Parameters, state: State) -> Homogeneous | None:
         scattering, absorption = (_coefficient(item) for item in (scattering, absorption))
         return Homogeneous(sigma_a=absorption, sigma_s=scattering, scale=scale, phase=phase)
     eta = spectrum(params, "eta", INDEX, state, 1.33)
-    inner = map_values(reflectance, from_body_reflectance(index_at_550(eta)))
+    inner = map_values(reflectance, partial(from_body_reflectance, ior=index_at_550(eta)))
     path = map_values(mfp, lambda v: scale * np.asarray(v))
     return Homogeneous.from_albedo(inner, path, g=g)
 

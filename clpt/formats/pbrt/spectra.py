@@ -18,14 +18,7 @@ from clpt.formats.colours import colour
 from clpt.formats.pbrt.params import Parameter, Parameters
 from clpt.formats.pbrt.state import State
 from clpt.scene.roles import EMISSION, REFLECTANCE, Spectral
-from clpt.spectra import (
-    Blackbody,
-    Spectrum,
-    Tabulated,
-    cie,
-    scaled,
-    spaces,
-)
+from clpt.spectra import Blackbody, Spectrum, Tabulated, cie, scaled, spaces
 
 SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
 ACES = "aces2065-1"

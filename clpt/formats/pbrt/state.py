@@ -113,7 +113,7 @@ class Definition:
     state: State
 
 
-# Definitions of a name in their order, each with the number from which it is in force.
+# Definitions of a name in their order, each with its first number in force.
 Versions = list[tuple[int, Definition]]
 
 
@@ -131,7 +131,7 @@ class Shared:
     )
     times: tuple[float, float] = (0.0, 1.0)  # of both transforms [s]
     files: dict[str, State] = field(default_factory=dict)  # the names, and where each stands
-    made: dict[Any, Any] = field(default_factory=dict)
+    results: dict[Any, Any] = field(default_factory=dict)
     make_material: Callable[..., Material] | None = None
     missing: Missing = "error"
     walks: bool = False  # light walks at random in bodies: no light is too small to be met
@@ -152,12 +152,12 @@ class Shared:
 
     def once(self, key: object, source: Parameters | Parameter, make: Callable[[], Any]) -> Any:
         """Return make(), called once for each key. Raises SceneError where it needs itself."""
-        if key not in self.made:
-            self.made[key] = None
-            self.made[key] = make()
-        if self.made[key] is None:
+        if key not in self.results:
+            self.results[key] = None
+            self.results[key] = make()
+        if self.results[key] is None:
             raise source.error("refers to itself")
-        return self.made[key]
+        return self.results[key]
 
 
 Maker = Callable[[Parameters, "State"], T]  # makes a part of the scene of a definition

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom
+from pxr import Usd, UsdGeom, Vt
 
 from clpt.arrays import Matrix
 from clpt.errors import SceneError
@@ -26,13 +26,7 @@ class Document:
     level: of subdivision, None for that which suits each mesh. left_out: prim paths by message.
     """
 
-    def __init__(
-        self,
-        file: Path,
-        stage: Usd.Stage,
-        time: float,
-        level: int | None = None,
-    ):
+    def __init__(self, file: Path, stage: Usd.Stage, time: float, level: int | None = None):
         self.file, self.stage, self.level = file, stage, level
         self.metres = float(UsdGeom.GetStageMetersPerUnit(stage))
         self.up: Up = "z" if UsdGeom.GetStageUpAxis(stage) == "Z" else "y"
@@ -94,10 +88,18 @@ class Document:
 
     def placement(self, prim: Usd.Prim) -> Matrix:
         """Return a prim's transform to the world, or of a prototype's prim to the prototype."""
-        matrix = np.array(self.transforms.GetLocalToWorldTransform(prim), np.float64).T
-        if not np.isfinite(matrix).all():
-            raise self.error("its transform is not finite", prim.GetPath())
-        return matrix
+        return self.placements([prim])[0]
+
+    def placements(self, prims: list[Usd.Prim]) -> Matrix:
+        """Return the transforms of prims, (n, 4, 4), each as `placement` does."""
+        local_to_world = self.transforms.GetLocalToWorldTransform
+        stored = Vt.Matrix4dArray([local_to_world(prim) for prim in prims])
+        matrices = np.array(stored, np.float64).reshape(-1, 4, 4).swapaxes(1, 2)
+        finite = np.isfinite(matrices).all(axis=(1, 2))
+        if not finite.all():
+            path = prims[int(np.argmin(finite))].GetPath()
+            raise self.error("its transform is not finite", path)
+        return matrices
 
 
 def rows(value: object, width: int, kind: type = np.float32) -> Any:

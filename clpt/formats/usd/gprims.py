@@ -41,6 +41,7 @@ class Content:
     lights: list[tuple[Usd.Prim, Matrix]] = field(default_factory=list)
     cameras: list[Usd.Prim] = field(default_factory=list)
     volumes: list[Usd.Prim] = field(default_factory=list)
+    settings: list[Usd.Prim] = field(default_factory=list)
     copies: list[tuple[Content, Floats]] = field(default_factory=list)
 
     def flat(self) -> Content:
@@ -77,7 +78,7 @@ def content(
     if depth > DEEPEST:
         raise document.error("instances are nested too deeply", root.GetPath())
     prims = walk.shown(document, root, defined=base is None)
-    whole = Content(cameras=prims["cameras"], volumes=prims["volumes"])
+    whole = Content(cameras=prims["cameras"], volumes=prims["volumes"], settings=prims["settings"])
     for prim in prims["volumes"] if base is not None else ():
         document.warn("volumes of prototypes are left out", prim.GetPath())
 
@@ -97,7 +98,8 @@ def content(
         prototype, material = several[0][0].GetPrototype(), several[0][1]
         make = partial(content, document, prototype, np.eye(4), material, depth + 1)
         inner = document.once(("content", document.code, *key), make)
-        whole.copies.append((inner, np.stack([placement(prim) for prim, _ in several])))
+        matrices = document.placements([prim for prim, _ in several])
+        whole.copies.append((inner, matrices if base is None else base @ matrices))
     for prim in prims["instancers"]:
         whole.copies += _instancer(document, prim, placement(prim), inherited, depth)
     return whole
@@ -193,7 +195,7 @@ def placed(document: Document, whole: Content) -> list[Shape]:
             for moved in at(document, prim, quadrics.under(one, uneven @ local), local)
         ]
         group = Group(tuple(own), parts[0][0].GetName())
-        solid = [matrix for matrix in world if not transforms.is_singular(matrix)]
+        solid = world[~transforms.are_singular(world)]
         shapes += [Instance(group=group, to_world=matrix) for matrix in solid]
     return shapes
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,9 +15,10 @@ import numpy as np
 from pxr import Sdf, Usd, UsdLux
 
 from clpt import transforms
-from clpt.arrays import Floats, Matrix
+from clpt.arrays import Floats, Floats32, Matrix
 from clpt.errors import SceneError
-from clpt.formats import ies
+from clpt.files import budget
+from clpt.formats import luminaires
 from clpt.formats.usd import packages, textures
 from clpt.formats.usd.document import Document
 from clpt.scene.lights import Area, Constant, Directional, Envmap, Goniometric, Light, Point, Spot
@@ -32,6 +34,10 @@ FROM_NADIR = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
 SUN_ANGLE, SUN_INTENSITY = 0.53, 50000.0
 WIDE = 2.0  # [degrees] of a distant light from which on a sharp shadow is told
 SHAPED = "inputs:shaping:"
+BALLS: dict[str, Callable[[Floats], Floats]] = {
+    "mirroredBall": lambda angle: np.sin(0.5 * angle),
+    "angular": lambda angle: angle / np.pi,
+}
 LINKS = ("lightLink", "shadowLink")
 
 
@@ -105,16 +111,43 @@ def _dome(document: Document, prim: Usd.Prim, placement: Matrix) -> Light:
     stored = textures.read(document, asset, str(prim.GetPath())) if asset and asset.path else None
     if stored is None:
         return Constant(radiance=RGBIlluminant(*rgb))
-    form = document.value(prim, "inputs:texture:format", "automatic")
-    if form not in ("automatic", "latlong"):
-        document.warn(f"format {form!r} is read as latlong", prim.GetPath())
     image = stored.decoded()[..., :3]
-    image = np.repeat(image, 3, axis=2) if image.shape[2] < 3 else image
+    image = np.repeat(image[..., :1], 3, axis=2) if image.shape[2] < 3 else image
+    form = str(document.value(prim, "inputs:texture:format", "automatic"))
+    if form in BALLS:
+        image = _unrolled(image, BALLS[form])
+    elif form not in ("automatic", "latlong"):
+        document.warn(f"format {form!r} is read as latlong", prim.GetPath())
     scale = float(rgb.max())
     if scale > 0.0 and rgb.min() < scale:
         image = image * (rgb / scale).astype(np.float32)
     to_world = transforms.rigid(placement) @ _pole(document, prim, placement)
     return Envmap(image=image, scale=scale, to_world=to_world)
+
+
+def _unrolled(image: Floats32, sine_of: Callable[[Floats], Floats]) -> Floats32:
+    """Return the image of a ball in latitude and longitude.
+
+    sine_of: the distance from the middle of the ball, 1 at its edge, by the angle from its axis,
+    which points to +z.
+    """
+    size = min(image.shape[:2])
+    budget.check(16 * 2 * size * size * 3, "its directions")
+    theta = np.pi * np.arange(size)[:, None] / (size - 1)
+    phi = np.pi * (1.0 - 2.0 * (np.arange(2 * size) + 0.5) / (2 * size))
+    x, y, z = np.sin(theta) * np.sin(phi), np.cos(theta), np.sin(theta) * np.cos(phi)
+    off = sine_of(np.arccos(np.clip(z, -1.0, 1.0)))
+    length = np.maximum(np.hypot(x, y), 1e-12)
+    column = 0.5 * (1.0 - off * x / length) * image.shape[1] - 0.5
+    row = 0.5 * (1.0 - off * y / length) * image.shape[0] - 0.5
+    last = np.array(image.shape[:2]) - 1
+    column, row = np.clip(column, 0.0, last[1]), np.clip(row, 0.0, last[0])
+    i, j = row.astype(np.int64), column.astype(np.int64)
+    below, right = np.minimum(i + 1, last[0]), np.minimum(j + 1, last[1])
+    v, u = (row - i)[..., None], (column - j)[..., None]
+    upper = (1.0 - u) * image[i, j] + u * image[i, right]
+    lower = (1.0 - u) * image[below, j] + u * image[below, right]
+    return ((1.0 - v) * upper + v * lower).astype(np.float32)
 
 
 def _pole(document: Document, prim: Usd.Prim, placement: Matrix) -> Matrix:
@@ -247,7 +280,7 @@ def _point(document: Document, prim: Usd.Prim, placement: Matrix, rgb: Floats) -
             edge="smooth",
         )
     # Directions as in the image of a goniometric light, counted from -z of the light.
-    off_axis = np.pi * (1.0 - (np.arange(ies.ROWS) + 0.5) / ies.ROWS)[:, None]
+    off_axis = np.pi * (1.0 - (np.arange(luminaires.ROWS) + 0.5) / luminaires.ROWS)[:, None]
     smooth = np.clip(
         (np.degrees(off_axis) / angle - 1.0 + softness) / max(softness, 1e-6), 0.0, 1.0
     )
@@ -267,14 +300,18 @@ def _profile(document: Document, prim: Usd.Prim) -> Floats | None:
     if not isinstance(asset, Sdf.AssetPath) or not asset.path:
         return None
     try:
-        lamp = ies.read(packages.file_of(document, asset))
+        lamp = luminaires.read_ies(packages.file_of(document, asset))
     except SceneError as error:
         document.warn(f"profile {asset.path!r} is left out: {error.message}", prim.GetPath())
         return None
+    candela = np.asarray(luminaires.directional_image(lamp)["image"].image, np.float64)
     scale = document.number(prim, SHAPED + "ies:angleScale", 0.0)
     if scale != 0.0:
-        document.warn("angleScale of a profile is left out", prim.GetPath())
-    candela = np.asarray(ies.table(lamp)["image"].image, np.float64)
+        theta = 180.0 * (1.0 - (np.arange(len(candela)) + 0.5) / len(candela))
+        at = theta / scale if scale > 0.0 else 180.0 + (theta - 180.0) / -scale
+        rows = np.clip(np.round((1.0 - at / 180.0) * len(candela) - 0.5), 0, len(candela) - 1)
+        inside = (at >= 0.0) & (at <= 180.0)
+        candela = np.where(inside[:, None, None], candela[rows.astype(np.int64)], 0.0)
     if document.value(prim, SHAPED + "ies:normalize", False):
         theta = np.pi * (np.arange(len(candela)) + 0.5) / len(candela)
         power = (candela.mean(axis=1)[:, 0] * np.sin(theta)).sum() * 2.0 * np.pi**2 / len(candela)

@@ -1,4 +1,4 @@
-"""Materials: UsdPreviewSurface 2.6, and gprims without a material in their display color."""
+"""Materials: MaterialX, UsdPreviewSurface 2.6, and gprims without one in their display color."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 from pxr import Usd, UsdShade
 
-from clpt.formats.usd import textures
+from clpt.formats.usd import networks, textures
 from clpt.formats.usd.document import Document
 from clpt.formats.usd.nodes import Node
 from clpt.formats.usd.textures import Uses
 from clpt.scene import gltf_material
 from clpt.scene.lights import Area
 from clpt.scene.materials import Blend, GltfSurface, Material, ThinDielectric, TwoSided
+from clpt.scene.media import Medium
 from clpt.scene.params import Kind, fields_of
-from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap, MeshAttribute
-from clpt.scene.values import Textured
+from clpt.scene.values import Texture, Textured
 
 PREVIEW = "UsdPreviewSurface"
 GREY = (0.18, 0.18, 0.18)
@@ -30,7 +30,7 @@ NORMALS = ((2.0, 2.0, 2.0), (-1.0, -1.0, -1.0))  # scale and bias of a map of 8 
 
 @dataclass(frozen=True)
 class Surface:
-    """A material, what it emits, and the primvars that it reads.
+    """A material, what it emits, what is inside of its shapes, and the primvars that it reads.
 
     uv_sets: names of sets of texture coordinates; fallbacks: values of a mesh without a primvar.
     """
@@ -39,6 +39,7 @@ class Surface:
     emission: Area | None = None
     uv_sets: tuple[str, ...] = ()
     fallbacks: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    interior: Medium | None = None
 
     @property
     def primvars(self) -> dict[str, int]:
@@ -55,7 +56,8 @@ class Surface:
             return self
         rows = {name: value_of(name) or row for name, row in self.fallbacks.items()}
         emission = None if self.emission is None else _settled(self.emission, rows)
-        return Surface(_settled(self.material, rows), emission, self.uv_sets)
+        inner = _settled(self.material, rows)
+        return Surface(inner, emission, self.uv_sets, interior=self.interior)
 
 
 def _settled(part: Any, rows: dict[str, tuple[float, ...]]) -> Any:
@@ -95,8 +97,14 @@ def _sided(inner: Material) -> Material:
 
 
 def _bound(document: Document, material: UsdShade.Material, both: bool) -> Surface:
-    """Return a material that a prim binds: its universal surface."""
+    """Return a material that a prim binds: that of MaterialX, else its universal surface."""
     name, path = material.GetPrim().GetName(), str(material.GetPath())
+    uses = Uses()
+    network = networks.shader(document, material)
+    if network is not None:
+        read = networks.surface(document, network, uses, name)
+        found = Surface(read.material, read.emission, interior=read.interior)
+        return _told(document, path, found, uses, both)
     shader = material.ComputeSurfaceSource("")[0]
     node = Node(document, shader) if shader else None
     if node is None or node.kind != PREVIEW:
@@ -109,16 +117,19 @@ def _bound(document: Document, material: UsdShade.Material, both: bool) -> Surfa
         return Surface(_sided(GltfSurface(base_color=GREY, roughness=0.5, name=name)))
     if material.ComputeDisplacementSource("")[0] and node.source("displacement"):
         document.warn("displacement is left out", path)
-    uses = Uses()
-    inner, emission = _preview(node, uses, name)
-    if emission is not None:
-        emission = dataclasses.replace(emission, two_sided=both)
+    return _told(document, path, Surface(*_preview(node, uses, name)), uses, both)
+
+
+def _told(document: Document, path: str, read: Surface, uses: Uses, both: bool) -> Surface:
+    """Return a surface with its primvars. both: what it emits leaves its back too."""
+    emission = read.emission and dataclasses.replace(read.emission, two_sided=both)
     if len(uses.uv_sets) > 2:
         document.warn(
             f"textures use over two sets of coordinates; {uses.uv_sets[0]} replaces the others",
             path,
         )
-    return Surface(inner, emission, tuple(uses.uv_sets), uses.fallbacks)
+    sets = tuple(uses.uv_sets)
+    return dataclasses.replace(read, emission=emission, uv_sets=sets, fallbacks=uses.fallbacks)
 
 
 def _preview(node: Node, uses: Uses, name: str) -> tuple[Material, Area | None]:

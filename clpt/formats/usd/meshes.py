@@ -23,7 +23,7 @@ from clpt.geometry.polygons import smooth_normals, triangulate
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import SECOND_UV
 
-MOST_FACES = 400_000  # of a mesh that is refined by a level of its own
+MOST_FACES = 200_000  # of a mesh that is refined by a level of its own
 # How the boundaries of texture coordinates go, by faceVaryingLinearInterpolation.
 BOUNDARIES = {"none": "edgeOnly", "boundaries": "linear", "all": "bilinear"}
 
@@ -75,7 +75,7 @@ def _all(document: Document, prim: Usd.Prim, material: UsdShade.Material | None)
 
 def _topology(document: Document, prim: Usd.Prim) -> Topology | None:
     """Return a mesh prim's faces; None for a mesh without any."""
-    points = document.value(prim, "points")
+    points = document.array(prim, "points", 3)
     counts = document.array(prim, "faceVertexCounts", 0, np.int64)
     corners = document.array(prim, "faceVertexIndices", 0, np.int64)
     if points is None or counts is None or corners is None or not len(corners):
@@ -307,4 +307,13 @@ def _shape(
         document.warn(note.partition(": ")[2], prim.GetPath())
     if not len(arrays["faces"]):
         return None
-    return Mesh(name=prim.GetName(), material=look.material, emission=look.emission, **arrays)
+    loop = document.value(prim, "subdivisionScheme") == "loop"
+    if loop and (polygons.topology.counts == 3).all():
+        arrays |= {"normals": None, "subdivision": 2 if document.level is None else document.level}
+    return Mesh(
+        name=prim.GetName(),
+        material=look.material,
+        emission=look.emission,
+        interior=look.interior,
+        **arrays,
+    )

@@ -43,6 +43,11 @@ class Node:
         value = attribute.Get(self.document.time)
         return default if value is None else value
 
+    def color_space(self, name: str) -> str:
+        """Return the color space that an input's value says it has; "" for none."""
+        attribute = self._attribute(name)
+        return "" if attribute is None else str(attribute.GetColorSpace())
+
     def number(self, name: str, default: float) -> float:
         """Return an input that is a finite number; `default`, with a warning, for another."""
         value = self.value(name, default)

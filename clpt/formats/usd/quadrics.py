@@ -39,6 +39,7 @@ def quadric(document: Document, prim: Usd.Prim, material: UsdShade.Material | No
         attributes[f"vertex_{name}"] = np.tile(value, (len(arrays["vertices"]), 1))
     shared: dict[str, Any] = {
         "name": prim.GetName(), "material": look.material, "emission": look.emission,
+        "interior": look.interior,
     }  # fmt: skip
     extent = float(np.ptp(arrays["vertices"], axis=0).max())
     if not extent > 0.0 or not math.isfinite(extent):

@@ -43,16 +43,15 @@ class Settings:
         return (height * aspect, height) if wider else (width, width / aspect)
 
 
-def settings(document: Document) -> Settings:
+def settings(document: Document, shown: list[Usd.Prim]) -> Settings:
     """Return the settings of the stage's metadata, else those of its only RenderSettings prim.
 
-    The first product has a say before them.
+    shown: its RenderSettings prims. What the first product says counts before them.
     """
     stage = document.stage
     prim = UsdRender.Settings.GetStageRenderSettings(stage).GetPrim()
     if not prim:
-        prims = [one for one in stage.Traverse() if one.GetTypeName() == "RenderSettings"]
-        prim = prims[0] if len(prims) == 1 else None
+        prim = shown[0] if len(shown) == 1 else None
     if not prim:
         return Settings()
     sources = [prim]

@@ -60,11 +60,7 @@ def load(path: Path, /, **variables: Any) -> Scene:
 
 
 def _number(
-    path: Path,
-    variables: dict[str, Any],
-    name: str,
-    low: float = -1e9,
-    high: float = 1e9,
+    path: Path, variables: dict[str, Any], name: str, low: float = -1e9, high: float = 1e9
 ) -> float:
     """Return a variable that is a number within its limits. Raises SceneError for another."""
     try:
@@ -188,7 +184,7 @@ def _scene(document: Document, variables: dict[str, Any]) -> Scene:
         shapes += lit.shapes
     for prim in world.volumes:
         shapes += volumes.volume(document, prim, document.placement(prim))
-    settings = render_settings.settings(document)
+    settings = render_settings.settings(document, world.settings)
     chosen = _chosen(document, world.cameras, variables.get("camera", settings.camera))
     if not shapes:
         document.warn("holds no shapes", "/")

@@ -19,8 +19,8 @@ from clpt.formats.usd import packages
 from clpt.formats.usd.document import Document
 from clpt.formats.usd.nodes import Node
 from clpt.scene import gltf_material
-from clpt.scene.texture_values import Texture
 from clpt.scene.textures import Bitmap, MeshAttribute
+from clpt.scene.values import Texture
 
 WRAPS = {
     "black": "zero", "clamp": "clamp", "repeat": "repeat", "mirror": "mirror",

@@ -29,7 +29,7 @@ HIDDEN = ("proxy", "guide")  # purposes that no picture shows
 Shown = dict[str, list[Usd.Prim]]  # prims by role: see ROLES, and "instances"
 ROLES = {
     **dict.fromkeys(GPRIMS, "gprims"), **dict.fromkeys(LIGHTS, "lights"), "Camera": "cameras",
-    "PointInstancer": "instancers", "Volume": "volumes",
+    "PointInstancer": "instancers", "Volume": "volumes", "RenderSettings": "settings",
 }  # fmt: skip
 
 

@@ -1,8 +1,11 @@
-"""Files of densities: numpy's .npy, Mitsuba's .vol, NanoVDB's .nvdb, OpenVDB's .vdb."""
+"""Files of densities: numpy's .npy, Mitsuba's .vol of version 3, NanoVDB's .nvdb, OpenVDB's .vdb.
+
+A .vol has 48 bytes of header, then float32 with x fastest."""
 
 from __future__ import annotations
 
 import contextlib
+import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -10,12 +13,54 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import transforms
 from clpt.errors import SceneError
-from clpt.files import budget, numpy_files
-from clpt.formats.volumes import nvdb, vdb, vol
+from clpt.files import budget, input_files, numpy_files
+from clpt.formats.volumes import nvdb, vdb
 from clpt.scene.volumes import Volume, check_density
 from clpt.spectra import RGBUnbounded
 from clpt.transforms import IDENTITY
+
+VOL_HEADER = struct.Struct("<3sB5i6f")
+FLOAT32 = 1  # the only encoding that Mitsuba 3 reads
+
+
+def read_vol(path: Path) -> Volume:
+    """Return the values (nx, ny, nz) of a single channel, and their box. Raises SceneError."""
+    values, box = read_channels(path)
+    if values.shape[3] != 1:
+        raise SceneError(f"has {values.shape[3]} channels; a density has one")
+    return Volume(values[..., 0], box)
+
+
+def read_channels(path: Path) -> tuple[np.ndarray, transforms.Matrix]:
+    """Return values (nx, ny, nz, channels) float32, and what takes the unit cube to their box.
+
+    Raises SceneError, OSError.
+    """
+    data = input_files.read_bytes(path)
+    budget.take(len(data), "its values", path)
+    if len(data) < VOL_HEADER.size or data[:3] != b"VOL":
+        raise SceneError("is no .vol file: it does not begin with VOL")
+    _, version, encoding, nx, ny, nz, channels, *box = VOL_HEADER.unpack_from(data)
+    if version != 3 or encoding != FLOAT32:
+        message = f"is a .vol of version {version}, encoding {encoding}; read are 3 and float32 (1)"
+        raise SceneError(message)
+    if min(nx, ny, nz, channels) < 1 or channels > 6:
+        raise SceneError(f"cannot be {nx} x {ny} x {nz} of {channels} channels")
+    count = nx * ny * nz * channels
+    if len(data) != VOL_HEADER.size + 4 * count:
+        message = (
+            f"must have {VOL_HEADER.size + 4 * count:,} bytes by its header, found {len(data):,}"
+        )
+        raise SceneError(message)
+    values = np.frombuffer(data, "<f4", count, VOL_HEADER.size).reshape(nz, ny, nx, channels)
+    low, high = np.array(box[:3]), np.array(box[3:])
+    if not (np.isfinite(box).all() and (low < high).all()):
+        raise SceneError("its box is empty")
+    matrix = transforms.translate(low) @ transforms.scale(high - low)
+    return np.ascontiguousarray(values.transpose(2, 1, 0, 3), np.float32), matrix
+
 
 _GREY = 1e-4  # relative difference of colours from multiples of a single colour
 
@@ -56,7 +101,7 @@ def read_colours(path: str | Path) -> Volume:
     with _reading(path):
         if path.suffix.lower() == ".npy":
             return _npy(path, axes=4)
-        return Volume(*vol.read_channels(path))
+        return Volume(*read_channels(path))
 
 
 def factored(
@@ -84,7 +129,7 @@ def distances(path: Path) -> np.ndarray:
     """Read signed distances (nx, ny, nz) float32 of a .npy or .vol file. Raises SceneError."""
     with _reading(path):
         if path.suffix.lower() == ".vol":
-            return vol.read(path).values
+            return read_vol(path).values
         return np.ascontiguousarray(_array(path), np.float32)
 
 
@@ -120,7 +165,7 @@ def _array(path: Path, axes: int = 3) -> np.ndarray:
 
 READERS: dict[str, Callable[[Path, str], Volume]] = {
     ".npy": _npy,
-    ".vol": lambda path, _: vol.read(path),
+    ".vol": lambda path, _: read_vol(path),
     ".nvdb": nvdb.read,
     ".vdb": vdb.read,
 }

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pyopencl as cl
@@ -34,12 +34,14 @@ from clpt.scene import Scene
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Curves, Shape, Spheres
 
-_ROOT = "stage/place_vertices.cl"
+_ROOT = "stage/place.cl#vertices"
 _NORMALS = SHAPE_BITS["normals"]
 _MOVABLE = {"to_world", "vertices", "normals", "centers"}  # fields that may change
 REBUILD_EVERY = 16  # moves of analytic shapes, which move independently
 
 Action = Callable[[], None]
+# Words of an analytic shape: table, words, first word; number of its first box, and its boxes.
+Analytic = tuple[str, NDArray[Any], int, int, NDArray[np.float32]]
 
 
 @dataclass(eq=False)
@@ -142,9 +144,13 @@ class Moving:
             instances += [(k, new) for k in indices]
             matrices += [matrix for _ in indices]
         if instances:
-            act = self._instances.plan(instances, matrices)
-            boxes = self.target.lowered.instances.boxes
-            actions.append(lambda: act(self._boxes_of("instance", boxes)))
+            transformed = self._instances.plan(instances, matrices)
+            moved, lowered = (instances, matrices), self.target.lowered.instances.boxes
+            actions.append(
+                lambda: self._instances.move(
+                    transformed, *moved, self._boxes_of("instance", lowered)
+                )
+            )
         return actions
 
     def _all_ranges(self) -> list[_Ranges]:
@@ -205,53 +211,65 @@ class Moving:
         if not keeps_its_kind(in_world):
             raise CannotMove(f"the transform of {_name(new)} makes triangles of it")
         if isinstance(shape, Spheres):
-            act = self._spheres.plan(ranges.row, shape, matrix)
-        elif isinstance(in_world, Curves):
-            act = self._plan_curves(ranges, in_world)
-        else:
-            act = self._plan_single(ranges, in_world)
+            common, source = self._spheres.plan(ranges.row, shape, matrix)
+            return [lambda: self._move_spheres(ranges, shape, matrix, common, source)]
+        plan = self._plan_curves if isinstance(in_world, Curves) else self._plan_single
+        words = plan(ranges, in_world)
+        return [lambda: self._move_analytic(ranges, shape, *words)]
 
-        def move() -> None:
-            ranges.shape = shape
-            act(self._boxes_of("shape", self.target.lowered.boxes))
-            self.target.moved_tables |= {"geometry", "spheres"}
+    def _move_spheres(
+        self,
+        ranges: _Ranges,
+        shape: Shape,
+        matrix: transforms.Matrix,
+        common: NDArray[np.uint32],
+        source: object,
+    ) -> None:
+        """Enqueue a move of spheres, see `MovingSpheres.plan`."""
+        ranges.shape = shape
+        boxes = self._boxes_of("shape", self.target.lowered.boxes)[1]
+        self._spheres.move(ranges.row, matrix, common, source, boxes)
+        self.target.moved_tables |= {"geometry", "spheres"}
 
-        return [move]
+    def _move_analytic(
+        self,
+        ranges: _Ranges,
+        shape: Shape,
+        table: str,
+        words: NDArray[Any],
+        begin: int,
+        number: int,
+        new_boxes: NDArray[np.float32],
+    ) -> None:
+        """Enqueue new words of a table and new boxes, see `Analytic`."""
+        ranges.shape = shape
+        host, buffer = self._boxes_of("shape", self.target.lowered.boxes)
+        stream = self.target.stream
+        stream.write(self.target.tables[table], words, 4 * begin)
+        host[number : number + len(new_boxes)] = new_boxes
+        stream.write(buffer, new_boxes, new_boxes[0].nbytes * number)
+        self.target.moved_tables |= {"geometry", "spheres"}
 
-    def _plan_single(self, ranges: _Ranges, shape: Shape) -> Callable[[Boxes], None]:
-        """Return the action that gives a sphere, disk or cylinder new parameters and a new box."""
+    def _plan_single(self, ranges: _Ranges, shape: Shape) -> Analytic:
+        """Return the new parameters and box of a sphere, disk or cylinder."""
         lowered, first_word = self.target.lowered, int(ranges.row["params"])
         words, box = analytic.row(shape), np.stack(analytic.bounds(shape))
         rows = lowered.tables["shapes"].view(SHAPE.dtype)
         first = int(lowered.settings["first_analytic"])
         number = int(np.flatnonzero(rows["params"][first:] == first_word)[0])
+        return "geometry", words, first_word, number, box[None]
 
-        def act(boxes: Boxes) -> None:
-            stream = self.target.stream
-            stream.write(self.target.tables["geometry"], words, 4 * first_word)
-            boxes[0][number] = box
-            stream.write(boxes[1], box, box.nbytes * number)
-
-        return act
-
-    def _plan_curves(self, ranges: _Ranges, shape: Curves) -> Callable[[Boxes], None]:
-        """Return the action that gives curves other pieces, as many as before, and other boxes."""
+    def _plan_curves(self, ranges: _Ranges, shape: Shape) -> Analytic:
+        """Return the new pieces of curves, as many as before, and their boxes."""
         owners = self.target.lowered.owners
         lowered = next(owner for row, owner, _, _ in owners if row is ranges.row)
-        assert isinstance(lowered, Curves)
-        pieces, prim = strands.pieces(shape, cut_as=lowered), int(ranges.row["prim"])
+        curves, former = cast(Curves, shape), cast(Curves, lowered)
+        pieces, prim = strands.pieces(curves, cut_as=former), int(ranges.row["prim"])
         box = strands.boxes(pieces)
         words = self.target.lowered.tables["geometry"]
         first = words[int(ranges.row["params"]) + analytic.member("curve", "first")]
         begin = int(first.view(np.int32)) + strands.WORDS * prim
-
-        def act(boxes: Boxes) -> None:
-            stream = self.target.stream
-            stream.write(self.target.tables["spheres"], pieces, 4 * begin)
-            boxes[0][prim : prim + len(box)] = box
-            stream.write(boxes[1], box, box[0].nbytes * prim)
-
-        return act
+        return "spheres", pieces, begin, prim, box
 
     def _boxes_of(self, tree: str, lowered: NDArray[np.float32]) -> Boxes:
         """Return the boxes of a tree, which `fit_trees` will refit."""

@@ -7,7 +7,7 @@ the device, without a copy on the host.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from clpt.render.records.device_arrays import as_array
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene.shapes import Shape, Spheres
 
-_ROOT, _SPHERES = "stage/place_vertices.cl", "stage/place_spheres.cl"
+_ROOT, _SPHERES = "stage/place.cl#vertices", "stage/place.cl#spheres"
 
 Location = tuple[cl.Buffer, int]  # a buffer, and the offset in it [words]
 Boxes = tuple[NDArray[np.float32], cl.Buffer]  # the boxes of a tree, on the host and the device
@@ -54,23 +54,28 @@ class MovingInstances:
 
     def plan(
         self, moved: Sequence[tuple[int, Shape]], matrices: Sequence[Location | None]
-    ) -> Callable[[Boxes], None]:
-        """Return a function of the boxes of all instances that enqueues a move.
+    ) -> list[Transformed]:
+        """Return the rows and boxes of instances whose transforms are on the host.
 
         moved: indices of instances, and their new shapes; matrices: their transforms on the device,
         None for transforms on the host. Raises SceneError for a transform that is singular.
         """
         of_host = [pair for pair, matrix in zip(moved, matrices, strict=True) if matrix is None]
-        transformed = self._transformed(of_host) if of_host else []
+        return self._transformed(of_host) if of_host else []
 
-        def act(boxes: Boxes) -> None:
-            if transformed:
-                self._send(transformed, boxes)
-            for (k, new), matrix in zip(moved, matrices, strict=True):
-                if matrix is not None:
-                    self._place(k, new, matrix, boxes[1])
-
-        return act
+    def move(
+        self,
+        transformed: list[Transformed],
+        moved: Sequence[tuple[int, Shape]],
+        matrices: Sequence[Location | None],
+        boxes: Boxes,
+    ) -> None:
+        """Enqueue a move; transformed: the result of `plan`; boxes: of all instances."""
+        if transformed:
+            self._send(transformed, boxes)
+        for (k, new), matrix in zip(moved, matrices, strict=True):
+            if matrix is not None:
+                self._place(k, new, matrix, boxes[1])
 
     def _transformed(self, moved: Sequence[tuple[int, Shape]]) -> list[Transformed]:
         """Return the rows and boxes of instances with transforms on the host, by prototype."""
@@ -147,8 +152,8 @@ class MovingSpheres:
 
     def plan(
         self, row: NDArray[np.void], shape: Spheres, matrix: transforms.Matrix
-    ) -> Callable[[Boxes], None]:
-        """Return a function of the boxes of all shapes that enqueues a move of spheres.
+    ) -> tuple[NDArray[np.uint32], Any]:
+        """Return the parameters that spheres share, and their centres, for `move`.
 
         row: of the shape in `shapes`; shape: the new shape; matrix: its transform to the world.
 
@@ -167,10 +172,9 @@ class MovingSpheres:
             raise CannotMove(
                 f"the centres of {where} are no (n, 3) or (n, 4) float32 on the device"
             )
-        source = centers if balls is None else balls
-        return lambda boxes: self._move(row, matrix, common, source, boxes[1])
+        return common, centers if balls is None else balls
 
-    def _move(
+    def move(
         self,
         row: NDArray[np.void],
         matrix: transforms.Matrix,

@@ -65,7 +65,7 @@ def sampling_table(pixel_filter: Filter) -> NDArray[np.float32]:
 
 
 def profile_table(pixel_filter: Filter) -> NDArray[np.float32]:
-    """Return the radius, n, and n + 1 values from the centre to there: see kernels/film/spread.cl.
+    """Return the radius, n, and n + 1 values from the centre to there: see kernels/film/filter.cl.
 
     The integral of the filter, over both sides, is 1.
     """

@@ -1,4 +1,4 @@
-"""The stages of a bounce in their order, and the verbs of kernels/stage/bounce.cl."""
+"""The stages of a bounce in their order, and the verbs of kernels/stage/loop.cl."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ class _Call:
 
 
 def stages_text(features: Features, layout: str, lanes: int, interleaved: bool) -> str:
-    """Return the stages of the loop as functions, and the verbs of kernels/stage/bounce.cl.
+    """Return the stages of the loop as functions, and the verbs of kernels/stage/loop.cl.
 
     A verb takes the slots from `first` to `end` through a stage, with the arguments of the loop. If
     kinds of paths differ in the stage, it asks `which` are traced. A verb without a stage is empty.

@@ -16,7 +16,7 @@ from clpt.render.media.bodies import check_bodies
 from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.transport.check import check_light_paths, check_lit_media
 from clpt.scene import Scene, check_parts, checked_seed
-from clpt.scene.integrators import Film, ParticleTracer
+from clpt.scene.integrators import Film
 from clpt.scene.lights import with_emission
 from clpt.scene.shapes import Instance, Shape
 from clpt.scene.textures import check_textures
@@ -45,7 +45,7 @@ def check_at_rest(scene: Scene, cache: LoweringCache) -> None:
     check_light_paths(scene, shapes_)
     check_motion(scene, Motions.of(scene))
     check_bodies([*shapes_, *(s for s in scene.shapes if isinstance(s, Instance))])
-    if isinstance(scene.integrator, ParticleTracer):
+    if scene.integrator.from_lights_alone:
         check_lit_media(scene, cache)
 
 

@@ -40,10 +40,10 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         f"samplers/pixel_sampler.cl{'#z' * (f.transport.sampler == 'zsobol')}",
     ),
     "generated/exposure.cl": lambda f, _: (
-        "film/splatting.cl" if f.film_weights else "film/exposure.cl",
+        f"film/exposure.cl#{'splatting' if f.film_weights else 'own_pixel'}",
     ),
     "generated/bands.cl": lambda f, _: ("film/bands.cl",) * f.film.bands,
-    "generated/integrator.cl": lambda f, _: (f"integrator/{f.transport.integrator}.cl",),
+    "generated/integrator.cl": lambda f, _: (f"integrator/{f.transport.integrator}.cl#vertex",),
     "generated/walk.cl": lambda f, _: either(flags.walks(f), "media/walk.cl"),
     "generated/merging.cl": lambda f, _: either(f.transport.merged, "transport/photons/area.cl"),
     "generated/collisions.cl": lambda f, _: either(
@@ -80,26 +80,26 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *when(
             f.film.layers.words > 0,
             *_screen_motion(f),
-            *either(f.screen_motion, "film/screen_motion_record.cl"),
+            *either(f.screen_motion, "film/screen_motion.cl#record"),
             *either(f.motion.camera, "cameras/motion.cl#axis"),
         ),
-        *either(f.film.layers.words > 0, "film/layers_record.cl"),
+        *either(f.film.layers.words > 0, "film/layers.cl#record"),
     ),
     "generated/path_covers.cl": lambda f, _: either(f.film.alpha, "film/covers.cl"),
     "generated/path_start.cl": lambda f, _: either(
         f.film.alpha and f.camera.weighs, "cameras/first_ray.cl#again"
     ),
     "generated/scouts.cl": lambda f, _: either(f.scouts, "film/scouts.cl"),
-    "generated/scouts_begin.cl": lambda f, _: either(f.scouts, "film/scouts_begin.cl"),
-    "generated/scout_choice.cl": lambda f, _: either(f.scouts, "film/scout_choice.cl"),
-    "generated/mattes.cl": lambda f, _: either(f.film.layers.mattes, "film/mattes.cl"),
+    "generated/scouts_begin.cl": lambda f, _: either(f.scouts, "film/scouts.cl#begin"),
+    "generated/scout_choice.cl": lambda f, _: either(f.scouts, "film/scouts.cl#choice"),
+    "generated/mattes.cl": lambda f, _: either(f.film.layers.mattes, "film/layers.cl#mattes"),
     "generated/light_layers.cl": lambda f, _: (
         *when(f.film.layers.lights, "generated/sampler.cl"),
         *either(f.film.layers.lights, "film/light_layers.cl"),
     ),
     "generated/met_weight.cl": lambda f, _: (
-        when(f.media.escapes, "integrator/steps/met_weight_escapes.cl")
-        or either(f.transport.balanced, "integrator/steps/met_weight.cl")
+        when(f.media.escapes, "integrator/steps/met_emission.cl#weight_escapes")
+        or either(f.transport.balanced, "integrator/steps/met_emission.cl#weight")
     ),
     "generated/escape_light.cl": lambda f, _: either(f.media.escapes, "tracing/escape_light.cl"),
     "generated/medium.cl": lambda f, _: (
@@ -202,7 +202,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         or ("transport/shadow_ray.cl",)
     ),
     "generated/trace.cl": lambda _, layout: (
-        f"tracing/trace.cl#{'lanes' if layout == 'brute' else 'one'}",
+        f"tracing/trace.cl#{'lanes' if layout == 'brute' else 'single'}",
     ),
     "generated/curve_others.cl": lambda f, _: either(
         f.geometry.analytic != ("curves",), "tracing/curves.cl#others"
@@ -277,8 +277,8 @@ def _escapes(features: Features, cls: type[Scatterer]) -> str:
     """Return the file about rays that leave sealed media."""
     if not features.media.escapes:
         return f"integrator/steps/escapes.cl{TWIN}"
-    end = "" if cls.is_phase else "_out" if cls is Dielectric else "_end"
-    return f"integrator/steps/escapes{end}.cl"
+    step = "" if cls.is_phase else "#out" if cls is Dielectric else "#end"
+    return f"integrator/steps/escapes.cl{step}"
 
 
 # likewise, for a scene's features and the kind of material that a program shades
@@ -322,18 +322,19 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         *when(_merges(f, cls), "generated/photon.cl", "transport/photons/gather.cl"),
         *either(_merges(f, cls), "integrator/steps/merge.cl"),
         *either(f.lights.kinds and not cls.delta, "integrator/steps/next_event.cl"),
-        *either(not flags.is_null(f, cls), "integrator/steps/roulette.cl"),
+        *either(not flags.is_null(f, cls), "integrator/steps/roulette.cl#path"),
         *either(not flags.is_null(f, cls), "integrator/steps/scatters.cl"),
         _escapes(f, cls),
     ),
     "generated/light_path_steps.cl": lambda f, cls: (
         *either(f.transport.joined and not cls.delta, "integrator/steps/join_camera.cl"),
         *either(flags.asks_chance(f, cls), "transport/mis_ratio.cl#chosen"),
-        *either(f.dull_paths_end and not cls.delta, "integrator/steps/dull_goes_on.cl"),
-        "integrator/steps/adjoint_weight.cl",
-        *either(not flags.is_null(f, cls), "integrator/steps/light_path_roulette.cl"),
+        *either(f.dull_paths_end and not cls.delta, "integrator/steps/roulette.cl#diffuse"),
+        *either(not flags.is_null(f, cls), "integrator/steps/roulette.cl#light_path"),
     ),
-    "generated/scout.cl": lambda f, cls: either(f.scouts and not cls.is_phase, "film/scout.cl"),
+    "generated/scout.cl": lambda f, cls: either(
+        f.scouts and not cls.is_phase, "film/scouts.cl#vertex"
+    ),
     "generated/vertex_steps.cl": lambda f, cls: (
         *either(f.names_surfaces, "transport/vertex.cl#names"),
         *(
@@ -344,7 +345,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         *either(
             flags.has_lobe(f, cls, "clearcoat_apart"), "materials/shading_frame.cl#coat_normal"
         ),
-        *either(flags.has_lobe(f, cls, "anisotropy"), "materials/shading_frame.cl#anisotropy"),
+        *either(flags.has_lobe(f, cls, cls.turning_lobe), "materials/shading_frame.cl#anisotropy"),
     ),
 }
 

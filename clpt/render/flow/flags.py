@@ -64,7 +64,7 @@ def is_chromatic(features: Features, cls: type[Scatterer]) -> bool:
     """Whether densities of a material's directions differ between wavelengths.
 
     Without dispersion they are equal. The adjoint weight of light paths then follows from eta alone
-    (kernels/integrator/steps/adjoint_weight.cl), unless lobes that refract and other lobes share
+    (kernels/integrator/particle_tracer.cl), unless lobes that refract and other lobes share
     directions.
     """
     if cls.is_phase:

@@ -17,7 +17,6 @@ from clpt.render.flow import (
     choices,
     common,
     flags,
-    registers,
     signatures,
     stages,
     vertices,
@@ -31,16 +30,38 @@ from clpt.render.records import Features, custom_materials
 from clpt.render.textures import cases as textures
 from clpt.scene.scatterer import Scatterer
 
-BOTH = tuple(f"integrator/{name}.cl" for name in ("path", "particle_tracer", "both"))
+BOTH = ("integrator/particle_tracer.cl", "integrator/path.cl#both")
 
 Files = dict[str, str | device.Part | tuple[str, ...]]
 
 # Replacements of kernel files for work-items that shade a single path.
 _ALONE: device.Virtual = {
     **bvh.ALONE,
-    "core/spectrum_at_once.cl": ("core/spectrum_in_turn.cl",),
-    "core/texels_between.cl": ("core/texels_in_turn.cl",),
+    "core/spectrum.cl#at_once": ("core/spectrum.cl#in_turn",),
+    "core/grid.cl#texels_at_once": ("core/grid.cl#texels_in_turn",),
     "materials/film_stack.cl#at_once": ("materials/film_stack.cl#in_turn",),
+}
+# The fewest registers of a work-item of a GPU, by program, as limits that are tried by
+# `native_programs.with_fewest_registers`. Left alone, compilers take more than some programs need,
+# and fewer work-items run at once. A program within a limit that does not spill has at most 4 %
+# more instructions: `python -m bench.gpu_compilers` uses them.
+_REGISTERS: dict[str, tuple[int, ...]] = {
+    "generate": (96, 112),
+    "flight": (128, 144),
+    "intersect": (96, 128),
+    "shadow": (80, 96),
+    "splat": (80, 96),
+    "shade_diffuse": (80, 96, 112),
+    "shade_dielectric": (112,),
+    "shade_plastic": (96, 112),
+    "shade_rough_conductor": (112, 128),
+    "shade_rough_plastic": (112, 128),
+    "shade_rough_dielectric": (112, 128),
+}
+_REGISTERS_OF_AMD = {
+    **dict.fromkeys(("generate", "emit", "shadow", "splat"), 128),
+    "shade_reradiating": 96,
+    **dict.fromkeys(("shade_diffuse", "shade_rough_plastic"), 168),
 }
 _FEW: device.Virtual = {"bvh/hints.cl": ("bvh/hints.cl#few_registers",)}
 
@@ -276,11 +297,11 @@ def _source(
     if not defines["SLAB_BLOCK"]:  # a CPU also traces single rays
         return device.assemble(file, virtual, defines)
     alone = {**virtual, **_ALONE}
-    if few := registers.of_amd(name):
+    if few := _REGISTERS_OF_AMD.get(name):
         alone |= _FEW
         defines["FEW_REGISTERS"] = few
     source = device.assemble(file, alone, defines)
-    return dataclasses.replace(source, registers=registers.limits(name))
+    return dataclasses.replace(source, registers=_REGISTERS.get(name, ()))
 
 
 def _shared(features: Features, layout: str) -> Files:

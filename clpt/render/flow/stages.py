@@ -15,7 +15,7 @@ from clpt.render.materials import cases as parameters
 from clpt.render.materials import thin_films
 from clpt.render.records import CameraFeatures, Features, GridFeatures, MaterialFeatures
 from clpt.render.records import camera as camera_records
-from clpt.render.records.dispatch import Case, Function, active, function
+from clpt.render.records.dispatch import Case, Function, active
 from clpt.render.records.materials import MIXTURE, row_words, words
 from clpt.scene.materials import Dielectric
 from clpt.scene.params import device_params, interior_params
@@ -53,7 +53,8 @@ def _lens_text(losses: bool) -> str:
         f"{surface.row_text()}{surface.spread_text()}"
         f"#define LENS_SURFACE_WORDS {surface.words}\n"
         f"#define LENS_GHOST_CELLS {camera_records.GHOST_CELLS}\n"
-        + '#include "materials/film_stack.cl"\n' * losses
+        + '#include "materials/film_stack.cl"\n'
+        * losses
     )
 
 
@@ -74,18 +75,12 @@ def connect_text(features: Features) -> str:
     record = camera_records.RECORDS[kind]
     files = f'#include "cameras/kinds/{kind}.cl#connect"\n'
     camera = f"(global const {record.name} *)(scene).camera"
-    if features.motion.camera:
-        point = f"{kind}_connect({camera}, (scene).settings, p, away, lens)"
-        return f'{files}#include "cameras/motion.cl#connect"\n' + function(
-            "CameraPoint camera_connect(Scene scene, vec3 p, mask away, vec2 lens)",
-            "Motion motion = camera_motion(scene);",
-            "p = camera_point_back(motion, p, away);",
-            f"return camera_point_moved(motion, camera_near(scene, {point}), away);",
-        )
+    name = "camera_connect_still" if features.motion.camera else "camera_connect"
+    moves = '#include "cameras/motion.cl#connect"\n' * features.motion.camera
     return (
-        f"{files}#define camera_connect(scene, p, away, lens) "
+        f"{files}#define {name}(scene, p, away, lens) "
         f"camera_near(scene, {kind}_connect({camera}, "
-        "(scene).settings, p, away, lens))\n"
+        f"(scene).settings, p, away, lens))\n{moves}"
     )
 
 
@@ -185,21 +180,9 @@ def null_transmittance_text(features: Features) -> str:
             )
     first = Function(f"{of} null_transmittance_0{arguments}", f"passage_of({passes})", cases)
     parts.append(first.text())
-    for level in range(1, features.materials.mixtures + 1):
-        below = f"null_transmittance_{level - 1}"
-        children = (
-            f"integer row = {active('MATERIAL_ROW(word)')};",
-            "real w = mixture_weight(scene, row, point, lambdas);",
-            f"{of} first = {below}(scene, gather_i(scene.mixtures, row + 2), point, lambdas, c);",
-            f"{of} second = {below}(scene, gather_i(scene.mixtures, row + 3), point, lambdas, c);",
-        )
-        lerp = "spectrum_add(first, spectrum_scale(spectrum_sub(second, first), w))"
-        value = lerp if features.materials.free_panes else "first + w * (second - first)"
-        mixed = Case(f"MATERIAL_KIND(word) == {MIXTURE:#x}", value, children)
-        leaf = f"{below}(scene, word, point, lambdas, c)"
-        parts.append(Function(f"{of} null_transmittance_{level}{arguments}", leaf, [mixed]).text())
-    last = features.materials.mixtures
-    return "".join([*parts, f"#define null_transmittance null_transmittance_{last}\n"])
+    last, name = features.materials.mixtures, "null_transmittance"
+    parts += [f"NULL_TRANSMITTANCE({name}_{i + 1}, {name}_{i})\n" for i in range(last)]
+    return "".join([*parts, f"#define {name} {name}_{last}\n"])
 
 
 def _pane_text(features: Features, cls: type[Scatterer]) -> list[str]:

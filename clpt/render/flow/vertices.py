@@ -51,7 +51,8 @@ def _may_share(features: Features, cls: type[Scatterer]) -> bool:
     """Whether a kind may share a vertex: not with photons, guides, escapes, hero wavelengths."""
     special = (flags.is_chromatic, flags.fluoresces, flags.is_guided, flags.between_bodies)
     merged = features.transport.merged and flags.gathers_photons(features, cls)
-    turned = any(flags.has_lobe(features, cls, lobe) for lobe in ("clearcoat_apart", "anisotropy"))
+    turning = ("clearcoat_apart", cls.turning_lobe)
+    turned = any(flags.has_lobe(features, cls, lobe) for lobe in turning)
     sent = features.media.escapes and cls.is_phase
     alone = merged or turned or sent or any(holds(features, cls) for holds in special)
     return features.transport.integrator != "whitted" and not alone

@@ -19,8 +19,7 @@ from clpt.records import LIGHT
 from clpt.render.geometry.find import Emitter
 from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights import tree as light_tree
-from clpt.render.lights.bodies import BodyLight
-from clpt.render.lights.bricks import BrickLights
+from clpt.render.lights.bodies import BodyLight, BrickLights
 from clpt.render.lights.encode_lamps import blank_row, lower_lamp
 from clpt.render.lights.find import Source, Sources, is_whole
 from clpt.render.materials.encoder import Encoder
@@ -30,14 +29,12 @@ from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
 from clpt.scene.lights import Light
 from clpt.scene.params import fields_of
-from clpt.scene.texture_values import mean
+from clpt.scene.values import mean
 
 PLACED_LIGHT_WEIGHT = 6  # rows of a light at a separate place, to decide on a light tree
 INFINITE_SHARE = 0.5  # of the choices, beside other lights
 
 FEW_LIGHTS = 256  # up to this number a single random number chooses a light and a point on it
-
-
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,8 @@ from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights import images as image_lights
 from clpt.render.lights import sky as sky_light
-from clpt.render.lights.bodies import BodyLight, volume_lights
+from clpt.render.lights.bodies import BodyLight, BrickLights, volume_lights
 from clpt.render.lights.bounds import Bounds
-from clpt.render.lights.bricks import BrickLights
 from clpt.render.records.lights import INFINITE
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.look import Look
@@ -31,8 +30,8 @@ from clpt.scene.media import Medium
 from clpt.scene.params import fields_of, params
 from clpt.scene.roles import EMISSION, REFLECTANCE
 from clpt.scene.shapes import Shape
-from clpt.scene.texture_values import brightness_at, is_texture, mean
 from clpt.scene.textures import attributes_in
+from clpt.scene.values import brightness_at, is_texture, mean
 
 Around: TypeAlias = Callable[[int | Emitter, light_bounds.Bounds], light_bounds.Bounds] | None
 

@@ -22,7 +22,7 @@ from typing import Concatenate, NoReturn, ParamSpec, TypeVar
 
 from clpt.device import Device, forking
 from clpt.errors import DeviceError
-from clpt.render.film.saved_film import Session
+from clpt.render.film.film_file import Session
 from clpt.render.film.state import Ranges
 from clpt.render.wavefront.adaptive import Adaptive
 

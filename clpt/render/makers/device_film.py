@@ -21,9 +21,9 @@ from clpt.render.edit.scene_edit import (
     resolve_device_arrays,
 )
 from clpt.render.film.developed import Developed
+from clpt.render.film.film_file import Origin
 from clpt.render.film.layers import white_paper
 from clpt.render.film.pictures import PictureForm
-from clpt.render.film.saved_film import Origin
 from clpt.render.film.state import DIMENSIONS, FilmState, Ranges
 from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.render.options import RenderOptions

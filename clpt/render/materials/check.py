@@ -9,8 +9,8 @@ from clpt.scene.indices import check_indices
 from clpt.scene.integrators import Film
 from clpt.scene.materials import Layer, Material, parts
 from clpt.scene.params import fields_of
-from clpt.scene.texture_values import is_texture
 from clpt.scene.textures import check_textures
+from clpt.scene.values import is_texture
 
 Maps = tuple[tuple[type[Material], bool], ...]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from clpt.scene.params import (
     place_of,
 )
 from clpt.scene.roles import Param, Role, Spectral
-from clpt.scene.texture_values import is_texture
+from clpt.scene.values import is_texture
 from clpt.spectra import RGB, Constant, Sensor, Tabulated
 
 BLACK = (Constant(0.0), RGB(0.0, 0.0, 0.0))
@@ -199,8 +199,7 @@ class Encoder:
 
 
 def _spectrum(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:
-    assert isinstance(param.role, Spectral)
-    return encoder.spectra.words(value, param.role)
+    return encoder.spectra.words(value, cast(Spectral, param.role))
 
 
 def _number(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:

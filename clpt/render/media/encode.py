@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Words
 from clpt.records import MEDIUM_BITS
-from clpt.render.lights.bodies import BodyLight
+from clpt.render.lights.bodies import BodyLight, BrickLights, black_bodies, brick_counts
 from clpt.render.lights.bounds import Bounds
-from clpt.render.lights.bricks import BrickLights, black_bodies, brick_counts
 from clpt.render.lights.encode import LightRows
 from clpt.render.materials.encode import MaterialWords
 from clpt.render.materials.encoder import Encoder

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Words, on_host
 from clpt.records import BRICK_SIZES
-from clpt.render.lights.bricks import POINTS, Windows, brick_counts, parts_of, to_lattice
+from clpt.render.lights.bodies import POINTS, Windows, brick_counts, parts_of, to_lattice
 from clpt.render.materials.encoder import Encoder
 from clpt.render.records.tables import TableStore, as_words
 from clpt.scene.media import ON_POINTS, Lattice, Medium
@@ -31,7 +31,7 @@ GLOW_WORDS = 6  # behind the row of a grid, see kernels/media/medium_grid_light.
 
 @dataclass(frozen=True, eq=False)
 class CloudDensity:
-    """The density of a cloud at points; numbers: see kernels/stage/cloud_density.cl, float32."""
+    """The density of a cloud at points; numbers: see kernels/stage/density.cl, float32."""
 
     shape: tuple[int, ...]
     numbers: NDArray[np.float32]

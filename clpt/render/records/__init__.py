@@ -319,6 +319,6 @@ class Features:
 
     @property
     def footprint_words(self) -> int:
-        """Words of the sums of a slot around its pixel, see kernels/film/splatting.cl."""
+        """Words of the sums of a slot around its pixel, see kernels/film/exposure.cl."""
         side = 2 * self.film.filter.reach + 1
         return side * side * 8 * (1 + self.film.alpha) if self.film_weights else 0

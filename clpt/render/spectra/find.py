@@ -24,7 +24,7 @@ from clpt.scene.integrators import Film
 from clpt.scene.materials import Material, parts
 from clpt.scene.params import fields_of, params
 from clpt.scene.roles import EMISSION
-from clpt.scene.texture_values import is_texture
+from clpt.scene.values import is_texture
 from clpt.spectra import RGB, RGBIlluminant, Spectrum
 from clpt.spectra.reradiation import Reradiation
 from clpt.spectra.spectrum import d65, gridded

@@ -2,27 +2,39 @@
 
 A row of `textures` belongs to a texture in a role. Row 0 is blank, and valid as any kind in any
 role, for idle lanes to read.
+
+A texture that combines others is a program in postfix order, see kernels/textures/texture.cl. Its
+row is the position of "program" in the table of texture kinds, then instructions of two words:
+operand, operation and perhaps END, and the operand's argument.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
+from clpt import spectra
+from clpt.arrays import Words
 from clpt.errors import SceneError
 from clpt.geometry.triangles import per_face
 from clpt.render.records.materials import SPECTRUM_WORDS
 from clpt.render.records.tables import TableStore
-from clpt.render.records.textures import KINDS, PROGRAM, RECORDS, TextureFeatures
+from clpt.render.records.textures import (
+    END,
+    KINDS,
+    OPERANDS,
+    OPERATIONS,
+    PROGRAM,
+    RECORDS,
+    TextureFeatures,
+)
 from clpt.render.spectra.encode import SpectraTable
 from clpt.render.textures.bitmaps import Images, has_levels
-from clpt.render.textures.programs import program
 from clpt.render.textures.texels import bands
 from clpt.scene.params import params
-from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role, Spectral
-from clpt.scene.texture_values import is_texture, separated
+from clpt.scene.roles import EMISSION, FACTOR, INDEX, REAL, REFLECTANCE, Role, Spectral
 from clpt.scene.textures import (
     MAPPINGS,
     PATTERNS,
@@ -37,9 +49,9 @@ from clpt.scene.textures import (
     Noise,
     Placed,
     Solid,
-    Texture,
 )
-from clpt.spectra import RGB, luminance
+from clpt.scene.values import Operation, Texture, Use, constant_number, is_texture, separated
+from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, luminance
 
 LARGEST = 2**31 - 1  # floats in `texels` that an index reaches
 
@@ -152,7 +164,7 @@ class TextureTable:
     def _append(self, texture: Texture, role: Role) -> int:
         if texture.combines:
             self.roles.add(("program", role.name))
-            words, depth = program(texture, role, self.store, self.spectra, self.row)
+            words, depth = program(texture, role, self)
             self.depth = max(self.depth, depth)
             return self.store.append("textures", [PROGRAM, *words])
         return APPENDERS[type(texture)](texture, role, self)
@@ -198,12 +210,14 @@ def _checkerboard(texture: Checkerboard, role: Role, table: TextureTable) -> int
     members = _uv(texture, table)
     colours: dict[str, Any] = {"color0": texture.color0, "color1": texture.color1}
     for name, value in colours.items():
-        if not isinstance(role, Spectral):
+        if role is REAL:
             words = np.zeros(SPECTRUM_WORDS, np.float32)
             words[0] = luminance(value.to_rgb("unbounded"))
             members[name] = table.store.append("textures", words.view(np.uint32))
         else:
-            members[name] = table.store.append("textures", table.spectra.words(value, role)[0])
+            members[name] = table.store.append(
+                "textures", table.spectra.words(value, cast(Spectral, role))[0]
+            )
     return table.append_leaf(texture, role, **members)
 
 
@@ -291,3 +305,77 @@ APPENDERS: dict[type[Texture], Callable[..., int]] = {
     Noise: _noise,
     Marble: _marble,
 }
+
+
+Code = list[tuple[int, int]]
+
+
+def program(value: Texture, role: Role, table: TextureTable) -> tuple[Words, int]:
+    """Return the instructions of a composite in a role, and how many values they stack.
+
+    value: a result of `Texture.folded`; table: the rows of its parts are appended to it.
+    """
+    code, depth = _Writer(role, table).code(value, "own")
+    last, argument = code[-1]
+    return np.array([*code[:-1], (last | END, argument)], np.uint32).reshape(-1), depth
+
+
+class _Writer:
+    """Writes the instructions of a program."""
+
+    def __init__(self, role: Role, table: TextureTable):
+        self.role, self.table = role, table
+
+    def code(self, value: object, use: Use) -> tuple[Code, int]:
+        """Return instructions that push a value, and how many values they stack."""
+        operation = self._operation(value, use)
+        if operation is None:
+            return [self._operand(value, use)], 1
+        name, operands = operation
+        joined: Code = []
+        depth = 0
+        for below, (operand_value, operand_use) in enumerate(operands[:-1]):
+            code, needed = self.code(operand_value, operand_use)
+            joined, depth = joined + code, max(depth, below + needed)
+        last, last_use = operands[-1]
+        if self._operation(last, last_use):
+            code, needed = self.code(last, last_use)
+            joined, depth = joined + code, max(depth, len(operands) - 1 + needed)
+            operand, argument = OPERANDS.index("top"), 0
+        else:
+            operand, argument = self._operand(last, last_use)
+        return [*joined, (operand | OPERATIONS[name], argument)], depth
+
+    def _operation(self, value: object, use: Use) -> Operation | None:
+        return value.operation(use, self.role) if is_texture(value) else None
+
+    def _operand(self, value: Any, use: Use) -> tuple[int, int]:
+        role = {"own": self.role, "factor": REFLECTANCE, "real": REAL}[use]
+        if is_texture(value):
+            # in a program of numbers every operand is a number
+            name = "own" if role == self.role else use
+            return OPERANDS.index(name), self.table.row(value, role)
+        number = constant_number(value, role)
+        if number is not None and role is not EMISSION:
+            word = np.float32(number).view(np.uint32)
+            return OPERANDS.index("number"), int(word)
+        return OPERANDS.index("constant"), self.table.store.append(
+            "textures", self._words(value, role)
+        )
+
+    def _words(self, value: Any, role: Role) -> Words:
+        """Return a colour or spectrum as five words; colours may exceed 1, emission is D65."""
+        if role is EMISSION and isinstance(value, Constant):
+            value = RGBIlluminant(*[value.value] * 3)
+        if role in (REFLECTANCE, INDEX) and type(value) in (RGB, RGBUnbounded):
+            rgb = (value.r, value.g, value.b)
+            words = np.zeros(SPECTRUM_WORDS, np.float32)
+            if self.table.spectra.spectral:
+                words[3], words[:3] = spectra.unbounded(rgb)
+            else:
+                words[:3] = rgb
+            return words.view(np.uint32)
+        if type(value) is RGBUnbounded:
+            value = RGB(value.r, value.g, value.b)
+        spectral = cast(Spectral, FACTOR if role is REFLECTANCE else role)
+        return self.table.spectra.words(value, spectral)[0]

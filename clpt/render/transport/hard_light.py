@@ -8,7 +8,7 @@ in a mirror or through glass.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -140,10 +140,10 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
         return without, "the longest path is too short for a caustic"
     if (in_fog := _in_fog(lit)) is not None:
         return in_fog
-    sharp = _first_with((shape for shape in index.shapes if not _hides(shape)), is_sharp)
+    sharp = _first_sharp(index.shapes)
     if sharp is None:
         return without, "nothing is specular"
-    if _first_with((s for s in index.shapes if s.emission is None), _is_diffuse) is None:
+    if not _has_diffuse(index.shapes):
         return without, "there is nothing dull for a caustic to be seen on"
     small = list(_small_lights(lit))
     if not small:
@@ -256,14 +256,24 @@ def _sees_clear(index: SceneIndex, geometry: Geometry) -> bool:
     return False
 
 
-def _first_with(all_: Iterable[Shape], wanted: Callable[[mt.Material], object]) -> Shape | None:
-    """The first shape whose material passes a test; each material is tested once."""
-    asked: set[int] = set()
+def _by_material(all_: Iterable[Shape]) -> Iterable[Shape]:
+    """Return the first shape of each material."""
+    first: dict[int, Shape] = {}
     for shape in all_:
-        if id(shape.material) not in asked and wanted(shape.material):
-            return shape
-        asked.add(id(shape.material))
-    return None
+        first.setdefault(id(shape.material), shape)
+    return first.values()
+
+
+def _first_sharp(all_: Iterable[Shape]) -> Shape | None:
+    """Return the first shape that is specular and makes caustics."""
+    clear = _by_material(shape for shape in all_ if not _hides(shape))
+    return next((shape for shape in clear if is_sharp(shape.material)), None)
+
+
+def _has_diffuse(all_: Iterable[Shape]) -> bool:
+    """Return whether a diffuse surface that emits no light can show caustics."""
+    dark = _by_material(shape for shape in all_ if shape.emission is None)
+    return any(_is_diffuse(shape.material) for shape in dark)
 
 
 def _is_diffuse(material: mt.Material) -> bool:

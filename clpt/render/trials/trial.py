@@ -30,7 +30,7 @@ from clpt.render.trials.cost import (
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.wavefront import Wavefront
-from clpt.scene.integrators import Integrator, Vcm
+from clpt.scene.integrators import Integrator
 
 log = logging.getLogger(__name__)
 
@@ -117,7 +117,7 @@ def name_of(way: Integrator) -> str:
     """Return the name of a candidate, for people."""
     if way.guiding:
         return "guiding"
-    if isinstance(way, Vcm):
+    if way.has_photons:
         return way.kind
     return "light paths" if way.light_paths else "path"
 

@@ -17,8 +17,8 @@ from clpt.render.textures.encode import PERMUTATION
 from clpt.render.wavefront import trees
 from clpt.render.wavefront.strategy import Strategy
 
-_BRICKS = "stage/brick_density.cl"
-_CLOUD = "stage/cloud_density.cl"
+_BRICKS = "stage/density.cl#bricks"
+_CLOUD = "stage/density.cl#cloud"
 UPLOADED = tuple(name for name in TABLES if name != "instances")  # the trees have the instances
 
 

@@ -96,7 +96,7 @@ inline Spectrum lens_reflectance(Scene scene, LensSurface s, real cosine, real n
     real rp = (far * c - near * beyond) / (far * c + near * beyond);
     Spectrum r = spectrum_of(sel(inside > 0.0f, 0.5f * (rs * rs + rp * rp), (real)(1.0f)));
     if (any(s.coats > 0)) {
-#if SPECTRUM_SIZE == 3 /* of red, green and blue those at one wavelength each */
+#if SPECTRUM_SIZE == 3 /* red, green and blue stand for a wavelength each */
         Spectrum at = {(real)(611.0f), (real)(549.0f), (real)(465.0f)};
 #else
         Spectrum at = lambdas;
@@ -196,7 +196,7 @@ inline LensRay lens_ghost(Scene scene, global const LensCamera *camera, LensRay 
     return r;
 }
 
-/* Two surfaces by a random number, and 1 / their probability; *u: uniform in [0, 1), and so again of what is left. */
+/* Two surfaces by a random number, and 1 / their probability; *u: uniform in [0, 1), and so again the rest of it. */
 inline vec3 lens_ghost_pair(Scene scene, global const LensCamera *camera, real *u)
 {
     real cell = min_r(*u * (real)(LENS_GHOST_CELLS), (real)(LENS_GHOST_CELLS - 1)), whole = floor(cell);

@@ -14,6 +14,5 @@ vec2 orthographic_screen(global const OrthographicCamera *camera, vec3 p, mask a
 {
     vec3 d = screen_point_back(camera->to_world, p);
     *seen = *seen & !away;
-    vec2 film = {0.5f - 0.5f * d.x, 0.5f - 0.5f * d.y / camera->aspect};
-    return film;
+    return (vec2){0.5f - 0.5f * d.x, 0.5f - 0.5f * d.y / camera->aspect};
 }

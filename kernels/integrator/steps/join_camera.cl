@@ -33,7 +33,7 @@ inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Verte
     return sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 }
 
-/* Twin, where light paths leave photons alone, or a material sends light one way only. */
+/* Twin, where light paths leave photons alone, or a material sends light in a single direction. */
 inline CameraJoint join_camera_seek(Scene scene, Vertex v, Scattering scatter)
 {
     CameraJoint joint;

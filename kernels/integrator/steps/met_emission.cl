@@ -1,7 +1,8 @@
+/* Step. */
 /* Light that a path from the camera meets, on surfaces that shine. */
 #include "generated/met_weight.cl"
 
-/* Adds the light that the `active` paths have met. Returns for which it is to be hidden. */
+/* Adds the light that the `active` paths have met. Returns the paths that the light is hidden from. */
 inline mask met_emission(Scene scene, Slab path, uint at, mask active, Vertex v SHADE_ARGS)
 {
     mask hidden = active & (v.s.light >= 0) & (v.depth == 0) & mask_of(scene.settings->hide_lights != 0);
@@ -24,3 +25,25 @@ inline mask met_emission(Scene scene, Slab path, uint at, mask active, Vertex v 
 
 /* Twin, on surfaces that do not shine. */
 inline mask met_emission(Scene scene, Slab path, uint at, mask active, Vertex v SHADE_ARGS) { return mask_of(0); }
+
+/* Step weight: the weight of light that a path meets, against next-event estimation and against light paths. */
+#include "generated/diffuse_roulette.cl"
+
+inline real met_weight(Scene scene, Slab path, uint at, Vertex v, integer light, real pdf, real other)
+{
+    real emission = light_path_pdf(scene, light, v.o, v.d, v.t, v.s.n);
+    return mis_weight_of_three(pdf, other, after_diffuse_roulette(path_mis_ratio(path, at, v.depth) * emission, pdf));
+}
+
+/* Twin, where paths are not weighed against light paths. */
+inline real met_weight(Scene scene, Slab path, uint at, Vertex v, integer light, real pdf, real other)
+{
+    return sel(pdf < 0.0f, (real)(1.0f), mis_weight(pdf, other));
+}
+
+/* Step weight_escapes: the same where rays leave sealed media toward lamps, see media/escape.cl. */
+inline real met_weight(Scene scene, Slab path, uint at, Vertex v, integer light, real pdf, real other)
+{
+    real sent = sel(v.depth > 0, max_r(-load_path_escape(path, at), (real)(0.0f)), (real)(0.0f));
+    return sel(pdf < 0.0f, 1.0f / (1.0f + sent), mis_weight(pdf, other));
+}

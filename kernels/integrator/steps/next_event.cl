@@ -49,7 +49,7 @@ inline integer next_event_keep(Scene scene, Slab path, Slab shadow, uint at, mas
     return sel_i(e.shine, (integer)(PATH_SHADOW), (integer)(0));
 }
 
-/* Twin, without lights, and at materials that send light one way only. */
+/* Twin, without lights, and at materials that send light in a single direction. */
 inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering scatter)
 {
     NextEvent e;

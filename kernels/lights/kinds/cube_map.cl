@@ -28,9 +28,8 @@ inline CubePoint cube_map_point(CubeMap l, vec3 d)
 
 inline Grid cube_map_grid(CubeMap l)
 {
-    Grid g = {l.width * 12, l.width * 2, (integer)(6), l.corners, l.marginal, l.conditional, l.blocks, l.block_rows,
-              l.block_columns, l.norm};
-    return g;
+    return (Grid){l.width * 12, l.width * 2, (integer)(6), l.corners, l.marginal, l.conditional, l.blocks, l.block_rows,
+                  l.block_columns, l.norm};
 }
 
 inline integer cube_map_receiver(CubeMap l, vec3 n)

@@ -6,9 +6,8 @@
 
 inline Grid envmap_grid(Envmap l)
 {
-    Grid g = {l.height - 1, l.width, (integer)(1), l.corners, l.marginal, l.conditional, l.blocks, l.block_rows,
-              l.block_columns, l.norm};
-    return g;
+    return (Grid){l.height - 1, l.width, (integer)(1), l.corners, l.marginal, l.conditional, l.blocks, l.block_rows,
+                  l.block_columns, l.norm};
 }
 
 inline integer envmap_receiver(Envmap l, vec3 n)

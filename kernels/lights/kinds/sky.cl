@@ -23,9 +23,8 @@ typedef struct {
 
 inline Grid sky_grid(Sky l)
 {
-    Grid g = {2 * l.height, l.width, (integer)(2), l.corners, l.marginal, l.conditional, l.blocks, l.block_rows,
-              l.block_columns, l.norm};
-    return g;
+    return (Grid){2 * l.height, l.width, (integer)(2), l.corners, l.marginal, l.conditional, l.blocks, l.block_rows,
+                  l.block_columns, l.norm};
 }
 
 inline integer sky_receiver(Sky l, vec3 n)
@@ -64,8 +63,7 @@ inline SkyTexels sky_texels(Sky l, SkyPoint p)
 {
     integer across = l.width / 2 + 1, left = sky_column(l, p.column), right = sky_column(l, p.column + 1);
     integer first = (p.row + sel_i(p.up, (integer)(0), (integer)(1))) * across;
-    SkyTexels t = {first + left, first + right, first + across + left, first + across + right, p.at};
-    return t;
+    return (SkyTexels){first + left, first + right, first + across + left, first + across + right, p.at};
 }
 
 /* Where a direction meets the disc: its texels, and whether it does. */

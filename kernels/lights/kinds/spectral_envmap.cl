@@ -4,9 +4,8 @@
 
 inline Envmap spectral_envmap_image(SpectralEnvmap l)
 {
-    Envmap e = {l.x, l.y, l.z, l.width, l.height, l.texels, l.corners, l.marginal, l.conditional, l.blocks,
-                l.block_rows, l.block_columns, l.norm};
-    return e;
+    return (Envmap){l.x, l.y, l.z, l.width, l.height, l.texels, l.corners, l.marginal, l.conditional, l.blocks,
+                    l.block_rows, l.block_columns, l.norm};
 }
 
 inline Spectrum spectral_envmap_between(SpectralEnvmap l, Scene scene, integer row, integer column, vec2 at,

@@ -3,10 +3,9 @@
 
 inline Sky spectral_sky_image(SpectralSky l)
 {
-    Sky e = {l.x, l.y, l.z, l.width, l.height, l.texels, l.corners, l.marginal, l.conditional, l.blocks,
-             l.block_rows, l.block_columns, l.norm, l.horizon, l.sun_texels, l.sun_cos, l.sun_sin, l.sun_radius,
-             l.sun_share};
-    return e;
+    return (Sky){l.x, l.y, l.z, l.width, l.height, l.texels, l.corners, l.marginal, l.conditional, l.blocks,
+                 l.block_rows, l.block_columns, l.norm, l.horizon, l.sun_texels, l.sun_cos, l.sun_sin, l.sun_radius,
+                 l.sun_share};
 }
 
 inline Spectrum spectral_sky_between(SpectralSky l, Scene scene, integer first, SkyTexels t, Spectrum numbers)

@@ -65,8 +65,7 @@ inline vec2 coated_conductor_lobes(CoatedConductor m, CoatedMetal c, vec3 wo, re
     real thrown = coated_metal_thrown(c, fabs(wo.z)), kept = 1.0f - thrown / max_r(c.bounce, (real)(1e-20f));
     real metal = t * kept * spectrum_mean(coated_conductor_fresnel(m, (real)(1.0f)));
     real diffuse = t * thrown * spectrum_mean(c.again), total = max_r(1.0f - t + metal + diffuse, (real)(1e-20f));
-    vec2 p = {(1.0f - t) / total, metal / total};
-    return p;
+    return (vec2){(1.0f - t) / total, metal / total};
 }
 
 /* Density of wi for the metal's lobe. */

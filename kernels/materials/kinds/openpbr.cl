@@ -389,8 +389,24 @@ inline real openpbr_density(Openpbr m, OpenpbrParts p, OpenpbrLobes l, vec3 wo, 
     return sel(reflected | crossed, pdf, (real)(0.0f));
 }
 
-/* Both directions, on the front of a thin surface. */
-inline vec3 openpbr_up(Openpbr m, vec3 wo, vec3 w) { return v3(w.x, w.y, w.z * openpbr_side(m, wo)); }
+/* A direction along and across the tangent, to which u is turned; sign -1: back. */
+inline vec3 openpbr_turn(Openpbr m, vec3 w, real sign)
+{
+    if (USES_OPENPBR_ANISOTROPY_ROTATION) {
+        real s, c, turns = m.anisotropy_rotation * (1.0f / 360.0f);
+        sincos_2pi(turns - floor(turns), &s, &c);
+        s *= sign;
+        w = v3(c * w.x + s * w.y, c * w.y - s * w.x, w.z);
+    }
+    return w;
+}
+/* Likewise, on the front of a thin surface. */
+inline vec3 openpbr_up(Openpbr m, vec3 wo, vec3 w)
+{
+    w = openpbr_turn(m, w, (real)(1.0f));
+    w.z *= openpbr_side(m, wo);
+    return w;
+}
 
 Spectrum openpbr_eval(Openpbr m, vec3 wo, vec3 wi)
 {
@@ -449,7 +465,8 @@ BsdfSample openpbr_sample(Openpbr m, vec3 wo, vec3 u)
     mask kept = sel_i(crossing, o.z * w.z < 0.0f, o.z * w.z > 0.0f) != 0;
     s.pdf = sel(kept, openpbr_density(m, p, l, o, w, p.eta.x), (real)(0.0f));
     s.weight = spectrum_scale(openpbr_value(m, p, o, w), sel(s.pdf > 0.0f, 1.0f / s.pdf, (real)(0.0f)));
-    s.wi = openpbr_up(m, wo, w);
+    s.wi = openpbr_turn(m, w, (real)(-1.0f));
+    s.wi.z *= openpbr_side(m, wo);
     s.eta = sel(passes & (m.thin_walled == 0), f.eta, (real)(1.0f));
     s.lobe = sel_i(crossing, (integer)(LOBE_TRANSMIT), (integer)(LOBE_REFLECT));
     return s;

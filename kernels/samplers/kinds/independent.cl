@@ -11,6 +11,5 @@ inline Sampler sampler_start(uint seed, natural pixel, natural sample)
 inline vec2 sampler_pair(Sampler s, natural dimension)
 {
     natural a = hash_natural(s.seed + hash_natural(s.index + dimension * 0x9e3779b9u));
-    vec2 u = {unit_interval(a), unit_interval(hash_natural(a ^ 0x68bc21ebu))};
-    return u;
+    return (vec2){unit_interval(a), unit_interval(hash_natural(a ^ 0x68bc21ebu))};
 }

@@ -1,4 +1,4 @@
-/* One Owen-scrambled Sobol sequence for the whole film, dealt out along the Z curve (Ahmed and Wonka 2020,
+/* A single Owen-scrambled Sobol sequence for the whole film, dealt out along the Z curve (Ahmed and Wonka 2020,
  * "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of Pixels"): the
  * samples of a pixel are a well-spread part of it, those of each square of pixels too, so that neighbours err
  * in opposite directions. The order of squares, and of the samples in a pixel, is shuffled by the nested

@@ -17,8 +17,7 @@
 typedef struct { real a, b, c, d; } Cubic; /* a + b s + c s^2 + d s^3 */
 inline Cubic cubic_of(real p0, real p1, real p2, real p3)
 {
-    Cubic q = {p0, 3.0f * (p1 - p0), 3.0f * ((p2 - p1) - (p1 - p0)), (p3 - p0) - 3.0f * (p2 - p1)};
-    return q;
+    return (Cubic){p0, 3.0f * (p1 - p0), 3.0f * ((p2 - p1) - (p1 - p0)), (p3 - p0) - 3.0f * (p2 - p1)};
 }
 inline real cubic_at(Cubic q, real s) { return q.a + s * (q.b + s * (q.c + s * q.d)); }
 inline real cubic_slope(Cubic q, real s) { return q.b + s * (2.0f * q.c + s * (3.0f * q.d)); }

@@ -5,7 +5,7 @@
  *
  * Only a window of a long ray gathers photons. Its middle is sampled as collisions are, and light is divided by the
  * probability that the window contains the photon. */
-#include "core/octahedral.cl"
+#include "core/warp.cl"
 #include "transport/photons/cells.cl"
 #include "transport/photons/weight.cl#light"
 #include "transport/photons/media.cl"

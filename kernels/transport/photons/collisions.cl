@@ -33,7 +33,6 @@ inline void collision_photon(Slab path, Slab hit, uint at, Collision c, Photon *
 /* Twin, where there are no media. */
 inline Collision collision_met(Scene scene, Slab path, Slab hit, uint at, mask *active)
 {
-    Collision c = {mask_of(0), (integer)(0)};
-    return c;
+    return (Collision){mask_of(0), (integer)(0)};
 }
 inline void collision_photon(Slab path, Slab hit, uint at, Collision c, Photon *photon, integer *group) {}

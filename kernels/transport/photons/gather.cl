@@ -4,7 +4,7 @@
  * per area, so that sum f power / (N pi r^2) is radiance, N being the number of light paths; f has no cosine. Each is
  * weighed (MIS) against all other techniques for its path, see transport/mis_ratio.cl. Photons on surfaces of another
  * orientation, or off the disk's plane, are left out. */
-#include "core/octahedral.cl"
+#include "core/warp.cl"
 #include "transport/photons/cells.cl"
 #include "transport/photons/weight.cl#light"
 

@@ -28,7 +28,7 @@ from clpt.scene.materials import (
     TwoSided,
     parts,
 )
-from clpt.scene.textures import Bitmap
+from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.spectra import Cauchy
 
 HEAD = '<?xml version="1.0"?><materialx version="1.39" colorspace="lin_rec709">'
@@ -203,6 +203,18 @@ def test_a_pattern_becomes_an_image(tmp_path: Path) -> None:
     assert not image[..., 1:].any()
 
 
+def test_a_tangent_is_turned(tmp_path: Path) -> None:
+    """As Blender writes it, for metal that is brushed."""
+    nodes = '<tangent name="T" type="vector3"/><normal name="N" type="vector3"/>'
+    nodes += '<rotate3d name="R" type="vector3">' + _input("in", "vector3", node="T")
+    nodes += _input("amount", "float", "-60") + _input("axis", "vector3", node="N") + "</rotate3d>"
+    shader = _input("geometry_tangent", "vector3", node="R")
+    assert _leaf(_read(tmp_path, shader, nodes)[0]).anisotropy_rotation == 0.0
+    brushed = shader + _input("specular_roughness_anisotropy", "float", "0.5")
+    surface, warnings = _read(tmp_path, brushed, nodes)
+    assert not warnings and _leaf(surface).anisotropy_rotation == -60.0
+
+
 def test_noise_in_space(tmp_path: Path) -> None:
     """Noise of scaled places is ours in a texture's space; heights of it are a bump map."""
     nodes = '<position name="Q" type="vector3"/><multiply name="V" type="vector3">'
@@ -285,6 +297,13 @@ def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setitem(__import__("sys").modules, "MaterialX", None)
     with pytest.raises(SceneError, match=r"clpt\[materialx\]"):
         materialx.load_materials(path)
+    document.standard.cache_clear()
+    host = _Told()
+    materialx.surface(_Shader("ND_standard_surface_surfaceshader"), host)
+    tint = {"base_color": _Shader("ND_saturate_color3", {"in": (1, 0, 0), "amount": 0})}
+    leaf = _leaf(materialx.surface(_Shader("ND_open_pbr_surface_surfaceshader", {}, tint), host))
+    assert len(host.told) == 3 and all("clpt[materialx]" in told for told in host.told[::2])
+    assert leaf.base_color.r == 0.8
 
 
 @dataclass
@@ -298,6 +317,9 @@ class _Told:
 
     def image(self, asset: Any, path: str) -> images.Stored | None:
         return images.Stored(np.full((2, 2, 3), 0.25, np.float32), encoded=False)
+
+    def attribute(self, name: str, count: int) -> MeshAttribute:
+        return MeshAttribute(name=f"vertex_{name}")
 
     def uv_mapping(self, name: str) -> str:
         return "uv1" if name == "lightmap" else "uv"

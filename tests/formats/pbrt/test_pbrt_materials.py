@@ -132,10 +132,10 @@ def layered(r, eta, thickness, bounces=200):
 @pytest.mark.parametrize("r", [0.05, 0.5, 0.95])
 def test_a_base_under_a_coat_that_absorbs(r):
     """Without absorption, the changed base leaves what the base left with it, twice passed."""
-    changed = scattering.under_coat(1.5, 0.1)(r)
+    changed = scattering.under_coat(r, 1.5, 0.1)
     share = layered(1e-9, 1.5, 0.1) / layered(1e-9, 1.5, 0.0)  # what entering loses, as leaving
     assert layered(changed, 1.5, 0.0) == pytest.approx(share * layered(r, 1.5, 0.1), rel=2e-3)
-    assert scattering.under_coat(1.5, 0.0)(r) == pytest.approx(r)
+    assert scattering.under_coat(r, 1.5, 0.0) == pytest.approx(r)
 
 
 def test_coated_diffuse():
@@ -204,7 +204,7 @@ def test_bodies_by_their_reflectance():
     a, s = a.to_rgb("unbounded"), s.to_rgb("unbounded")
     assert a + s == pytest.approx([0.25] * 3)
     looks = scattering.body_albedo(s, a, 0.3)
-    wanted = scattering.from_body_reflectance(1.33)(np.array([0.9, 0.5, 0.1]))
+    wanted = scattering.from_body_reflectance(np.array([0.9, 0.5, 0.1]), 1.33)
     assert looks == pytest.approx(wanted, abs=1e-6)
     assert isinstance(
         make("subsurface", at, roughness=("float", 0.3), **given), materials.RoughDielectric

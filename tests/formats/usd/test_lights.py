@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from clpt.images import write
 from clpt.scene import Scene
-from clpt.scene.lights import Constant, Directional, Goniometric, Point, Spot
+from clpt.scene.lights import Constant, Directional, Envmap, Goniometric, Point, Spot
 from clpt.scene.shapes import Shape
 from tests.formats.usd.conftest import SQUARE, Loader
 
@@ -142,3 +144,49 @@ def test_what_lights_cannot_do_is_told(stage: Loader) -> None:
         "/A: inputs:specular is left out",
         "/P: PortalLight is left out",
     ]
+
+
+@pytest.mark.parametrize("form", ["latlong", "mirroredBall", "angular"])
+def test_domes_of_other_formats(stage: Loader, tmp_path: Path, form: str) -> None:
+    """Of an image that is red in its middle, red comes from +z of the dome."""
+    pixels = np.zeros((65, 65 if form != "latlong" else 130, 3), np.float32)
+    middle = pixels.shape[1] // 2
+    pixels[28:37, middle - 4 : middle + 5] = [1, 0, 0]
+    pixels[20:28, middle - 4 : middle + 5] = [0, 1, 0]  # above it
+    write(tmp_path / "sky.exr", pixels)
+    text = f"""def DomeLight "L" {{
+        asset inputs:texture:file = @./sky.exr@
+        token inputs:texture:format = "{form}"
+        float inputs:intensity = 3
+    }}"""
+    dome = stage(MESH + text).lights[0]
+    assert isinstance(dome, Envmap)
+    assert dome.scale == 3.0
+    image = np.asarray(dome.image)
+    height, width = image.shape[:2]
+    assert np.allclose(image[height // 2, width // 2], [1, 0, 0], atol=0.1)
+    up = image[: height // 2 - 2, width // 2 - 2 : width // 2 + 2].sum(axis=(0, 1))
+    assert up[1] > up[0]
+    assert np.allclose(dome.to_world, np.eye(4))
+
+
+def test_the_pole_of_a_dome(stage: Loader, tmp_path: Path) -> None:
+    """Up on a stage whose up axis is z, turned there by its author or not."""
+    text = """def DomeLight{} "L" {{
+        asset inputs:texture:file = @./sky.exr@
+        {}
+    }}"""
+    write(tmp_path / "sky.exr", np.ones((4, 8, 3), np.float32))
+    turned = 'float xformOp:rotateX = 90; uniform token[] xformOpOrder = ["xformOp:rotateX"]'
+    for kind, attributes in (
+        ("", ""),
+        ("", turned),
+        ("_1", ""),
+        ("_1", 'uniform token poleAxis = "Z"'),
+    ):
+        dome = stage(MESH + text.format(kind, attributes), 'upAxis = "Z"').lights[0]
+        assert np.allclose(dome.to_world[:3, 1], [0, 0, 1])
+    lying = stage(MESH + text.format("_1", 'uniform token poleAxis = "Y"'), 'upAxis = "Z"').lights[
+        0
+    ]
+    assert np.allclose(lying.to_world[:3, 1], [0, 1, 0])

@@ -175,6 +175,10 @@ def test_what_cannot_be_changes_nothing(renderer: clpt.Renderer) -> None:
         ({"transforms": {"wall": np.zeros((4, 4))}}, "rectangle 'wall': .*singular"),
         ({"vertices": {"floor": CORNERS[:2]}}, "a face names vertex 3, there are 2"),
         ({"materials": {RED: 3}}, "3 is not a material"),
+        (
+            {"transforms": {"wall": tf.translate([0, 1, -1])}, "materials": {"nobody": RED}},
+            "no shape has the name 'nobody'",
+        ),
     ):
         with pytest.raises(SceneError, match=message):
             renderer.update(**edit)

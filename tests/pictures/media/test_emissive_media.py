@@ -15,7 +15,7 @@ import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.geometry.triangles import triangulate
-from clpt.render.lights.bricks import BrickLights
+from clpt.render.lights.bodies import BrickLights
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic, Perspective
 from clpt.scene.integrators import Box, Direct, Whitted

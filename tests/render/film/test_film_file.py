@@ -17,8 +17,8 @@ import pytest
 import clpt
 from clpt.errors import SceneError
 from clpt.render.film import film_file
+from clpt.render.film.film_file import Origin, SavedFilm, Session
 from clpt.render.film.pictures import PictureForm
-from clpt.render.film.saved_film import Origin, SavedFilm, Session
 from clpt.render.film.state import FilmState
 from clpt.scene.fingerprint import Fingerprint
 
