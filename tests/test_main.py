@@ -132,12 +132,12 @@ assert not {"clpt.render.renderer", "clpt.cluster", "rich"} & sys.modules.keys()
 
 
 def test_side_tools_do_not_weigh_on_a_render(tmp_path):
-    """Mie's series, spots, tev, plots, the page and the cluster load when they are asked."""
+    """Mie's series, tev, plots, the page and the cluster load when they are asked."""
     code = """
 import sys
 from clpt.__main__ import run
 assert run(sys.argv[1:]) == 0
-side = ("clpt.mie", "clpt.lenses.tracing", "clpt.images.tev", "clpt.cli.plots", "clpt.view")
+side = ("clpt.mie", "clpt.images.tev", "clpt.cli.plots", "clpt.view")
 side += ("clpt.cluster", "clpt.bench", "clpt.testing", "matplotlib", "scipy", "trimesh")
 side += ("dask", "IPython")
 assert "clpt.render.renderer" in sys.modules and not {*side} & sys.modules.keys()

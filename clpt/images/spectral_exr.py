@@ -126,9 +126,11 @@ def is_spectral(path: str | Path) -> bool:
 def read(path: str | Path, *, emissive: bool | None = None) -> SpectralImage:
     """Read a spectral EXR file.
 
-    emissive: True for light, False for reflectances, where a file holds both; None: light if any.
-    Polarisation (S1 to S3) is left out with a warning. Raises SceneError for other files, and for a
-    file that lacks the part, or holds a wavelength twice, or fluorescence.
+    path: of the file. emissive: True for light, False for reflectances, where a file holds both;
+    None: light if any. Polarisation (S1 to S3) is left out with a warning.
+
+    Raises SceneError for other files, and for a file that lacks the part, or holds a wavelength
+    twice, or fluorescence.
     """
     path = Path(path)
     header, channels = _contents(path)

@@ -23,22 +23,19 @@
 #define passage_mix(a, b, w) ((a) + (w) * ((b) - (a)))
 #endif
 
-/* The transmittance of a surface whose material may be a mixture; below: of the parts of mixtures. Functions cannot
- * call themselves, so there is a function for each level of nesting. */
-#define NULL_TRANSMITTANCE(name, below)                                                                                \
-    inline Passage name(Scene scene, integer word, TexturePoint point, Wavelengths lambdas, real c)                    \
-    {                                                                                                                  \
-        Passage value = below(scene, word, point, lambdas, c);                                                         \
-        mask m = MATERIAL_KIND(word) == MATERIAL_MIXTURE;                                                              \
-        if (any(m)) {                                                                                                  \
-            integer row = sel_i(m, MATERIAL_ROW(word), (integer)(0));                                                  \
-            real w = mixture_weight(scene, row, point, lambdas);                                                       \
-            Passage first = below(scene, gather_i(scene.mixtures, row + 2), point, lambdas, c);                        \
-            Passage second = below(scene, gather_i(scene.mixtures, row + 3), point, lambdas, c);                       \
-            value = passage_sel(m, passage_mix(first, second, w), value);                                              \
-        }                                                                                                              \
-        return value;                                                                                                  \
-    }
+/* The body of the transmittance of a surface whose material may be a mixture; below: that of the parts of mixtures.
+ * Functions cannot call themselves, so there is a function for each level of nesting. */
+#define MIXTURE_TRANSMITTANCE(below)                                                                                  \
+    Passage value = below(scene, word, point, lambdas, c);                                                            \
+    mask m = MATERIAL_KIND(word) == MATERIAL_MIXTURE;                                                                 \
+    if (any(m)) {                                                                                                     \
+        integer row = sel_i(m, MATERIAL_ROW(word), (integer)(0));                                                     \
+        real w = mixture_weight(scene, row, point, lambdas);                                                          \
+        Passage first = below(scene, gather_i(scene.mixtures, row + 2), point, lambdas, c);                           \
+        Passage second = below(scene, gather_i(scene.mixtures, row + 3), point, lambdas, c);                          \
+        value = passage_sel(m, passage_mix(first, second, w), value);                                                 \
+    }                                                                                                                 \
+    return value;
 
 /* Step opaque: 0 or 1, in scenes where every surface blocks light. */
 inline real trace_transmittance(TRACE_ARGS, Scene scene, vec3 o, vec3 d, real t, Wavelengths lambdas, mask active)

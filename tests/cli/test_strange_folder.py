@@ -70,6 +70,7 @@ def run(folder: Path, *words: str, module: bool = False) -> None:
 def test_commands_that_end(folder: Path) -> None:
     """Each of them, with a small job; the first makes what the others read."""
     run(folder, *RENDER, "out/a.film", "-o", "out/a.exr", "-o", "out/a.png")
+    (folder / "out/points.csv").write_text("0, 0, 0\n", "utf-8")
     ended = set()
     for words in (
         ("merge", "out/a.film", "-o", "out/b.exr"),
@@ -77,6 +78,7 @@ def test_commands_that_end(folder: Path) -> None:
         ("devices",),
         ("scenes",),
         ("info", "scene"),
+        ("measure", "scene", "--at", "out/points.csv", "--samples", "16", "-o", "out/lux.csv"),
         ("inspect", "out/a.exr", "--json"),
         ("convert", "out/a.exr", "out/c.png"),
         ("compare", "out/a.film", "out/a.exr", "-o", "out/d.png"),

@@ -20,7 +20,7 @@ from clpt.device import (
     build,
     build_all,
     building,
-    context,
+    choosing,
     disk_cache,
     link,
     native_programs,
@@ -233,7 +233,7 @@ def test_remarks_of_a_driver_are_no_warnings(device, cache_folder, monkeypatch, 
         before = list(warnings.filters)
         with pytest.raises(Warning, match="Non-empty compiler output"):  # what PyOpenCL does
             Remarking(device.context, TEXT).build(b"", [device.info.cl_device])
-        assert context.trial(device.info) is None
+        assert choosing.trial(device.info) is None
         opened = Device.open(device.info)
         build_all(opened, {name: source(TEXT + f"/* {name} */") for name in "abc"})
         link(opened, {"main": source()}, "main", build(opened, source()).signatures)
@@ -273,7 +273,7 @@ def test_few_registers_are_tried_where_a_driver_tells(
     monkeypatch.setattr(native_programs, "log_of", log_of)
     limited = dataclasses.replace(source(), registers=(96, 128, 160))
     assert building._natively(device, limited, []) and not limits.popitem()[1]
-    monkeypatch.setattr(context.DeviceInfo, "limits_registers", True)
+    monkeypatch.setattr(choosing.DeviceInfo, "limits_registers", True)
     program = building._natively(device, limited, [])
     assert limits[program.int_ptr] == kept and 160 not in limits.values()
     limits.clear()

@@ -181,7 +181,10 @@ def null_transmittance_text(features: Features) -> str:
     first = Function(f"{of} null_transmittance_0{arguments}", f"passage_of({passes})", cases)
     parts.append(first.text())
     last, name = features.materials.mixtures, "null_transmittance"
-    parts += [f"NULL_TRANSMITTANCE({name}_{i + 1}, {name}_{i})\n" for i in range(last)]
+    parts += [
+        f"{of} {name}_{i + 1}{arguments}\n{{\n    MIXTURE_TRANSMITTANCE({name}_{i})\n}}\n"
+        for i in range(last)
+    ]
     return "".join([*parts, f"#define {name} {name}_{last}\n"])
 
 

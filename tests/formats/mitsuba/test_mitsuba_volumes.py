@@ -9,7 +9,7 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
-from clpt.formats.volumes import vol
+from clpt.formats.volumes import VOL_HEADER
 from clpt.scene import media
 from clpt.scene.volumes import resampled
 from clpt.spectra import RGB, Constant
@@ -49,7 +49,7 @@ def write_grid(path: Path, values: np.ndarray) -> None:
     """A .vol of an array (nx, ny, nz) or (nx, ny, nz, channels)."""
     given = np.asarray(values, "<f4").reshape(*values.shape[:3], -1)
     *size, channels = given.shape
-    header = vol.HEADER.pack(b"VOL", 3, 1, *size, channels, 0, 0, 0, 1, 1, 1)
+    header = VOL_HEADER.pack(b"VOL", 3, 1, *size, channels, 0, 0, 0, 1, 1, 1)
     path.write_bytes(header + np.ascontiguousarray(given.transpose(2, 1, 0, 3)).tobytes())
 
 

@@ -20,6 +20,7 @@ GLASS: dict[str, m.Material] = {
     "dielectric": m.Dielectric(int_ior=1.3, ext_ior=1.0),
     "rough_dielectric": m.RoughDielectric(int_ior=1.3, ext_ior=1.0, alpha_u=0.2, alpha_v=0.2),
     "gltf_surface": m.GltfSurface(transmission=1.0, roughness=0.2, ior=1.3),
+    "openpbr": m.Openpbr(transmission_weight=1.0, specular_roughness=0.3, specular_ior=1.3),
 }
 WAYS: dict[str, integrators.Integrator] = {
     "path": integrators.Path(light_paths=0),

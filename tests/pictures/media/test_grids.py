@@ -17,7 +17,7 @@ import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.formats.volumes import vol
+from clpt.formats.volumes import VOL_HEADER
 from clpt.render.media import grids
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic, Perspective
@@ -295,7 +295,7 @@ def test_against_mitsuba(tmp_path: Path, mode: str) -> None:
     pytest.importorskip("mitsuba")
     from tests.pictures.peers.test_mitsuba import compare
 
-    header = vol.HEADER.pack(b"VOL", 3, 1, *RANDOM.shape, 1, 0, 0, 0, 1, 1, 1)
+    header = VOL_HEADER.pack(b"VOL", 3, 1, *RANDOM.shape, 1, 0, 0, 0, 1, 1, 1)
     values = np.ascontiguousarray(RANDOM.transpose(2, 1, 0), "<f4").tobytes()
     (tmp_path / "density.vol").write_bytes(header + values)
     path = tmp_path / "scene.xml"
