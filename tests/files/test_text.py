@@ -8,7 +8,7 @@ from clpt import spectra
 from clpt.errors import SceneError
 from clpt.files import text
 from clpt.formats import load
-from clpt.formats.luminaires import read_ies as read_ies
+from clpt.formats.ies import read as read_ies
 from clpt.formats.meshes.spheres_curves import read_strands
 
 WORD = "größe 1\n"

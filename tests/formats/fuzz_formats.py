@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from clpt import images, lenses, measured, spectra
-from clpt.formats import load, luminaires, volumes
+from clpt.formats import ies, load, volumes
 from clpt.formats.meshes import mesh, mtl, spheres_curves
 from clpt.formats.mitsuba.serialized import read as read_serialized
 from clpt.images import read_stored
@@ -597,8 +597,8 @@ FORMATS: dict[str, Format] = {
     "csv": Format(".csv", lambda: [CSV], words, spectra.read_refractive_index),
     "spd": Format(".spd", lambda: [SPD], words, spectra.read_table),
     "sensor": Format(".csv", lambda: [SENSOR], words, spectra.read_sensor),
-    "ies": Format(".ies", lambda: [IES], words, luminaires.read_ies),
-    "eulumdat": Format(".ldt", lambda: [LDT], words, luminaires.read_eulumdat),
+    "ies": Format(".ies", lambda: [IES], words, ies.read),
+    "eulumdat": Format(".ldt", lambda: [LDT], words, ies.read_eulumdat),
     "lens dat": Format(".dat", lambda: [ROWS], words, lenses.read),
     "lens zmx": Format(".zmx", lambda: [ZMX], words, lenses.read),
     "lens txt": Format(

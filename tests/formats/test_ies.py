@@ -11,7 +11,7 @@ import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.errors import SceneError
-from clpt.formats import luminaires
+from clpt.formats import ies
 
 VERTICAL = np.arange(0.0, 91.0, 5.0)
 
@@ -45,18 +45,18 @@ def written(tmp_path: Path):
 
 
 def test_table_and_its_mirrors(written):
-    whole = luminaires.read_ies(written(lamp((0, 90, 180, 270, 360))))
+    whole = ies.read(written(lamp((0, 90, 180, 270, 360))))
     assert whole.intensity(0.0, 45.0) == pytest.approx(245.0)
     assert whole.intensity(60.0, 270.0) == pytest.approx(235.0, rel=1e-5)
     assert whole.intensity(120.0, 0.0) == 0.0
-    half = luminaires.read_ies(written(lamp((0, 90, 180))))
+    half = ies.read(written(lamp((0, 90, 180))))
     assert half.intensity(0.0, 270.0) == pytest.approx(290.0)
-    quarter = luminaires.read_ies(written(lamp((0, 45, 90))))
+    quarter = ies.read(written(lamp((0, 45, 90))))
     np.testing.assert_allclose(quarter.intensity(0.0, [45, 135, 225, 315]), 245.0)
-    other = luminaires.read_ies(written(lamp((90, 180, 270))))
+    other = ies.read(written(lamp((90, 180, 270))))
     np.testing.assert_allclose(other.intensity(0.0, [0, 180, 45, 315]), [380, 380, 335, 425])
     tilted = lamp().replace("TILT=NONE", "TILT=INCLUDE\n1\n3\n0 90 180\n1 1 1")
-    assert luminaires.read_ies(written(tilted)).intensity(0.0, 7.0) == pytest.approx(200.0)
+    assert ies.read(written(tilted)).intensity(0.0, 7.0) == pytest.approx(200.0)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_table_and_its_mirrors(written):
 )
 def test_the_ballast_lamp_factor_is_of_old_editions(written, head, counts):
     text = lamp(head=head).replace("0.5 1 40", "0.5 0.9 40")
-    assert luminaires.read_ies(written(text)).intensity(0.0, 0.0) == pytest.approx(
+    assert ies.read(written(text)).intensity(0.0, 0.0) == pytest.approx(
         200.0 * (0.9 if counts else 1.0)
     )
 
@@ -80,14 +80,14 @@ def test_the_ballast_lamp_factor_is_of_old_editions(written, head, counts):
 def test_angles_around_without_360(written, step):
     """Even steps that end one before 360 go around; others say what is missing."""
     angles = tuple(range(0, 360, step))
-    found = luminaires.read_ies(written(lamp(angles)))
+    found = ies.read(written(lamp(angles)))
     assert found.horizontal[-1] == 360.0
     last = 200.0 + angles[-1]
     assert found.intensity(0.0, angles[-1]) == pytest.approx(last)
     assert found.intensity(0.0, 360 - step / 2) == pytest.approx((last + 200.0) / 2.0)
     for wrong in ((0, 90, 200, 270), (0, 90, 180, 260), (10, 100, 190, 280)):
         with pytest.raises(SceneError, match="horizontal angles go from"):
-            luminaires.read_ies(written(lamp(wrong)))
+            ies.read(written(lamp(wrong)))
 
 
 def test_a_floor_below_a_lamp(written, tmp_path):
@@ -108,7 +108,7 @@ def test_a_floor_below_a_lamp(written, tmp_path):
     x, y = np.meshgrid(edges * np.sign(scene.camera.to_world[0, 0]), edges)
     cos = 2.0 / np.sqrt(x * x + y * y + 4.0)
     around = np.degrees(np.arctan2(x, -y))  # the file's 0 lies at -y, 90 at +x
-    candela = luminaires.read_ies(path).intensity(np.degrees(np.arccos(cos)), around)
+    candela = ies.read(path).intensity(np.degrees(np.arccos(cos)), around)
     expected = 0.5 / np.pi * candela * cos / (x * x + y * y + 4.0) / spectra.UNIT_LUMINANCE
     away = np.abs(around) > 20.0  # where 360 meets 0 the file jumps
     np.testing.assert_allclose(picture[away], expected[away], rtol=0.02)
@@ -141,7 +141,7 @@ def test_a_floor_below_a_lamp(written, tmp_path):
 )
 def test_refused(written, text, message):
     with pytest.raises(SceneError, match=message):
-        luminaires.read_ies(written(text))
+        ies.read(written(text))
 
 
 def ldt(symmetry: int, planes: tuple[float, ...], rows: np.ndarray, **more: object) -> str:
@@ -174,7 +174,7 @@ def test_eulumdat_of_each_symmetry(tmp_path, symmetry, measured):
     path = tmp_path / "lamp.ldt"
     path.write_text(ldt(symmetry, planes, rows))
     at = np.arange(0.0, 361.0, 45.0)[:, None]
-    found = luminaires.read_eulumdat(path).intensity(VERTICAL, at)
+    found = ies.read_eulumdat(path).intensity(VERTICAL, at)
     np.testing.assert_allclose(found, formula(VERTICAL, at), rtol=1e-5, atol=1e-3)
 
 
@@ -196,4 +196,4 @@ def test_eulumdat_refused(tmp_path, text, message):
     path = tmp_path / "lamp.ldt"
     path.write_text(text)
     with pytest.raises(SceneError, match=message):
-        luminaires.read_eulumdat(path)
+        ies.read_eulumdat(path)

@@ -11,7 +11,7 @@ import numpy as np
 
 from clpt import images, transforms
 from clpt.errors import SceneError
-from clpt.formats import luminaires
+from clpt.formats import ies
 from clpt.formats.mitsuba.limits import within
 from clpt.formats.mitsuba.media import around
 from clpt.formats.mitsuba.properties import Context, PluginReader, Properties, unknown
@@ -175,7 +175,7 @@ def _ies(props: Properties) -> Parameters:
     if scale < 0.0:
         raise props.element.error("'scale' cannot be negative")
     try:
-        lamp = luminaires.parameters(path)
+        lamp = ies.parameters(path)
     except SceneError as error:
         line = f":{error.line}" if error.line else ""
         raise props.element.error(f"{path.name}{line}: {error.message}") from None

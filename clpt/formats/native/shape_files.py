@@ -12,7 +12,7 @@ import numpy as np
 
 from clpt.choices import Missing
 from clpt.files import budget, numpy_files
-from clpt.formats import luminaires
+from clpt.formats import ies
 from clpt.formats.meshes import mesh, spheres_curves
 from clpt.formats.meshes.triangles import TANGENTS
 from clpt.formats.native.cursor import Cursor
@@ -74,8 +74,8 @@ FILES: dict[type[Kind], ShapeFile] = {
         "name of an .ies or .ldt file",
         "candela by direction, in place of `image`",
         ("image",),
-        luminaires.parameters,
-        luminaires.joined,
+        ies.parameters,
+        ies.joined,
     ),
 }
 

@@ -18,7 +18,7 @@ from clpt import transforms
 from clpt.arrays import Floats, Floats32, Matrix
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.formats import luminaires
+from clpt.formats import ies
 from clpt.formats.usd import packages, textures
 from clpt.formats.usd.document import Document
 from clpt.scene.lights import Area, Constant, Directional, Envmap, Goniometric, Light, Point, Spot
@@ -280,7 +280,7 @@ def _point(document: Document, prim: Usd.Prim, placement: Matrix, rgb: Floats) -
             edge="smooth",
         )
     # Directions as in the image of a goniometric light, counted from -z of the light.
-    off_axis = np.pi * (1.0 - (np.arange(luminaires.ROWS) + 0.5) / luminaires.ROWS)[:, None]
+    off_axis = np.pi * (1.0 - (np.arange(ies.ROWS) + 0.5) / ies.ROWS)[:, None]
     smooth = np.clip(
         (np.degrees(off_axis) / angle - 1.0 + softness) / max(softness, 1e-6), 0.0, 1.0
     )
@@ -300,11 +300,11 @@ def _profile(document: Document, prim: Usd.Prim) -> Floats | None:
     if not isinstance(asset, Sdf.AssetPath) or not asset.path:
         return None
     try:
-        lamp = luminaires.read_ies(packages.file_of(document, asset))
+        lamp = ies.read(packages.file_of(document, asset))
     except SceneError as error:
         document.warn(f"profile {asset.path!r} is left out: {error.message}", prim.GetPath())
         return None
-    candela = np.asarray(luminaires.directional_image(lamp)["image"].image, np.float64)
+    candela = np.asarray(ies.directional_image(lamp)["image"].image, np.float64)
     scale = document.number(prim, SHAPED + "ies:angleScale", 0.0)
     if scale != 0.0:
         theta = 180.0 * (1.0 - (np.arange(len(candela)) + 0.5) / len(candela))

@@ -72,7 +72,7 @@ class Photometry:
         return np.where(measured, first * (1.0 - x) + second * x, 0.0)
 
 
-def read_ies(path: Path) -> Photometry:
+def read(path: Path) -> Photometry:
     """Read an IES file. Raises SceneError with the line that is broken or not supported."""
     return _IesReader(path).photometry()
 
@@ -318,8 +318,8 @@ def parameters(path: Path) -> dict[str, Any]:
 
     Raises SceneError with the broken line.
     """
-    read = read_eulumdat if path.suffix.lower() == EULUMDAT else read_ies
-    return directional_image(read(path))
+    reader = read_eulumdat if path.suffix.lower() == EULUMDAT else read
+    return directional_image(reader(path))
 
 
 def joined(lamp: Goniometric, file: dict[str, Any]) -> Goniometric:
