@@ -38,9 +38,9 @@ def own_codes(view, colours):
 
 
 def test_the_default_is_the_configs_own(aces):
-    assert aces.display == "sRGB - Display" and aces.name.startswith("ACES 2.0 - SDR")
+    assert aces.display == "sRGB - Display" and aces.name.startswith("ACES ")
     assert aces.name in views.views()[aces.display]
-    assert "ACES 2.0" in repr(aces)
+    assert "ACES " in repr(aces)
 
 
 @pytest.mark.parametrize("name", [None, PLAIN])
@@ -97,7 +97,7 @@ def test_a_config_in_a_file(tmp_path, aces):
 
 
 def test_what_is_wrong_is_told(tmp_path, monkeypatch):
-    with pytest.raises(UnknownKindError, match=r"view of 'sRGB - Display' 'ACES'.*ACES 2.0"):
+    with pytest.raises(UnknownKindError, match=r"view of 'sRGB - Display' 'ACES'.*ACES [12].0"):
         View("ACES")
     with pytest.raises(UnknownKindError, match=r"display 'sRGB'.*sRGB - Display"):
         View(display="sRGB")
