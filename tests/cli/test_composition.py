@@ -186,9 +186,10 @@ def test_any_text_is_a_value_or_is_refused(text):
         except click.BadParameter as error:
             assert error.format_message()
             continue
-        if isinstance(made, tuple):
-            assert math.isfinite(made.azimuth) and abs(made.elevation) <= 90.0
-        elif isinstance(made, tuple):
+        if isinstance(kind, CameraType):
+            azimuth, elevation, _ = made if isinstance(made, tuple) else (0.0, 0.0, 1.0)
+            assert math.isfinite(azimuth) and abs(elevation) <= 90.0
+        else:
             try:
                 first, count = made[0].of(100)
             except click.BadParameter:
