@@ -102,6 +102,21 @@ def single(values: ArrayLike) -> NDArray[np.float32]:
         return np.asarray(values, np.float32)
 
 
+def vectors(values: ArrayLike, where: str) -> Floats:
+    """Return rows (..., 3) of finite numbers, in two axes at least. Raises SceneError."""
+    try:
+        rows = np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        rows = np.zeros(0)
+    if rows.ndim < 2 or rows.shape[-1] != 3 or rows.size == 0:
+        message = f"must be rows of x, y and z, (n, 3), not of shape {rows.shape}"
+        raise SceneError(message, where=where)
+    bad = np.flatnonzero(~np.isfinite(rows.reshape(-1, 3)).all(axis=1))
+    if bad.size:
+        raise SceneError(f"row {bad[0]} is not finite", where=where)
+    return rows
+
+
 def fits_single(values: ArrayLike) -> bool:
     """Return whether values are finite as float32 too."""
     return bool(np.isfinite(single(values)).all())

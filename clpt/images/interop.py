@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from clpt.arrays import Matrix
+from clpt.arrays import Floats, Matrix
+from clpt.images.transfer import decoded
 from clpt.spectra import spaces
 
 ADOBE_RGB = (0.64, 0.33, 0.21, 0.71, 0.15, 0.06, 0.3127, 0.329)  # red, green, blue, D65: x, y
@@ -28,6 +29,11 @@ class Encoding:
     encoded: bool
     gamma: float | None
     matrix: Matrix | None
+
+    def linear(self, colours: Floats) -> Floats:
+        """Return colours (..., 3) float64 as linear Rec. 709."""
+        light = decoded(colours, self.gamma) if self.encoded else colours
+        return light if self.matrix is None else light @ self.matrix.T
 
 
 def encoding(name: str) -> Encoding | None:

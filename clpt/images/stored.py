@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats32, Matrix, on_host, single
 from clpt.errors import SceneError
-from clpt.images.transfer import srgb_to_linear
+from clpt.images.transfer import decoded, srgb_to_linear
 
 BLOCK = 1 << 22  # values that are decoded at once, so that what is between takes no memory
 CHANNELS = (1, 3, 4)
@@ -96,8 +97,7 @@ class Stored:
     def _curve(self) -> Callable[[Floats32], Floats32]:
         if self.gamma is None:
             return srgb_to_linear
-        power = np.float32(1.0 / self.gamma)
-        return lambda values: np.maximum(values, np.float32(0.0)) ** power
+        return partial(decoded, gamma=self.gamma)
 
 
 _SCALE = np.arange(256, dtype=np.float32) / np.float32(255.0)

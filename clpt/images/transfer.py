@@ -19,17 +19,20 @@ HEX = r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})"
 
 def srgb_to_linear(x: Floats32) -> Floats32:
     """The sRGB transfer decoded (IEC 61966-2-1)."""
-    return _srgb_decoded(x).astype(np.float32)
+    return decoded(x).astype(np.float32)
 
 
-def _srgb_decoded(x: NDArray[Any]) -> NDArray[Any]:
+def decoded(x: NDArray[Any], gamma: float | None = None) -> NDArray[Any]:
+    """Return light of values that are light to the power of `gamma`; None: of the sRGB transfer."""
+    if gamma is not None:
+        return np.maximum(x, x.dtype.type(0.0)) ** x.dtype.type(1.0 / gamma)
     return np.where(x <= 0.04045, x / 12.92, ((np.maximum(x, 0) + 0.055) / 1.055) ** 2.4)
 
 
 @cache
 def srgb8_steps() -> Floats32:
     """The least linear value of each 8-bit sRGB code, then infinity: (257,) float32, rising."""
-    exact = _srgb_decoded((np.arange(255) + 0.5) / 255.0)
+    exact = decoded((np.arange(255) + 0.5) / 255.0)
     steps = exact.astype(np.float32)
     steps = np.where(steps < exact, np.nextafter(steps, np.float32(1.0)), steps)
     return np.concatenate([[-np.inf], steps, [np.inf]]).astype(np.float32)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clpt import device as dev
-from clpt.arrays import Floats, Image
+from clpt.arrays import Floats, Image, vectors
 from clpt.errors import SceneError, UnknownKindError
 from clpt.instruments.quantities import QUANTITIES, Quantity
 from clpt.render.options import check_scene
@@ -26,6 +26,7 @@ from clpt.scene import Scene, shapes
 from clpt.scene.cameras import Rays
 from clpt.scene.integrators import Box, Film
 from clpt.scene.materials import Diffuse
+from clpt.scene.motion import rotation
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -90,8 +91,8 @@ def measure(
         raise UnknownKindError("quantity", quantity, QUANTITIES)
     if error is not None and not error > 0.0:
         raise SceneError(f"must be above 0, not {error!r}", where="error")
-    points = _rows(at, "at")
-    toward = np.broadcast_to(_rows(directions, "directions"), points.shape)
+    points = vectors(np.atleast_2d(at), "at")
+    toward = np.broadcast_to(vectors(np.atleast_2d(directions), "directions"), points.shape)
     rows = points.reshape(-1, 3), toward.reshape(-1, 3)
     instrument = photometer(scene, QUANTITIES[quantity], *rows, bands=bands)
     with Renderer(instrument, device, **options) as renderer:
@@ -218,21 +219,5 @@ def _balls(points: Floats, lift: float, seed: int) -> tuple[Rays, shapes.Shape]:
 def _random_frames(count: int, seed: int) -> Floats:
     """Return rotations (count, 3, 3), even over all (Shoemake 1992)."""
     q = np.random.default_rng(seed).normal(size=(count, 4))
-    w, x, y, z = (q / np.linalg.norm(q, axis=1, keepdims=True)).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
-
-
-def _rows(values: ArrayLike, where: str) -> Floats:
-    """Return rows (..., 3) of finite numbers. Raises SceneError."""
-    rows = np.atleast_2d(np.asarray(values, np.float64))
-    if rows.shape[-1] != 3 or rows.size == 0:
-        raise SceneError(f"must be rows of x, y and z, not of shape {rows.shape}", where=where)
-    bad = np.flatnonzero(~np.isfinite(rows.reshape(-1, 3)).all(axis=1))
-    if bad.size:
-        raise SceneError(f"row {bad[0]} is not finite", where=where)
-    return rows
+    unit = q / np.linalg.norm(q, axis=1, keepdims=True)
+    return np.moveaxis(rotation(np.roll(unit, -1, axis=1).T), -1, 0)

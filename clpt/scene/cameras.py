@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import lenses, spectra, transforms
-from clpt.arrays import fits_single
+from clpt.arrays import fits_single, vectors
 from clpt.errors import SceneError
 from clpt.lenses import Prescription
 from clpt.lenses.tracing import MARGIN, FocusedLens, focused_lens
@@ -521,33 +521,21 @@ class Rays(Camera):
     directions: ArrayLike = host(((0.0, 0.0, 1.0),), "(n, 3), or a row for all", form="rows3")
     weights: ArrayLike = host(1.0, "(n,) factors, or one for all", form="number_or_list")
 
-    def _rows(self, name: str, values: ArrayLike) -> NDArray[np.float64]:
-        """Return rows (n, 3) of finite numbers. Raises SceneError."""
-        where = f"rays.{name}"
-        try:
-            rows = np.asarray(values, np.float64)
-        except (TypeError, ValueError):
-            rows = np.zeros(0)
-        if rows.ndim < 2 or rows.shape[-1] != 3 or rows.size == 0:
-            raise SceneError("must be rows of x, y and z, (n, 3)", where=where)
-        rows = rows.reshape(-1, 3)
-        bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-        if bad.size:
-            raise SceneError(f"row {bad[0]} is not finite: {rows[bad[0]]}", where=where)
-        return rows
+    def _origins(self) -> NDArray[np.float64]:
+        return vectors(self.origins, "rays.origins").reshape(-1, 3)
 
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
         """Return the film's size and the count of rays."""
-        return {"columns": width, "rows": height, "count": len(self._rows("origins", self.origins))}
+        return {"columns": width, "rows": height, "count": len(self._origins())}
 
     def record_tables(self) -> dict[str, NDArray[np.float32]]:
         """Return rows of origin, unit direction and weight in the world. Raises SceneError."""
-        matrix, origins = self.affine_matrix(), self._rows("origins", self.origins)
-        directions = self._rows("directions", self.directions)
+        matrix, origins = self.affine_matrix(), self._origins()
+        directions = vectors(self.directions, "rays.directions").reshape(-1, 3)
         if len(directions) not in (1, len(origins)):
             message = f"{len(directions)} rows for {len(origins)} origins"
             raise SceneError(message, where="rays.directions")
-        directions = directions @ matrix[:3, :3].T
+        directions = transforms.transform_vectors(matrix, directions)
         lengths = np.linalg.norm(directions, axis=1, keepdims=True)
         if not lengths.all():
             raise SceneError(f"row {np.argmin(lengths)} is 0, 0, 0", where="rays.directions")
@@ -561,7 +549,7 @@ class Rays(Camera):
 
     def view_point(self, width: int, height: int) -> NDArray[np.float64]:
         """Return the mean origin (3,) [m]."""
-        mean = self._rows("origins", self.origins).mean(axis=0)
+        mean = self._origins().mean(axis=0)
         return np.asarray(transforms.transform_points(self.affine_matrix(), mean), np.float64)
 
 

@@ -275,7 +275,7 @@ def quaternion(r: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def rotation(q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the rotation matrix (3, 3) of a unit quaternion (x, y, z, w)."""
+    """Return the rotation matrix (3, 3, ...) of unit quaternions (4, ...): x, y, z, w."""
     x, y, z, w = q
     return np.array(
         [

@@ -109,6 +109,19 @@ inline RefractingFacet refracting_facet(vec3 wo, vec3 wi, real eta)
     return p;
 }
 
+/* wi as facets see it: what goes straight through a thin sheet is mirrored in it. */
+inline vec3 sheet_seen(mask thin, vec3 wo, vec3 wi)
+{
+    return v3(wi.x, wi.y, sel(thin & (wo.z * wi.z < 0.0f), -wi.z, wi.z));
+}
+/* The facet that sends light from wi to wo, by reflection, or by transmission at an index; thin: of a sheet. */
+inline RefractingFacet sheet_facet(mask thin, int transmits, vec3 wo, vec3 wi, real index)
+{
+    real eta = 1.0f;
+    if (transmits) eta = sel(!thin & (wo.z * wi.z < 0.0f), sel(wo.z > 0.0f, index, 1.0f / index), eta);
+    return refracting_facet(wo, sheet_seen(thin, wo, wi), eta);
+}
+
 /* f |cos| of radiance that crosses a boundary with nothing lost but by Fresnel's reflection; index: of
  * the inside over the outside. */
 inline real refracting_facet_transmitted(Microfacets d, vec3 wo, vec3 wi, real index)

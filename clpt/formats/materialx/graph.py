@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from clpt import images
 from clpt.arrays import Floats
+from clpt.images.interop import Encoding
 from clpt.scene.textures import Bitmap
 from clpt.scene.values import Texture
 
@@ -302,19 +303,10 @@ def from_space(value: Floats, space: str) -> Floats:
     """Return colors (..., 3 or 4) of a color space as linear Rec. 709."""
     if value.shape[-1] < 3 or space in LINEAR:
         return value
-    curve, matrix = SPACES.get(space, (None, None))
-    colors = value[..., :3] if curve is None else curve(value[..., :3])
-    colors = colors if matrix is None else colors @ matrix.T
-    return np.concatenate([colors, value[..., 3:]], axis=-1)
-
-
-def _curved(gamma: float) -> Callable[[Floats], Floats]:
-    return lambda values: np.maximum(values, 0.0) ** gamma
-
-
-def _srgb(values: Floats) -> Floats:
-    low = values / 12.92
-    return np.where(values <= 0.04045, low, ((np.maximum(values, 0.0) + 0.055) / 1.055) ** 2.4)
+    encoding = SPACES.get(space)
+    if encoding is None:
+        return value
+    return np.concatenate([encoding.linear(value[..., :3]), value[..., 3:]], axis=-1)
 
 
 LINEAR = ("", "raw", "none", "lin_rec709", "lin_rec709_scene", "auto")
@@ -328,13 +320,15 @@ P3 = np.array([
 ADOBE = np.array([
     [1.39836, -0.39836, 0.0], [0.0, 1.0, 0.0], [0.0, -0.04293, 1.04293],
 ])  # fmt: skip
-SPACES: dict[str, tuple[Callable[[Floats], Floats] | None, Floats | None]] = {
-    "srgb_texture": (_srgb, None), "srgb_rec709_scene": (_srgb, None), "sRGB": (_srgb, None),
-    "g22_rec709": (_curved(2.2), None), "g18_rec709": (_curved(1.8), None),
-    "g22_rec709_scene": (_curved(2.2), None), "rec709_display": (_curved(2.4), None),
-    "acescg": (None, AP1), "lin_ap1": (None, AP1), "lin_ap1_scene": (None, AP1),
-    "g22_ap1": (_curved(2.2), AP1), "lin_displayp3": (None, P3), "srgb_displayp3": (_srgb, P3),
-    "lin_adobergb": (None, ADOBE), "adobergb": (_curved(563.0 / 256.0), ADOBE),
+SRGB = Encoding(True, None, None)
+SPACES = {
+    **dict.fromkeys(("srgb_texture", "srgb_rec709_scene", "sRGB"), SRGB),
+    **dict.fromkeys(("g22_rec709", "g22_rec709_scene"), Encoding(True, 1 / 2.2, None)),
+    "g18_rec709": Encoding(True, 1 / 1.8, None), "rec709_display": Encoding(True, 1 / 2.4, None),
+    **dict.fromkeys(("acescg", "lin_ap1", "lin_ap1_scene"), Encoding(False, None, AP1)),
+    "g22_ap1": Encoding(True, 1 / 2.2, AP1), "lin_displayp3": Encoding(False, None, P3),
+    "srgb_displayp3": Encoding(True, None, P3), "lin_adobergb": Encoding(False, None, ADOBE),
+    "adobergb": Encoding(True, 256.0 / 563.0, ADOBE),
 }  # fmt: skip
 
 
@@ -342,7 +336,7 @@ def bitmap_of(stored: images.Stored, space: str) -> dict[str, Any]:
     """Return `image` and `raw` of a bitmap whose file is in a color space."""
     if space in LINEAR:
         return {"image": stored.values, "raw": True}
-    if SPACES.get(space) == (_srgb, None) and stored.values.dtype == np.uint8:
+    if SPACES.get(space) is SRGB and stored.values.dtype == np.uint8:
         return {"image": stored.values, "raw": False}
     return {"image": pixels_of(stored, space), "raw": True}
 

@@ -91,19 +91,6 @@ inline GltfParts gltf_parts(GltfSurface m)
     return p;
 }
 
-/* wi as the facets see it: what goes straight through is mirrored in a thin sheet. */
-inline vec3 gltf_seen(GltfSurface m, vec3 wo, vec3 wi)
-{
-    return v3(wi.x, wi.y, sel((m.thin != 0) & (wo.z * wi.z < 0.0f), -wi.z, wi.z));
-}
-/* The facet that sends light from wi to wo, by reflection, or by transmission at an index. */
-inline RefractingFacet gltf_facet(GltfSurface m, vec3 wo, vec3 wi, real index)
-{
-    real eta = 1.0f;
-    if (USES_GLTF_SURFACE_TRANSMISSION)
-        eta = sel((m.thin == 0) & (wo.z * wi.z < 0.0f), sel(wo.z > 0.0f, index, 1.0f / index), eta);
-    return refracting_facet(wo, gltf_seen(m, wo, wi), eta);
-}
 /* The cosine on the thinner side of a facet that is met at signed cosine c, where light is refracted; -1 where
  * all of it is reflected. */
 inline real gltf_cosine(GltfSurface m, real c, real index)
@@ -244,9 +231,9 @@ inline real gltf_reflects(GltfSurface m, GltfParts p, real c)
 inline Spectrum gltf_facets(GltfSurface m, GltfParts p, vec3 wo, vec3 wi, real index)
 {
     mask front = wo.z > 0.0f, crossed = wo.z * wi.z < 0.0f;
-    RefractingFacet h = gltf_facet(m, wo, wi, index);
+    RefractingFacet h = sheet_facet(m.thin != 0, USES_GLTF_SURFACE_TRANSMISSION, wo, wi, index);
     real v = microfacet_visible_pdf(p.facets, wo, h.h) * h.jacobian;
-    v *= microfacet_g1(p.facets, gltf_seen(m, wo, wi), h.h);
+    v *= microfacet_g1(p.facets, sheet_seen(m.thin != 0, wo, wi), h.h);
     Spectrum f0 = p.f0;
     FilmBase film = p.film;
     real f90 = p.f90, c = gltf_cosine(m, h.o, index), share = sel(front, (real)(1.0f), p.passed);
@@ -293,7 +280,8 @@ inline Spectrum gltf_value(GltfSurface m, GltfParts p, vec3 wo, vec3 wi)
     }
     real z_o = sel(m.thin != 0, cos_o, wo.z), z_i = sel(m.thin != 0, cos_i, wi.z);
     mask outside = front & reflected;
-    RefractingFacet h = gltf_facet(m, wo, wi, p.eta.x); /* where it is asked for, by reflection */
+    /* read where light is reflected */
+    RefractingFacet h = sheet_facet(m.thin != 0, USES_GLTF_SURFACE_TRANSMISSION, wo, wi, p.eta.x);
     if (USES_GLTF_SURFACE_SHEEN_COLOR) {
         real most = max_r(gltf_sheen_albedo(m, z_o), gltf_sheen_albedo(m, z_i));
         Spectrum cover = layer_cover(m.sheen_color);
@@ -322,7 +310,7 @@ inline Spectrum gltf_value(GltfSurface m, GltfParts p, vec3 wo, vec3 wi)
 inline real gltf_density(GltfSurface m, GltfParts p, GltfLobes l, vec3 wo, vec3 wi, real index)
 {
     mask reflected = wo.z * wi.z > 0.0f, crossed = wo.z * wi.z < 0.0f;
-    RefractingFacet h = gltf_facet(m, wo, wi, index);
+    RefractingFacet h = sheet_facet(m.thin != 0, USES_GLTF_SURFACE_TRANSMISSION, wo, wi, index);
     real turned = gltf_reflects(m, p, gltf_cosine(m, h.o, index));
     real facets = microfacet_visible_pdf(p.facets, wo, h.h) * sel(crossed, 1.0f - turned, turned) * l.facets;
     if (USES_GLTF_SURFACE_CLEARCOAT) {

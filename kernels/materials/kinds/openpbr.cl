@@ -85,20 +85,6 @@ inline OpenpbrParts openpbr_parts(Openpbr m)
     return p;
 }
 
-/* wi as the facets see it: what goes straight through is mirrored in a thin sheet. */
-inline vec3 openpbr_seen(Openpbr m, vec3 wo, vec3 wi)
-{
-    return v3(wi.x, wi.y, sel((m.thin_walled != 0) & (wo.z * wi.z < 0.0f), -wi.z, wi.z));
-}
-/* The facet that sends light from wi to wo, by reflection, or by transmission at an index. */
-inline RefractingFacet openpbr_facet(Openpbr m, vec3 wo, vec3 wi, real index)
-{
-    real eta = 1.0f;
-    if (USES_OPENPBR_TRANSMISSION_WEIGHT)
-        eta = sel((m.thin_walled == 0) & (wo.z * wi.z < 0.0f), sel(wo.z > 0.0f, index, 1.0f / index), eta);
-    return refracting_facet(wo, openpbr_seen(m, wo, wi), eta);
-}
-
 /* Where a film covers a share of it, its reflectance, else f. */
 inline Spectrum openpbr_filmed(Openpbr m, Spectrum f, FilmBase base, real c)
 {
@@ -276,9 +262,9 @@ inline real openpbr_reflects(Openpbr m, OpenpbrParts p, real o)
 inline Spectrum openpbr_facets(Openpbr m, OpenpbrParts p, vec3 wo, vec3 wi, real index)
 {
     mask front = wo.z > 0.0f, crossed = wo.z * wi.z < 0.0f;
-    RefractingFacet h = openpbr_facet(m, wo, wi, index);
+    RefractingFacet h = sheet_facet(m.thin_walled != 0, USES_OPENPBR_TRANSMISSION_WEIGHT, wo, wi, index);
     real v = microfacet_visible_pdf(p.facets, wo, h.h) * h.jacobian;
-    v *= microfacet_g1(p.facets, openpbr_seen(m, wo, wi), h.h);
+    v *= microfacet_g1(p.facets, sheet_seen(m.thin_walled != 0, wo, wi), h.h);
     v = sel(h.shading, v, (real)(0.0f));
     Fresnel boundary = fresnel_dielectric(h.o, index);
     real c = sel(front, fabs(h.o), fabs(boundary.cos_t));
@@ -376,7 +362,7 @@ inline Spectrum openpbr_value(Openpbr m, OpenpbrParts p, vec3 wo, vec3 wi)
 inline real openpbr_density(Openpbr m, OpenpbrParts p, OpenpbrLobes l, vec3 wo, vec3 wi, real index)
 {
     mask reflected = wo.z * wi.z > 0.0f, crossed = wo.z * wi.z < 0.0f, front = wo.z > 0.0f;
-    RefractingFacet h = openpbr_facet(m, wo, wi, index);
+    RefractingFacet h = sheet_facet(m.thin_walled != 0, USES_OPENPBR_TRANSMISSION_WEIGHT, wo, wi, index);
     real turned = openpbr_reflects(m, p, h.o);
     real facets = microfacet_visible_pdf(p.facets, wo, h.h) * sel(crossed, 1.0f - turned, turned) * l.facets;
     if (USES_OPENPBR_COAT_WEIGHT)
