@@ -54,8 +54,8 @@ expected    by $witness
 device      $result
 on          $label, $opencl, driver $driver
 
-All files hold words of 32 bits in the host's order. *.margins has a float for each word, by which
-it may differ. A margin m of 0 or more: the words are floats, and may differ by m. Below 0: they are
+All files hold words of 32 bits in the host's order. *.margins has a float for each word: its
+margin. A margin m of 0 or more: the words are floats, and may differ by m. Below 0: they are
 whole numbers, and may differ by -1 - m. Infinite: the word is not compared.
 """)
 

@@ -218,7 +218,7 @@ def size_text(values: np.ndarray) -> str:
 
 
 def film_summary(path: Path) -> dict[str, Any]:
-    """Return what a film file says of itself. Raises SceneError."""
+    """Return the description of a film file. Raises SceneError."""
     from ...render.film import film_file  # here: an image needs no renderer
 
     header = film_file.read_header(path)

@@ -151,7 +151,7 @@ def as_text(pair: Pair) -> str:
 
 
 def write(pair: Pair, path: Path, most: float | None) -> str:
-    """Write the difference, and return what to say. Raises SceneError.
+    """Write the difference, and return a line about it. Raises SceneError.
 
     most: that is the brightest of the false colours.
     """

@@ -60,7 +60,7 @@ CHUNK = 1 << 16  # vertices at a time: each takes a matrix
 
 
 def joint_matrices(skin: Element, to_world: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what takes vertices to the world for each joint, (joints, 4, 4)."""
+    """Return the matrices (joints, 4, 4) from vertices to the world, by joint."""
     joints = skin.indices("joints", "nodes")
     if not joints:
         raise skin.error("has no joints")

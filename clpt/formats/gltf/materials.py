@@ -31,7 +31,7 @@ LEAST_ABBE = 1.0  # of any glass is above 9
 
 
 def surface(element: Element, colours: bool) -> GltfSurface:
-    """Return what a material's surface does; `colours`: times those of the vertices."""
+    """Return the material of a surface; `colours`: times those of the vertices."""
     glossy = element.extension(GLOSSINESS)
     values = _rough(element) if glossy is None else _glossy(glossy)
     if colours:
@@ -291,7 +291,7 @@ def extinction(volume: Element) -> Any:
 
 
 def medium(element: Element | None) -> Homogeneous | None:
-    """Return what scatters light inside of a material's body; None where nothing does.
+    """Return the medium inside of a material's body; None where nothing scatters light.
 
     Raises SceneError for numbers out of range.
     """

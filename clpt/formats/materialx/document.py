@@ -83,7 +83,7 @@ class Element:
         return Element(node, self.outer), found.getOutputString() or "out"
 
     def _outside(self, outer: Node, inside: str) -> tuple[Node, str] | None:
-        """Return what an input of the node is connected to whose graph this stands in."""
+        """Return the node and output outside that a graph's input gets; None for a value."""
         source = outer.source(inside)
         if source is not None or outer.value(inside) is not None:
             return source
