@@ -112,7 +112,7 @@ $(VENV)/.docs: $(VENV)/.run
 	@touch $@
 
 # a device that runs a kernel; else PoCL by apt-get; else Intel's CPU runtime by pip
-WORKS := $(BIN)/python -c 'from clpt.device.context import selection; selection()'
+WORKS := $(BIN)/python -c 'from clpt.device.choosing import selection; selection()'
 $(VENV)/.opencl:
 	@$(WORKS) 2>/dev/null \
 		|| { $(call apt,pocl-opencl-icd) && $(WORKS) 2>/dev/null; } \

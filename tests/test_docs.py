@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import importlib
+import importlib.util
 import json
 import logging
 import re
@@ -43,6 +45,39 @@ def test_every_page_is_in_the_navigation():
     places = re.findall(r": (\S+\.md)$", text[text.index("nav:") : text.index("theme:")], re.M)
     assert len(set(places)) == len(places)
     assert {page.name for page in PAGES} <= set(places)
+
+
+def texts_beside_python() -> Iterator[tuple[str, str]]:
+    """Yield the pages, the Makefile and the settings, which no import checks: names, texts."""
+    patterns = ("*.md", "docs/*.md", "bench/**/*.md", "scenes/**/*.md", "Makefile", ".ci/run")
+    for pattern in (*patterns, ".github/**/*.yml", "pyproject.toml"):
+        for path in sorted(ROOT.glob(pattern)):
+            if path.name != "CHANGELOG.md":
+                yield str(path.relative_to(ROOT)), path.read_text("utf-8")
+
+
+def test_names_that_texts_import_exist():
+    absent = []
+    for file, text in texts_beside_python():
+        for module, names in re.findall(r"from (clpt[\w.]*) import ([\w, ]+)", text):
+            for name in (part.split(" as ")[0].strip() for part in names.split(",")):
+                try:
+                    if not hasattr(importlib.import_module(module), name):
+                        importlib.import_module(f"{module}.{name}")
+                except ModuleNotFoundError:
+                    absent.append(f"{file}: from {module} import {name}")
+    assert absent == []
+
+
+def test_modules_that_texts_run_exist():
+    command = re.compile(r"-m ((?:clpt|docs|bench|scenes|tests)(?:\.\w+)*)")
+    absent = [
+        f"{file}: {module}"
+        for file, text in texts_beside_python()
+        for module in command.findall(text)
+        if importlib.util.find_spec(module) is None
+    ]
+    assert absent == []
 
 
 def test_links_lead_somewhere():
