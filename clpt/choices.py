@@ -21,7 +21,8 @@ LAYERS = (
 )  # fmt: skip
 QUANTITIES = (
     "irradiance", "spectral_irradiance", "scalar_irradiance", "illuminance", "scalar_illuminance",
-    "photon_flux_density", "radiance", "spectral_radiance", "luminance",
+    "tristimulus", "cct", "cri", "rf", "photon_flux_density", "radiance",
+    "spectral_radiance", "luminance",
 )  # of light, to be measured
 OBSERVERS = ("cie1931", "cie1964")
 SPACES = ("rec709", "rec2020", "display_p3", "aces2065_1", "acescg", "xyz")
