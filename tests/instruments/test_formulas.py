@@ -166,11 +166,9 @@ def overcast_sky(rng):
     at, normals = rng.normal(size=(2, CASES, 3))
     g = (np.arange(900) + 0.5) * math.pi / 1800.0
     azimuth = (np.arange(1440) + 0.5) * math.pi / 720.0
-    sky = np.stack(
-        np.broadcast_arrays(
-            np.cos(g)[:, None] * np.cos(azimuth), np.sin(g)[:, None], np.cos(g)[:, None] * np.sin(azimuth)
-        ), axis=-1,
-    )  # fmt: skip
+    level, up = np.cos(g)[:, None], np.sin(g)[:, None]
+    parts = np.broadcast_arrays(level * np.cos(azimuth), up, level * np.sin(azimuth))
+    sky = np.stack(parts, axis=-1)
     weights = (1.0 + 2.0 * np.sin(g)) / 3.0 * np.cos(g) * (math.pi / 1800.0) * (math.pi / 720.0)
     expected = [(np.maximum(sky @ normal, 0.0).sum(1) * weights).sum() for normal in unit(normals)]
     lamp = lights.Envmap(image=image)
@@ -212,7 +210,8 @@ def mirror(rng):
 
 
 KINDS = (
-    rectangle, disc, sphere, luminaire, spot, sun, even_sky, overcast_sky, integrating_sphere, mirror,
+    rectangle, disc, sphere, luminaire, spot, sun, even_sky, overcast_sky,
+    integrating_sphere, mirror,
 )  # fmt: skip
 
 
