@@ -29,8 +29,8 @@ class Quantity:
 
     unit: of its values. at: "points", with normals, or "rays", with directions. weighs: "eye" for
     the photopic observer, "photons" for their count, "" for energy; spectral: a value for each band
-    [unit per nm]; everywhere: all directions count alike; color: a function in
-    `clpt.instruments.color`, of light as the eye ("eye") or a spectrometer ("spectrum") has it.
+    [unit per nm]; everywhere: all directions count alike; color: turns pixels
+    into values, of light as the eye ("eye") or a spectrometer ("spectrum") has it.
     """
 
     unit: str
@@ -38,7 +38,7 @@ class Quantity:
     weighs: str = ""
     spectral: bool = False
     everywhere: bool = False
-    color: str = ""
+    color: Callable[[Floats], Floats] | None = None
 
     def film(self, film: Film, bands: int) -> Film:
         """Return a film that measures it; bands: of a spectral quantity."""
@@ -62,9 +62,8 @@ class Quantity:
 
         Raises SceneError for a quantity of color where `colour-science` is not installed.
         """
-        if self.color:
-            function: Callable[[Floats], Floats] = getattr(color, self.color)
-            return function(pixels)
+        if self.color is not None:
+            return self.color(pixels)
         if self.weighs == "eye":
             return UNIT_LUMINANCE * pixels[..., 1]
         if self.spectral:
@@ -82,10 +81,10 @@ QUANTITIES = {
     "scalar_irradiance": Quantity("W/m^2", "points", everywhere=True),
     "illuminance": Quantity("lx", "points", "eye"),
     "scalar_illuminance": Quantity("lx", "points", "eye", everywhere=True),
-    "tristimulus": Quantity("lx", "points", "eye", color="tristimulus"),
-    "cct": Quantity("K", "points", "eye", color="temperature"),
-    "cri": Quantity("Ra", "points", "spectrum", color="rendering_index"),
-    "rf": Quantity("Rf", "points", "spectrum", color="fidelity_index"),
+    "tristimulus": Quantity("lx", "points", "eye", color=color.tristimulus),
+    "cct": Quantity("K", "points", "eye", color=color.temperature),
+    "cri": Quantity("Ra", "points", "spectrum", color=color.rendering_index),
+    "rf": Quantity("Rf", "points", "spectrum", color=color.fidelity_index),
     "photon_flux_density": Quantity("umol/m^2/s", "points", "photons"),
     "radiance": Quantity("W/m^2/sr", "rays"),
     "spectral_radiance": Quantity("W/m^2/sr/nm", "rays", spectral=True),
