@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -62,9 +61,7 @@ def _each_spectrum(function: Callable[[Any], float], pixels: Floats) -> Floats:
 def _colour() -> Any:
     """Return the module `colour`. Raises SceneError."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of its own optional packages
-            import colour
+        import colour
     except ImportError:
         raise SceneError(MISSING) from None
     return colour
