@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.geometry import shapes
 from clpt.render.materials.encode import MaterialWords
 from clpt.render.materials.encoder import Encoder
@@ -41,7 +42,7 @@ def check_bodies(placed: Iterable[Shape]) -> None:
     Where a shape has a priority, bodies must be closed and name no exterior.
     """
     listed = list(placed)
-    for shape in listed:
+    for shape in budget.steps(listed):
         _check_priority(shape)
     if not any(shape.priority for shape in listed):
         return

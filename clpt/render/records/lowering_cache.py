@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from clpt.arrays import on_device
+from clpt.files import budget
 from clpt.scene.pixels import image_file
 
 T = TypeVar("T")
@@ -35,6 +36,7 @@ class LoweringCache:
 
         by: the values that the result depends on, in place of all arguments.
         """
+        budget.check_time()
         by = arguments if by is None else by
         key = function, *map(_key, by)
         if key not in self._results:

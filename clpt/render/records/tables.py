@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from clpt.arrays import Words
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.records import TABLES
 
 MOST_ELEMENTS = 2**31 - 1  # of a table: kernels have indices of 32 bits with a sign
@@ -58,6 +59,7 @@ class TableStore:
     def _append(self, name: str, element: str, values: ArrayLike) -> int:
         if TABLES[name][0] != element:
             raise TypeError(f"table {name!r} holds {TABLES[name][0]}, not {element}")
+        budget.check_time()
         first, size = self._sizes[name], np.size(values)
         if first + size > MOST_ELEMENTS:
             raise SceneError(
