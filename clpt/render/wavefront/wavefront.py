@@ -27,9 +27,8 @@ from clpt.render.wavefront import strategy
 from clpt.render.wavefront.bounce_loop import BounceLoop, Ending, Kernels, OnCounters, Step
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.film import Film
-from clpt.render.wavefront.guide import Guide
+from clpt.render.wavefront.light_caches import Guide, Photons
 from clpt.render.wavefront.path_buffers import COUNTERS, PathBuffers, divide_film
-from clpt.render.wavefront.photons import Photons
 from clpt.render.wavefront.strategy import UNTUNED, Strategy, Tuning
 
 log = logging.getLogger(__name__)
