@@ -25,8 +25,8 @@ def pictures(variance: float, seed: int) -> np.ndarray:
 
 def test_a_cost_is_variance_times_the_time_of_rays() -> None:
     """The ratio of two variances of 24,576 numbers is off by more than 6 % once in 1e5 times."""
-    trials = [Trial(pictures(0.04, 1), 1000), Trial(pictures(0.01, 2), 500, 1.5)]
-    assert trials.costs(trials) == pytest.approx([1.0, 1.5 * 0.25 * 0.5], rel=0.06)
+    unlike = [Trial(pictures(0.04, 1), 1000), Trial(pictures(0.01, 2), 500, 1.5)]
+    assert trials.costs(unlike) == pytest.approx([1.0, 1.5 * 0.25 * 0.5], rel=0.06)
     even = [Trial(pictures(0.0, 1), 1000), Trial(pictures(0.0, 2), 500)]
     assert trials.costs(even) == [1.0, 1.0]
 
