@@ -207,8 +207,8 @@ def refusals(renderer: ResumableRenderer) -> list[str]:
     sentences = []
     if rejected := renderer.counts.rejected:
         sentences.append(
-            f"{rejected} samples were not finite, too bright, or in a medium that is far too dense "
-            "beside empty cells, and count as black"
+            f"{rejected} samples were not finite, too bright, in a medium that is far too dense "
+            "beside empty cells, or not finished in time; they lack light"
         )
     if renderer.counts.full:
         sentences.append("pixels are too bright for the film: lower film.exposure")
