@@ -86,6 +86,10 @@ CAMERAS = {
         cameras.Spherical(to_world=look_at([0.25, 0.9, 0.9], [0.0, 0.9, -1.0], UP)),
         size=(264, 132),
     ),
+    "matrix": seen("A cabinet projection, which no other camera has.", cabinet()),
+    "rays": seen(
+        "A fisheye of 160 degrees, ray by ray: a list makes any camera.", disc(), (180, 180)
+    ),
     "calibrated": seen(
         "A fisheye by OpenCV's model, with calibrated distortion; what it does not see is black.",
         cameras.Calibrated(
@@ -93,9 +97,5 @@ CAMERAS = {
             distortion=(0.05, -0.1, 0.0, 0.0),
             to_world=look_at([0.5, 1.3, 2.2], [-0.1, 0.7, 0.0], UP),
         ),
-    ),
-    "matrix": seen("A cabinet projection, which no other camera has.", cabinet()),
-    "rays": seen(
-        "A fisheye of 160 degrees, ray by ray: a list makes any camera.", disc(), (180, 180)
     ),
 }
