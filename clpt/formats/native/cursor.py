@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from clpt.arrays import is_number
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.files import budget
 from clpt.files import text as text_files
 from clpt.formats.reading import Located
-from clpt.scalars import is_number
 
 LARGEST_INTEGER = 2**31 - 1
 PER_LETTER = 16  # bytes of memory for each letter of JSON, while it is read

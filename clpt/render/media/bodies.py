@@ -11,12 +11,12 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import is_whole
 from clpt.errors import SceneError
 from clpt.geometry import shapes
 from clpt.render.materials.encode import MaterialWords
 from clpt.render.materials.encoder import Encoder
 from clpt.render.media.encode import MediumWords
-from clpt.scalars import is_whole
 from clpt.scene import roles
 from clpt.scene.materials import CLEAR, Material
 from clpt.scene.media import Medium
