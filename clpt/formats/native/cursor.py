@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -119,6 +119,9 @@ class Cursor(Located):
     def numbers(self, count: int = 0) -> list[float]:
         """Return a list of finite numbers, `count` of them unless that is 0."""
         return [entry.number() for entry in self.entries(count)]
+
+
+ReadCursor = Callable[[Cursor], Any]  # reads the value at a cursor
 
 
 def parse(path: Path, confined: bool = False) -> Cursor:

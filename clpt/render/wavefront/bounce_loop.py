@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pyopencl as cl
@@ -37,7 +37,7 @@ LEAST_ITEMS = 1 << 12  # of a part
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
 IDLE = {"samples": (0, 0), "bounces": 0, "restart": 0, "leave": None}  # has nothing to do
 
-OnCounters = Callable[[NDArray[np.uint64]], bool]  # returns whether a run goes on
+OnBatch = Callable[[Any], bool]  # called with counters; returns whether a run goes on
 
 
 @dataclass(frozen=True)
@@ -72,16 +72,29 @@ def next_bounces(bounces: int, took: float, most: int, cancel_seconds: float | N
     return max(1, min(wanted, 2 * bounces, int(rate * LOOP_SECONDS)))
 
 
+class HasArguments(Protocol):
+    """An owner of buffers."""
+
+    @property
+    def arguments(self) -> Mapping[str, Any]:
+        """The arguments of kernels by name."""
+
+
 class Kernels:
     """Programs of a device by name, and their kernels with the arguments that they all share.
 
-    arguments: returns the arguments by name. seconds: of building.
+    owners: of buffers, each with `arguments` by name. seconds: of building.
     """
 
-    def __init__(self, on: device.Device, arguments: Callable[[], dict[str, Any]]):
-        self.device, self.arguments = on, arguments
+    def __init__(self, on: device.Device, owners: Sequence[HasArguments]):
+        self.device, self._owners = on, owners
         self.programs: dict[str, device.Program] = {}
         self.seconds = 0.0
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The present arguments of all owners by name."""
+        return {name: value for owner in self._owners for name, value in owner.arguments.items()}
 
     def build(self, texts: dict[str, device.Source]) -> None:
         """Build those programs that are not built yet."""
@@ -100,7 +113,7 @@ class Kernels:
     def bind(self, program: str, name: str, **more: object) -> device.BoundKernel:
         """Return a kernel of a program with its arguments, by the names in its signature."""
         kernel = self.programs[program].kernel(name)
-        arguments = {**self.arguments(), **more}
+        arguments = {**self.arguments, **more}
         return kernel.bind(**{a.name: arguments[a.name] for a in kernel.arguments})
 
 
@@ -201,7 +214,7 @@ class BounceLoop:
         event = self.stream.run(self.loop, *self._loop_sizes())
         self.timings.add(f"{self._label}loop", event)
 
-    def run(self, first: int, end: int, on_batch: OnCounters) -> bool:
+    def run(self, first: int, end: int, on_batch: OnBatch) -> bool:
         """Trace the paths of samples first to end - 1 of every pixel, and wait.
 
         on_batch is called every few iterations with the counters; if it returns False, every path
@@ -223,7 +236,7 @@ class BounceLoop:
         self,
         numbers: tuple[int, int],
         leave: object,
-        on_batch: OnCounters,
+        on_batch: OnBatch,
     ) -> bool:
         """Trace paths of these numbers until none is in flight; see `run`."""
         steps = self._batch()

@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats
+from clpt.render.wavefront.bounce_loop import OnBatch
 from clpt.render.wavefront.noise_meter import NoiseMeter, divide
 from clpt.render.wavefront.tracer import Selection, Tracer
-from clpt.render.wavefront.wavefront import OnBatch
 from clpt.render.wavefront.work_list import FOREVER
 
 GUIDES = 4  # light paths of the picture for each guide
