@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from clpt.render.lights.find import emissions_of, light_power
-from clpt.render.spectra.look import Look
+from clpt.render.spectra.find import Look
 
 from ... import images
 from ...arrays import Floats32
