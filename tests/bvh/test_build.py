@@ -245,7 +245,7 @@ def test_memory_of_a_build(device, monkeypatch, layout, quality):
     source = [cl.Buffer(device.context, flags, hostbuf=array) for array in arrays]
     bvh.build(device, *source, layout=layout, quality=quality)
     assert max(most) < 270 * n + (1 << 18)
-    assert max(sizes) <= 64 * n
+    assert max(sizes) <= (64 if device.info.is_cpu else 80) * n  # blocks
 
 
 def test_a_buffer_beyond_the_device_is_refused(device):
