@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 from clpt import device
 from clpt.bench.figures import Figure
-from clpt.bench.flight import Flight
-from clpt.bench.launches import PLAIN, Comparison, Launch, launches
+from clpt.bench.launches import PLAIN, Comparison, Flight, Launch, launches
 from clpt.errors import ClptError, UnknownKindError
 from clpt.layout import SLAB_BLOCK
 from clpt.records import SLABS

@@ -13,7 +13,7 @@ import numpy as np
 
 from clpt import device, transforms
 from clpt.bench.figures import Figure, Taken, clock_complaint, timed
-from clpt.bench.flight import Flight
+from clpt.bench.launches import Flight
 from clpt.errors import UnknownKindError
 from clpt.render.wavefront.bounce_loop import Step
 from clpt.scene import Scene, integrators, lights, params, textures

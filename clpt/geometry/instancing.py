@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import Matrices, Points, on_host, single
 from clpt.errors import SceneError
-from clpt.geometry import analytic, shape_records, shapes, strands, triangles, tubes
+from clpt.geometry import analytic, shapes, strands, triangles
 from clpt.geometry.analytic import keeps_its_kind, tessellate
-from clpt.geometry.shapes import where
-from clpt.geometry.tubes import Tubes, as_tubes
+from clpt.geometry.shapes import ANALYTIC, where
+from clpt.geometry.strands import Tubes, as_tubes
 from clpt.records import INSTANCE
 from clpt.scene.shapes import Curves, Cylinder, Group, Mesh, Shape, Sphere
 
@@ -124,7 +124,7 @@ def sort(
         as_met = _met_as(member)
         if (group := as_met.group) is not None:
             groups.setdefault(id(group), (group, []))[1].append(number)
-        elif number in moving and as_met.kind not in shape_records.ANALYTIC:
+        elif number in moving and as_met.kind not in ANALYTIC:
             prototypes.append(_alone(as_met, number))
         else:
             placed.append(Placed(as_met, number))
@@ -134,7 +134,7 @@ def sort(
         for member in group.shapes:
             shape = _met_as(member, to_world)
             whole = Prototype((shape,), to_world, np.array(numbers, np.int32))
-            if shape.kind in shape_records.ANALYTIC:
+            if shape.kind in ANALYTIC:
                 placed += _analytic(shape, whole, prototypes, warnings, moving)
             elif shape.emission is not None or len(numbers) == 1:
                 placed += _own(_copies(shape, whole), prototypes, moving)
@@ -330,12 +330,13 @@ def _of_tubes(shape: Curves, times: Sequence[float]) -> NDArray[np.int64]:
     keyed = times if shape.deformation is not None else ()
     alike = [shape.at_time(time) for time in keyed]
     vertices, faces, _, _ = triangles.local(alike[0] if alike else shape, alike)
-    strand = tubes.strands(alike[0] if alike else shape, where(shape), alike, len(vertices))
+    cubics = alike[0] if alike else shape
+    strand = strands.strands_of_vertices(cubics, where(shape), alike, len(vertices))
     return np.asarray(strand[faces[:, 0]][triangles.kept(shape, times)])
 
 
 def _of_curves(shape: Curves, times: Sequence[float]) -> NDArray[np.int64]:
-    return strands.strands(shape)
+    return strands.strands_of_pieces(shape)
 
 
 def _of_one(shape: Shape, times: Sequence[float]) -> NDArray[np.int64]:

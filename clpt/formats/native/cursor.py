@@ -16,7 +16,7 @@ from typing import Any
 
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.files import budget
-from clpt.files import text as text_files
+from clpt.files import input_files as text_files
 from clpt.formats.reading import Located
 from clpt.scalars import is_number
 
