@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from string import Template
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from clpt import device, version
 from clpt.arrays import Words
+from clpt.bench.figures import Taken, timed
 from clpt.device.building import OPTIONS
 from clpt.errors import SceneError
 from clpt.files import output_files
@@ -64,26 +65,18 @@ class Flight:
         self.wavefront.paths.restart()
         self.wavefront.stages[0].bound.set_args(samples=(0, ENDLESS))
 
-    def bounce(self, around: Callable[[Step, Callable[[], Any]], Any] | None = None) -> None:
-        """Enqueue the stages of a bounce.
-
-        around: called with each stage and its `enqueue`, which it must call.
-        """
+    def bounce(self) -> None:
+        """Enqueue the stages of a bounce."""
         for step in self.wavefront.stages:
-            self.stage(step, around)
+            self.stage(step)
 
-    def stage(
-        self, step: Step, around: Callable[[Step, Callable[[], Any]], Any] | None = None
-    ) -> None:
-        """Enqueue a stage; around: see `bounce`."""
+    def stage(self, step: Step) -> Any:
+        """Enqueue a stage; return its event."""
+        return self.wavefront.stream.run(step.bound, step.size, step.group)
 
-        def enqueue() -> Any:
-            return self.wavefront.stream.run(step.bound, step.size, step.group)
-
-        if around is None:
-            enqueue()
-        else:
-            around(step, enqueue)
+    def timed(self, step: Step) -> tuple[int, Taken]:
+        """Run a stage; return its items and their time."""
+        return self.items(step), timed(self.device, lambda: [self.stage(step)])
 
     def read(self, record: Record, name: str) -> NDArray:
         """Return a member of all slots: (slots,), or (slots, components)."""
@@ -146,6 +139,7 @@ ROUNDING = 1e-3  # margin of a float, over its size plus the mean size of its me
 EXACT, FREE = -1.0, np.inf  # margins
 MOST_OFF = 0.01  # of a launch's changed words: a rounding may decide a path's choice
 FREE_MEMBERS = ("low", "high", "cone")  # low digits of sums; packed halves
+NAMED = 4  # the most members in a message
 COUNTS = ("queue_starts", "queue_counts")  # other compared buffers; the order in queues is free
 DATA = Path(__file__).parent / "data"
 HOSTS = ("launch.c", "launch.py")  # stored as .txt: they are no part of clpt
@@ -215,7 +209,7 @@ class Launch:
         margins = {name: _margins(flight, name, after[name]) for name in self.margins}
         return dataclasses.replace(self, after={**self.after, **after}, margins=margins)
 
-    def compare(self, words: Mapping[str, Words]) -> Comparison:
+    def compare(self, words: Mapping[str, Words], flight: Flight) -> Comparison:
         """Compare a device's output words with this launch's."""
         changed, off = 0, {}
         for name, margins in self.margins.items():
@@ -223,16 +217,20 @@ class Launch:
             which = is_off(words[name], expected, margins)
             changed += int(((self.before[name] != expected) & (margins != FREE)).sum())
             off[name] = np.flatnonzero(which)
-        return Comparison(self.stage, changed, off)
+        return Comparison(self, changed, off, _members(flight, off))
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A comparison of launches: the number of changed words, and the indices of wrong words."""
+    """A device's words beside a launch: the number of changed words, the indices of wrong words.
 
-    stage: str
+    members: names of slabs' members, and of other buffers, with wrong words.
+    """
+
+    launch: Launch
     changed: int
     off: Mapping[str, NDArray[np.intp]]
+    members: Sequence[str]
 
     @property
     def share(self) -> float:
@@ -244,6 +242,15 @@ class Comparison:
     def wrong(self) -> bool:
         """Whether rounding cannot explain all wrong words."""
         return self.share > MOST_OFF
+
+    @property
+    def problem(self) -> str:
+        """The error as text, or ""."""
+        if not self.wrong:
+            return ""
+        names = ", ".join(self.members[:NAMED]) + (", ..." if len(self.members) > NAMED else "")
+        share = f"{max(self.share, 0.01):.0%}".replace("%", " %")
+        return f"{share} of what it writes is wrong ({names})"
 
 
 def launches(flight: Flight) -> Iterator[Launch]:
@@ -312,6 +319,23 @@ def _margins(flight: Flight, name: str, expected: Words) -> NDArray[np.float32]:
             digit = ("low", "middle", "high")[word - member.word] if member.type == "fixed" else ""
             limits[:, word] = _member_margins(digit or member.name, member.type, rows[:, word])
     return margins
+
+
+def _members(flight: Flight, off: Mapping[str, NDArray[np.intp]]) -> list[str]:
+    """Return the names of slabs' members, and of other buffers, with wrong words."""
+    names: dict[str, None] = {}
+    for name, words in off.items():
+        record = next((slab for slab in SLABS if f"{slab.name.lower()}_words" == name), None)
+        if record is None:
+            names |= dict.fromkeys([name] if len(words) else [])
+            continue
+        stride = flight.wavefront.paths.rows(record, 0).pitch // 4
+        in_blocks = flight.wavefront.lanes == 1
+        rows = words // SLAB_BLOCK % record.step if in_blocks else words // stride
+        for member in record.members:
+            if ((rows >= member.word) & (rows < member.word + member.words)).any():
+                names[member.name] = None
+    return list(names)
 
 
 def rows_of(flight: Flight, record: Record, words: NDArray) -> NDArray:

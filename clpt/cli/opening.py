@@ -23,7 +23,7 @@ from ..render.renderer import Renderer
 from ..render.resumable import ResumableRenderer
 from ..scene import Scene
 from .display import Display, device_names
-from .options.changes import changed
+from .options.applied import changed
 from .options.scene_options import Machine, SceneOptions, Workers
 from .process import failures
 from .process.allocator import reusing

@@ -22,8 +22,8 @@ import pyopencl as cl
 
 from clpt.device import disk_cache, native_programs, runtimes
 
+from ..arrays import is_whole
 from ..errors import DeviceError
-from ..scalars import is_whole
 from .compilers import Compilers, spare_cores
 from .context import Device, DeviceInfo, devices
 from .source import Source, assemble

@@ -250,7 +250,8 @@ def test_a_film_without_a_pass(tmp_path):
 
 
 def killing_scene():
-    from clpt.cli.options.changes import SceneChanges, changed
+    from clpt.cli.options.applied import changed
+    from clpt.cli.options.changes import SceneChanges
     from clpt.formats import load
 
     return changed(load(killing.SCENE), SceneChanges.of(size=(8, 8), mode="rgb"))

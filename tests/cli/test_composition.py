@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from clpt import images, transforms
 from clpt.__main__ import run
-from clpt.cli.options.changes import CameraType, CropType, SceneChanges, changed, composed
+from clpt.cli.options.applied import changed, composed
+from clpt.cli.options.changes import CameraType, CropType, SceneChanges
 from clpt.errors import SceneError
 from clpt.formats import brought, load
 from clpt.scene import Film, Scene, cameras, lights, shapes, studio

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from clpt.cli import COMMANDS, cli
 from clpt.cli.inspect import PixelType
-from clpt.cli.options.changes import CameraType, CropType, SceneChanges, changed
+from clpt.cli.options.applied import changed
+from clpt.cli.options.changes import CameraType, CropType, SceneChanges
 from clpt.cli.options.scene_options import Bytes, Where
 from clpt.cli.options.values import (
     Count,

@@ -22,7 +22,8 @@ from clpt import __version__, device, images
 from clpt.__main__ import run
 from clpt.cli.files import outputs
 from clpt.cli.files import targets as names
-from clpt.cli.options.changes import SceneChanges, changed
+from clpt.cli.options.applied import changed
+from clpt.cli.options.changes import SceneChanges
 from clpt.cli.process import stopping
 from clpt.cli.render import picture
 from clpt.cli.render.passes import render_samples

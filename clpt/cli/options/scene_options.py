@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
@@ -30,6 +30,7 @@ from .records import Command, Decorator, with_options
 from .values import Choice, LightPaths, Names, SensorName, Size, White
 
 if TYPE_CHECKING:
+    from ...formats.reading import Progress
     from ...scene import Scene
 
 
@@ -111,8 +112,6 @@ def loading_options(command: Command) -> Command:
     """Give a command the parameter `variables`, and options that limit loads."""
     return with_options(command, _LOADING)
 
-
-Progress: TypeAlias = Callable[[float, str], None]  # of `clpt.load`
 
 
 LOCAL = "local:"
@@ -214,7 +213,7 @@ class SceneOptions:
 
     def scene(self, file: Path, progress: Progress | None = None) -> Scene:
         """Return the scene of a file, changed. Raises SceneError, click.BadParameter."""
-        from .changes import changed
+        from .applied import changed
 
         return changed(self.loading.read(file, progress), self.changes)
 

@@ -1,7 +1,4 @@
-"""Materials: MaterialX, UsdPreviewSurface 2.6, and gprims without one in their display color.
-
-`clpt.formats.materialx` asks a `Network` for the nodes and images of a stage.
-"""
+"""Materials: MaterialX, UsdPreviewSurface 2.6, and gprims without one in their display color."""
 
 from __future__ import annotations
 
@@ -13,7 +10,6 @@ from typing import Any
 import numpy as np
 from pxr import Usd, UsdShade
 
-from clpt import images
 from clpt.formats import materialx
 from clpt.formats.usd import textures
 from clpt.formats.usd.document import Document
@@ -26,46 +22,8 @@ from clpt.scene.params import Kind, fields_of
 from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.scene.values import Texture, Textured
 
-CONTEXT = "mtlx"  # of renderers that read MaterialX
-
-
-@dataclass(frozen=True)
-class Network:
-    """A stage as the host of a material's network."""
-
-    document: Document
-    uses: Uses
-
-    def warn(self, message: str, path: str) -> None:
-        self.document.warn(message, path)
-
-    def image(self, asset: object, path: str) -> images.Stored | None:
-        return textures.read(self.document, asset, path)
-
-    def uv_mapping(self, name: str) -> str:
-        return self.uses.uv_mapping(name or "st")
-
-    def attribute(self, name: str, count: int) -> MeshAttribute:
-        self.uses.fallbacks.setdefault(name, (0.0,) * count)
-        return MeshAttribute(name=f"vertex_{name}")
-
-
-def network_shader(document: Document, material: UsdShade.Material) -> Node | None:
-    """Return the surface shader of MaterialX that a material has; None without one."""
-    for context in (CONTEXT, ""):
-        found = material.ComputeSurfaceSource(context)[0]
-        node = Node(document, found) if found else None
-        if node is not None and node.kind.startswith("ND_") and "UsdPreview" not in node.kind:
-            return node
-    return None
-
-
-def network_surface(document: Document, node: Node, uses: Uses, name: str) -> materialx.Surface:
-    """Return a shader of MaterialX as a material, its light, and the inside of its shapes."""
-    return materialx.surface(node, Network(document, uses), name)
-
-
 PREVIEW = "UsdPreviewSurface"
+CONTEXT = "mtlx"  # of renderers that read MaterialX
 GREY = (0.18, 0.18, 0.18)
 COLOR, ATTRIBUTE = "displayColor", "vertex_"  # a primvar, and how names of attributes begin
 NORMALS = ((2.0, 2.0, 2.0), (-1.0, -1.0, -1.0))  # scale and bias of a map of 8 bits
@@ -142,10 +100,10 @@ def _sided(inner: Material) -> Material:
 def _bound(document: Document, material: UsdShade.Material, both: bool) -> Surface:
     """Return a material that a prim binds: that of MaterialX, else its universal surface."""
     name, path = material.GetPrim().GetName(), str(material.GetPath())
-    uses = Uses()
-    network = network_shader(document, material)
+    uses = Uses(document)
+    network = _network(document, material)
     if network is not None:
-        read = network_surface(document, network, uses, name)
+        read = materialx.surface(network, uses, name)
         found = Surface(read.material, read.emission, interior=read.interior)
         return _told(document, path, found, uses, both)
     shader = material.ComputeSurfaceSource("")[0]
@@ -161,6 +119,16 @@ def _bound(document: Document, material: UsdShade.Material, both: bool) -> Surfa
     if material.ComputeDisplacementSource("")[0] and node.source("displacement"):
         document.warn("displacement is left out", path)
     return _told(document, path, Surface(*_preview(node, uses, name)), uses, both)
+
+
+def _network(document: Document, material: UsdShade.Material) -> Node | None:
+    """Return the surface shader of MaterialX that a material has; None without one."""
+    for context in (CONTEXT, ""):
+        found = material.ComputeSurfaceSource(context)[0]
+        node = Node(document, found) if found else None
+        if node is not None and node.kind.startswith("ND_") and "UsdPreview" not in node.kind:
+            return node
+    return None
 
 
 def _told(document: Document, path: str, read: Surface, uses: Uses, both: bool) -> Surface:
