@@ -21,7 +21,7 @@ from rich.table import Table
 import clpt
 from bench import machine
 from clpt import device as dev
-from clpt.cli.options.changes import changed
+from clpt.cli.options.applied import changed
 from clpt.cli.options.scene_options import SceneChanges
 
 SCENES = ("scenes/cornell_box", "tests/scenes/textures.xml")

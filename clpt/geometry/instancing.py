@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import Matrices, Points, on_host, single
 from clpt.errors import SceneError
-from clpt.geometry import analytic, shapes, strands, triangles
+from clpt.geometry import analytic, shapes, strands, triangles, tubes
 from clpt.geometry.analytic import keeps_its_kind, tessellate
 from clpt.geometry.shapes import ANALYTIC, where
-from clpt.geometry.strands import Tubes, as_tubes
+from clpt.geometry.tubes import Tubes, as_tubes
 from clpt.records import INSTANCE
 from clpt.scene.shapes import Curves, Cylinder, Group, Mesh, Shape, Sphere
 
@@ -330,13 +330,12 @@ def _of_tubes(shape: Curves, times: Sequence[float]) -> NDArray[np.int64]:
     keyed = times if shape.deformation is not None else ()
     alike = [shape.at_time(time) for time in keyed]
     vertices, faces, _, _ = triangles.local(alike[0] if alike else shape, alike)
-    cubics = alike[0] if alike else shape
-    strand = strands.strands_of_vertices(cubics, where(shape), alike, len(vertices))
+    strand = tubes.strands(alike[0] if alike else shape, where(shape), alike, len(vertices))
     return np.asarray(strand[faces[:, 0]][triangles.kept(shape, times)])
 
 
 def _of_curves(shape: Curves, times: Sequence[float]) -> NDArray[np.int64]:
-    return strands.strands_of_pieces(shape)
+    return strands.strands(shape)
 
 
 def _of_one(shape: Shape, times: Sequence[float]) -> NDArray[np.int64]:

@@ -16,7 +16,7 @@ from clpt.errors import SceneError
 from clpt.files import budget
 from clpt.geometry import distance_grids, refining
 from clpt.geometry.shapes import ONE_OF, placement, where
-from clpt.geometry.strands import tubes
+from clpt.geometry.tubes import tubes
 from clpt.scene import shapes
 from clpt.scene.motion import Deformation
 from clpt.scene.params import fields_of

@@ -26,7 +26,6 @@ from clpt.images.picture_files import (
     check_input,
     check_output,
     log_notes,
-    png,
     read,
     read_stored,
     write,
@@ -34,6 +33,7 @@ from clpt.images.picture_files import (
 )
 from clpt.images.pillow import decoded
 from clpt.images.pillow import texts as png_text
+from clpt.images.screen_files import png
 from clpt.images.stored import Stored, from_array
 
 __all__ = [

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError
 from clpt.files import budget, input_files
-from clpt.images import checks, picture_files
+from clpt.images import checks, screen_files
 from clpt.images.stored import Stored
 
 if TYPE_CHECKING:  # else imported where it is used, for many pictures are EXR only
@@ -70,7 +70,7 @@ def decoded(
     if kind != "PNG":
         return replace(pixels, notes=notes, colour_notes=colour_notes)
     with BytesIO(source) if isinstance(source, bytes) else source.open("rb") as file:
-        said = picture_files.profile(file)
+        said = screen_files.profile(file)
     return replace(
         pixels,
         gamma=said.gamma,

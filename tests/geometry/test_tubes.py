@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from clpt.errors import SceneError
-from clpt.geometry import analytic, strands, triangles
+from clpt.geometry import analytic, triangles, tubes
 from clpt.scene.shapes import Curves
 
 POINTS = np.array(
@@ -34,7 +34,7 @@ def test_a_spline_is_followed():
     a, b = middle[:-1, None], middle[1:, None]
     t = ((fine - a) * (b - a)).sum(-1) / ((b - a) ** 2).sum(-1)
     off = np.linalg.norm(a + np.clip(t, 0.0, 1.0)[..., None] * (b - a) - fine, axis=2).min(axis=0)
-    assert off.max() < strands.ERROR * 0.1
+    assert off.max() < tubes.ERROR * 0.1
 
 
 def test_bases_agree():
@@ -82,8 +82,8 @@ def test_many_strands_get_fewer_pieces_and_sides(monkeypatch):
     points = rng.random((800, 4)) * [1.0, 1.0, 1.0, 0.01]
     curves = Curves(points=points, lengths=(8,) * 100)
     assert len(triangles.triangulate(curves)[1]) > 100 * 5 * 2 * 16 * 2
-    monkeypatch.setattr(strands, "PIECES", 500)
-    monkeypatch.setattr(strands, "TRIANGLES", 1000)
+    monkeypatch.setattr(tubes, "PIECES", 500)
+    monkeypatch.setattr(tubes, "TRIANGLES", 1000)
     assert len(triangles.triangulate(curves)[1]) == 100 * 5 * 2 * 4
 
 

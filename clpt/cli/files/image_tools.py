@@ -11,11 +11,11 @@ import numpy as np
 
 from clpt import images
 from clpt.files import output_files
-from clpt.images import picture_files
 from clpt.images.colour import false_colours
 
 from ...choices import FOR_SCREENS
 from ...errors import SceneError, nearest, one_line
+from ...images import screen_files
 from ...images.measures import Differences, differences, size_of
 from ...version import VERSION
 from ..options.grading import Grading, for_screens
@@ -162,7 +162,7 @@ def write(pair: Pair, path: Path, most: float | None) -> str:
         return str(path)
     size = size_of(pair.a, pair.b)
     top = most or float(np.quantile(size, MOST)) or float(size.max()) or 1.0
-    data = picture_files.encode(path.suffix.lower(), false_colours(size / top))
+    data = screen_files.encode(path.suffix.lower(), false_colours(size / top))
     try:
         output_files.write(path, data)
     except OSError as error:

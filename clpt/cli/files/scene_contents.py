@@ -7,9 +7,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from clpt.scene import Scene, materials, shapes, studio, textures
-
 from ...geometry.triangles import triangulate
+from ...scene import Scene, materials, shapes, studio, textures
 from ...scene.params import Kind, fields_of
 
 DIGITS = 4  # of bounds that people read

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
-from clpt.files import budget
-
 from ...choices import (
     DENOISERS,
     INTEGRATORS,
@@ -24,6 +22,7 @@ from ...choices import (
     Missing,
     Quality,
 )
+from ...files import budget
 from ...formats import load
 from .changes import SceneChanges, composition_options
 from .records import Command, Decorator, with_options

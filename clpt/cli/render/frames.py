@@ -29,7 +29,7 @@ from ...version import VERSION
 from ..display import Display, clock
 from ..files import outputs, targets
 from ..opening import RendererFactory, choose_devices, cluster_factories, device_factories
-from ..options.changes import changed
+from ..options.applied import changed
 from ..process.stopping import STATUS, stops
 from . import video
 from .passes import End, render_samples

@@ -33,7 +33,7 @@ class Geometry:
     """
 
     faces: NDArray[np.int64]
-    draco_attributes: dict[str, NDArray[Any]]
+    attributes: dict[str, NDArray[Any]]
     targets: list[dict[str, Floats32]] = field(default_factory=list)
 
 

@@ -10,7 +10,7 @@ import pytest
 import clpt
 from clpt import transforms as T
 from clpt.geometry.instancing import FEW
-from clpt.geometry.strands import as_tubes
+from clpt.geometry.tubes import as_tubes
 from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import cameras, integrators, lights, materials
 from clpt.scene.shapes import Curves, Group, Instance, Spheres

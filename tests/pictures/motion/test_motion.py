@@ -14,7 +14,7 @@ import clpt
 from clpt import transforms
 from clpt.errors import SceneError
 from clpt.geometry import motion
-from clpt.geometry.strands import as_tubes
+from clpt.geometry.tubes import as_tubes
 from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene, cameras, integrators, lights, materials, media, shapes, textures
 from clpt.scene.motion import Deformation, Keys, Shutter, decomposed, rotation
