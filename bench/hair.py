@@ -21,7 +21,7 @@ from rich.table import Table
 import clpt
 from bench import machine
 from clpt import transforms as tf
-from clpt.geometry.strands import as_tubes
+from clpt.geometry.tubes import as_tubes
 from clpt.scene import Scene, cameras, integrators, lights, materials
 from clpt.scene.shapes import Curves, Rectangle
 
