@@ -1,8 +1,12 @@
-"""Leaves cut from a space-filling curve by kernels/bvh/curve.cl, for builds without planes."""
+"""Items in the order of a space-filling curve: leaves cut from it, and trees from the leaves up.
+
+See kernels/bvh/curve.cl, sort.cl and clusters.cl.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from itertools import pairwise
+from typing import Any, TypeAlias
 
 import numpy as np
 import pyopencl as cl
@@ -13,7 +17,12 @@ from .building import Building
 
 _BUILD, _CURVE, _SORT = "bvh/build.cl", "bvh/curve.cl", "bvh/sort.cl"
 _INDEX = CURVE_KEYS["index"]
+_CLUSTERS = "bvh/clusters.cl"
+_ROUNDS = 128  # CLUSTERS_ROUNDS of the kernels
+_AT_ONCE = 8  # rounds; then the host reads how many clusters are left
 _TILES = 4  # of a compute unit, if the sort has few
+
+Steps: TypeAlias = tuple[tuple[int, int], ...]  # (begin, count) of nodes, the lowest first
 
 
 def runs(
@@ -73,6 +82,67 @@ def sorted_by_digits(building: Building, count: int, keys: cl.Buffer) -> cl.Buff
         building.run_tiles(_SORT, "sort_move", tiles, keys=keys, sorted=others, **shift, **tiled)
         keys, others = others, keys
     return keys
+
+
+def united(
+    building: Building, count: int, items: cl.Buffer, extents: cl.Buffer, radius: int
+) -> tuple[cl.Buffer, Steps]:
+    """Unite items to a root; return the nodes, and the steps of the rounds and of the root.
+
+    extents: of the scene; radius: see `clpt.bvh.tree.upward`. Wait for the number of rounds.
+    """
+    keys = sorted_keys(building, count, items, extents)
+    rows, spare, nodes = (building.allocate(size * count) for size in (32, 32, 64))
+    levels, tile = building.allocate(8 * (_ROUNDS + 1)), building.grain.tile
+    building.stream.fill(levels, 0, 0, levels.size)
+    begin = {"items": items, "keys": keys, "extents": extents, "nodes": nodes, "levels": levels}
+    building.run_each(_CLUSTERS, "clusters_begin", count, clusters=rows, **begin)
+    nearest, counts = building.allocate(4 * count), building.allocate(4 * count)
+    numbers = building.allocate(8 * -(-count // tile) + 4)
+    near = {"levels": levels, "nearest": nearest}
+    tree = {"nodes": nodes, "counts": counts, "sums": building.local(2), **near}
+    left, number = count, 0
+    while left > tile and number < _ROUNDS:
+        tiles = -(-left // tile)
+        tiled = {"tile": tile, "tiles": tiles, "numbers": numbers}
+        for _ in range(_AT_ONCE):
+            at = {"round": number}
+            building.run_each(
+                _CLUSTERS, "clusters_find", left, clusters=rows, radius=radius, **at, **near
+            )
+            counted = {"sums": tree["sums"], **tiled, **near, **at}
+            building.run_tiles(_CLUSTERS, "clusters_count", tiles, **counted)
+            building.sums_before(numbers, 2 * tiles)
+            moved = {"clusters": rows, "next": spare, **tiled, **at}
+            building.run_tiles(_CLUSTERS, "clusters_round", tiles, **moved, **tree)
+            rows, spare, number = spare, rows, number + 1
+        left = int(building.read(levels, 2 * number + 1, np.uint32)[-1])
+    final = {"clusters": rows, "next": spare, "round": number, "radius": radius}
+    building.run_tiles(_CLUSTERS, "clusters_finish", 1, **final, **tree)
+    sizes = building.read(levels, 2 * (_ROUNDS + 1), np.uint32)[::2].tolist()
+    pairs = ((2 * after, 2 * (before - after)) for before, after in pairwise(sizes) if after)
+    return nodes, (*(pair for pair in pairs if pair[1]), (0, 1))
+
+
+def ordered(
+    building: Building,
+    count: int,
+    items: cl.Buffer,
+    nodes: cl.Buffer,
+    steps: Steps,
+    leaf_size: int,
+) -> tuple[cl.Buffer, cl.Buffer]:
+    """Return items in the order of the leaves, and the first item of each node.
+
+    Nodes with at most `leaf_size` items become leaves.
+    """
+    into, positions = building.allocate(32 * count), building.allocate(8 * count)
+    tree = {"nodes": nodes, "positions": positions, "leaf_size": leaf_size}
+    for begin, size in reversed(steps):
+        building.run_each(
+            _CLUSTERS, "clusters_order", size, begin=begin, items=items, ordered=into, **tree
+        )
+    return into, positions
 
 
 def _cells(span: NDArray[np.float32], code: int) -> dict[str, Any]:

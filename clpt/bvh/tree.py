@@ -14,7 +14,7 @@ import numpy as np
 import pyopencl as cl
 
 from ..records import TREE_SIZES
-from . import clusters, curve
+from . import curve
 from .building import Building
 
 _BUILD, _PACK, _REINSERT = "bvh/build.cl", "bvh/pack.cl", "bvh/reinsert.cl"
@@ -172,9 +172,9 @@ def upward(
     with.
     """
     extents = curve.whole(building, count, parts)
-    nodes, steps = clusters.united(building, count, items, extents, radius)
+    nodes, steps = curve.united(building, count, items, extents, radius)
     least = 1 if collapses else leaf_size
-    ordered, firsts = clusters.ordered(building, count, items, nodes, steps, least)
+    ordered, firsts = curve.ordered(building, count, items, nodes, steps, least)
     return Tree(count, ordered, nodes, extents, steps, firsts=firsts, leaf_size=leaf_size)
 
 
