@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.files import budget, input_files, numpy_files, output_files, text
+from clpt.files import budget, input_files, numpy_files, output_files
 from clpt.scene.shapes import Spheres
 from clpt.scene.textures import ATTRIBUTES
 
@@ -44,7 +44,7 @@ def read_strands(path: Path) -> dict[str, Any]:
 
     Raises SceneError with the line that is not four numbers, and for an empty file.
     """
-    data = text.plain(input_files.read_bytes(path))
+    data = input_files.plain(input_files.read_bytes(path))
     budget.check(PER_BYTE * len(data), "its points", path)
     rows = [line.split() for line in data.split(b"\n")]
     columns = np.array([len(row) for row in rows])
@@ -60,7 +60,7 @@ def read_strands(path: Path) -> dict[str, Any]:
         points = np.array(words).astype(np.float64).reshape(-1, 4)
     except ValueError:
         line = _wrong(rows)
-        comma = text.comma_message(text.decode(b" ".join(rows[line - 1])))
+        comma = input_files.comma_message(input_files.decode(b" ".join(rows[line - 1])))
         raise SceneError(comma or "is not all numbers", file=path, line=line) from None
     starts = np.flatnonzero(occupied & ~np.r_[False, occupied[:-1]])
     ends = np.flatnonzero(occupied & ~np.r_[occupied[1:], False])
