@@ -64,12 +64,15 @@ class _Stream:
         return characters.decode("utf-8", "replace")
 
 
-def read(path: Path, index: int) -> tuple[Mesh, bool, list[str]]:
-    """Return the mesh number `index` of a file, whether it is to be flat, and what was left out.
+def read(path: Path, index: int, archives: dict[Path, bytes]) -> tuple[Mesh, bool, list[str]]:
+    """Return the mesh number `index` of a file, whether it is to be flat, and its warnings.
 
+    archives: the contents of the files that were read before, by path; a file is read once.
     Raises SceneError for a file that is missing or broken, or has no such mesh.
     """
-    data = input_files.read_bytes(path)
+    if path not in archives:
+        archives[path] = input_files.read_bytes(path)
+    data = archives[path]
     first, end, version = _mesh_range(path, data, index)
     stream = _Stream(path, data[first + 4 : end])
     (flags,) = struct.unpack("<I", stream.take(4))

@@ -285,7 +285,8 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
         raise props.element.error(f"{path.name!r} is not a {suffix} file")
     try:
         if suffix == ".serialized":
-            whole, own_flat, warnings = serialized.read(path, props.integer("shape_index", 0))
+            index = props.integer("shape_index", 0)
+            whole, own_flat, warnings = serialized.read(path, index, props.context.archives)
             flat |= own_flat
         else:
             loaded = mesh.read_mesh(path, materials=False)
@@ -296,6 +297,7 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
         props.context.warn(props.element, f"{path.name}: {warning}")
     if crease >= 0.0 and not flat:
         whole = creased(whole, crease)
+    flat |= whole.normals is None and not props.context.document.makes_normals
     vertices, moves = whole.vertices, not np.array_equal(to_world, transforms.IDENTITY)
     if moves:
         vertices = transforms.transform_points(to_world, vertices).astype(np.float32)
