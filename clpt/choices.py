@@ -20,8 +20,19 @@ LAYERS = (
     "indirect", "light_groups", "crypto_object", "crypto_material", "samples", "variance",
 )  # fmt: skip
 QUANTITIES = (
-    "irradiance", "spectral_irradiance", "scalar_irradiance", "illuminance", "scalar_illuminance",
-    "photon_flux_density", "radiance", "spectral_radiance", "luminance",
+    "irradiance",
+    "spectral_irradiance",
+    "scalar_irradiance",
+    "illuminance",
+    "scalar_illuminance",
+    "tristimulus",
+    "cct",
+    "cri",
+    "rf",
+    "photon_flux_density",
+    "radiance",
+    "spectral_radiance",
+    "luminance",
 )  # of light, to be measured
 OBSERVERS = ("cie1931", "cie1964")
 SPACES = ("rec709", "rec2020", "display_p3", "aces2065_1", "acescg", "xyz")

@@ -19,16 +19,15 @@ from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.denoise import needs
 from clpt.errors import LONGEST_WARNING, ClptError, DeviceError, SceneError, one_line
 from clpt.images.colour import View
-from clpt.render.edit.plan import Plan
+from clpt.render.edit.plans import Plan
 from clpt.render.edit.scene_edit import MaterialKey, ShapeKey
-from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
 from clpt.render.film.film_file import (
     classes_text,
     other_devices,
 )
-from clpt.render.film.layer_channels import write_picture
-from clpt.render.film.pictures import PictureForm, Pictures
+from clpt.render.film.layers import write_picture
+from clpt.render.film.pictures import DenoisedPicture, PictureForm, Pictures
 from clpt.render.film.state import join_ranges
 from clpt.render.makers.contents import (
     Change,

@@ -73,7 +73,10 @@ def _show_own(module: ModuleType) -> None:
         name
         for name, value in vars(module).items()
         if not name.startswith("_")
-        and (name.isupper() or (isinstance(value, defined) and value.__module__ == module.__name__))
+        and (
+            name.isupper()
+            or (isinstance(value, defined) and value.__module__.startswith(module.__name__))
+        )
     ]
     vars(module)["__dir__"] = lambda: names
 

@@ -33,7 +33,7 @@ class OnDevice(Protocol):
 
 
 class Look(Protocol):
-    """The weights of emissions for a film, see `clpt.render.spectra.look.Look`."""
+    """The weights of emissions for a film, see `clpt.render.spectra.find.Look`."""
 
     def brightness(self, light: Spectrum) -> float:
         """Return the weight of a spectrum."""

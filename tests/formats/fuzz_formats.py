@@ -29,7 +29,7 @@ import numpy as np
 
 from clpt import images, lenses, measured, spectra
 from clpt.formats import ies, load, volumes
-from clpt.formats.meshes import mesh, mtl, spheres_curves
+from clpt.formats.meshes import mesh, mtl_statements, spheres_curves
 from clpt.formats.mitsuba.serialized import read as read_serialized
 from clpt.images import read_stored
 from clpt.images.spectral_exr import SpectralImage
@@ -539,7 +539,7 @@ FORMATS: dict[str, Format] = {
     "draco": Format(".glb", lambda: [_draco()], glb, _scene),
     "meshopt": Format(".glb", lambda: [_meshopt(0), _meshopt(1)], glb, _scene),
     "obj": Format(".obj", lambda: [OBJ, _ball(".obj")], words, mesh.read_mesh),
-    "mtl": Format(".mtl", lambda: [MTL], words, mtl.read),
+    "mtl": Format(".mtl", lambda: [MTL], words, mtl_statements.read),
     "ply": Format(".ply", lambda: [PLY_BINARY, _ball(".ply")], raw, mesh.read_mesh),
     "ply text": Format(".ply", lambda: [PLY_TEXT], words, mesh.read_mesh),
     "ply.gz": Format(".ply", lambda: [gzip.compress(PLY_BINARY)], gzipped(raw), mesh.read_mesh),

@@ -663,7 +663,7 @@ def test_uv_on_a_mesh():
 
 
 def test_brightness_of_a_texture_is_its_mean():
-    from clpt.render.spectra.look import Look
+    from clpt.render.spectra.find import Look
 
     board = Checkerboard(color0=(1.0, 1.0, 1.0), color1=(0.0, 0.5, 1.0))
     assert board.mean(Look(False, 360.0, 830.0)) == pytest.approx(0.75)

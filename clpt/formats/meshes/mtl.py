@@ -5,10 +5,9 @@ Its illumination models are made from clpt's materials as docs/meshes.md tells.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,16 @@ from numpy.typing import NDArray
 from clpt import images, spectra
 from clpt.choices import Missing
 from clpt.errors import SceneError
-from clpt.files import input_files, text
 from clpt.formats.colours import EVEN, GREY, grey_for
+from clpt.formats.meshes.mtl_statements import (
+    BLACK,
+    WHITE,
+    Options,
+    Statement,
+    Statements,
+    read,
+    uncommented,
+)
 from clpt.formats.meshes.named_files import find
 from clpt.scene.lights import Area
 from clpt.scene.materials import (
@@ -43,87 +50,17 @@ from clpt.scene.textures import Bitmap, Product
 from clpt.scene.values import ImageLike, Textured
 from clpt.spectra import Spectrum, Tabulated
 
-WHITE, BLACK, UNSAID = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.6, 0.6, 0.6)
+UNSAID = (0.6, 0.6, 0.6)  # Kd
 ROUNDING = 1e-3  # of colours that are converted
 COAT, SMOOTHEST = 1.5, 1e-4  # index where none above 1 is given; the least alpha of microfacets
 CHANNELS = {"r": "r", "g": "g", "b": "b", "m": "a", "l": "luminance"}
-WORDS = ("-blendu", "-blendv", "-clamp", "-cc", "-imfchan", "-type", "-colorspace")
-OPTIONS = {  # how many words follow
-    "-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-bm": 1, "-boost": 1, "-texres": 1,
-    **dict.fromkeys(WORDS, 1),
-}  # fmt: skip
-WHOLE = {"-s": WHITE, "-o": BLACK, "-t": BLACK}  # defaults of their last numbers
 UNUSED = {  # options that are left out, and their values that ask for nothing
     "-t": (BLACK,), "-boost": ((0.0,),), "-cc": ("off",), "-type": (), "-imfchan": (*CHANNELS,),
 }  # fmt: skip
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
 BEHIND = re.compile(r"\s(?=-(?:s|o|t|mm|bm|blendu|blendv|clamp|imfchan|cc|boost|texres)\s)")
-ALIKE = {"map_bump": "bump", "map_norm": "norm", "map_kn": "norm", "map_disp": "disp"}
 PHYSICAL = ("pr", "pm", "ps", "pc", "aniso", "map_pr", "map_pm", "map_ps", "map_pc")
 GLASS = (4, 6, 7, 9)
 MIRRORS = (3, 8)
-# Without a meaning where light is traced, or for a material that has no use for them.
-SILENT = {"ka", "illum", "ni", "ns", "ks", "kd", "sharpness", "pcr", "d", "tr"}
-NEUTRAL = {  # values that ask for nothing
-    "tf": (WHITE, (1.0,)), "kt": (BLACK,),
-    **dict.fromkeys(("anisor", "aniso", "pm", "ps", "pc"), ((0.0,),)),
-}  # fmt: skip
-
-
-@dataclass
-class Statement:
-    """A line of a material: its first word `key`, and the words after it."""
-
-    key: str
-    value: str
-    file: Path
-    line: int
-
-    def error(self, message: str) -> SceneError:
-        """Return an error about the line."""
-        return SceneError(f"{self.key}: {message}", file=self.file, line=self.line)
-
-    def words(self) -> list[str]:
-        """Return the words before a comment."""
-        return uncommented(self.value).split()
-
-    def numbers(self, words: list[str] | None = None) -> list[float]:
-        """Return the words as finite numbers. Raises SceneError."""
-        words = self.words() if words is None else words
-        try:
-            values = [float(word) for word in words]
-        except ValueError:
-            message = text.comma_message(self.value) or f"needs numbers, not {self.value[:60]!r}"
-            raise self.error(message) from None
-        if not values or not all(map(math.isfinite, values)):
-            raise self.error(f"needs finite numbers, not {self.value[:60]!r}")
-        return values
-
-
-Statements = dict[str, Statement]
-Options = dict[str, Any]
-
-
-def uncommented(line: str) -> str:
-    """Return a line without the comment behind it, if that follows a blank."""
-    return re.split(r"(?:^|\s)#", line, maxsplit=1)[0].strip()
-
-
-def read(path: Path) -> dict[str, Statements]:
-    """Read the statements of each material by its name. Raises SceneError."""
-    data = text.plain(input_files.read_bytes(path))
-    materials: dict[str, Statements] = {}
-    statements: Statements = {}
-    for number, line in enumerate(data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")):
-        words = text.decode(line.replace(b"\0", b" ")).strip().split(None, 1)
-        if not words or words[0].startswith("#"):
-            continue
-        key, value = words[0].lower(), words[1] if len(words) > 1 else ""
-        if key == "newmtl":
-            statements = materials[value] = {}
-        else:
-            statements[ALIKE.get(key, key)] = Statement(words[0], value, path, number + 1)
-    return materials
 
 
 @dataclass
@@ -202,7 +139,7 @@ class _Maker:
             surface = Mask(material=surface, opacity=opacity)
             if emission is not None:  # a surface that is cut away does not shine
                 radiance = Product(first=emission.radiance, second=opacity)
-                emission = dataclasses.replace(emission, radiance=radiance)
+                emission = replace(emission, radiance=radiance)
         self.tell_rest()
         return surface if _transmits(surface) else TwoSided(front=surface), emission
 
@@ -212,7 +149,7 @@ class _Maker:
         if len(same) == 2 and same[0] == same[1]:
             self.used.add("map_ka")
         for key, statement in self.statements.items():
-            if key not in self.used and key not in SILENT and not _is_neutral(key, statement):
+            if key not in self.used and not statement.is_neutral(key):
                 self.library.left_out[statement.key] = None
 
     # What a surface is
@@ -253,9 +190,7 @@ class _Maker:
         """Return a material with a highlight, as wide as Ns says."""
         alpha = self.alpha()
         if diffuse == BLACK:
-            return RoughConductor(
-                specular_reflectance=gloss, alpha_u=alpha, alpha_v=alpha, name=self.name
-            )
+            return RoughConductor(specular_reflectance=gloss, alpha=alpha, name=self.name)
         if (self.number("ns", 0.0) or 0.0) <= 0.0:  # no highlight, but a second Kd
             return Diffuse(reflectance=diffuse, name=self.name)
         return RoughPlastic(
@@ -325,8 +260,7 @@ class _Maker:
             return RoughDielectric(
                 int_ior=index,
                 ext_ior=1.0,
-                alpha_u=alpha,
-                alpha_v=alpha,
+                alpha=alpha,
                 specular_transmittance=self.reflectance("tf", None, WHITE),
                 name=self.name,
             )
@@ -388,7 +322,7 @@ class _Maker:
             return None if value == 1.0 else value
         pixels = _pixels(image)
         if "-imfchan" not in options and pixels.shape[2] == 4 and pixels[..., 3].min() < 1.0:
-            image = dataclasses.replace(image, channel="a")
+            image = replace(image, channel="a")
         if value == 0.0:
             self.remark(f"d is 0 beside {statement.key}: the image alone counts")
         return image if value in (0.0, 1.0) else Product(first=image, second=value)
@@ -503,10 +437,10 @@ class _Maker:
 
         even: the stand-in is a flat normal map.
         """
-        name, options = _options(statement, statement.value)
+        name, options = statement.image(statement.value)
         path = self.find(statement, name)
         if path is None and (behind := BEHIND.search(name)):
-            options |= _options(statement, name[behind.end() :])[1]
+            options |= statement.image(name[behind.end() :])[1]
             name = name[: behind.start()]
             path = self.find(statement, name)
         if path is None:
@@ -525,31 +459,6 @@ class _Maker:
             if options[option] not in UNUSED[option]:
                 self.library.left_out[f"{statement.key} {option}"] = None
         return _placed(path, options, raw), options
-
-
-def _options(statement: Statement, unread: str) -> tuple[str, Options]:
-    """Return the name of an image, and the options before it. Raises SceneError."""
-    options: Options = {}
-    while (match := re.match(r"(-[a-z]+)(\s+|$)", unread, re.IGNORECASE)) is not None:
-        option = match[1].lower()
-        if option not in OPTIONS:
-            break
-        unread = unread[match.end() :]
-        taken: list[str] = []
-        while len(taken) < OPTIONS[option] and (word := re.match(r"(\S+)(\s+|$)", unread)):
-            if option not in WORDS and not NUMBER.fullmatch(word[1]):
-                break
-            taken.append(word[1])
-            unread = unread[word.end() :]
-        if option in WORDS and taken:
-            options[option] = taken[0].lower()
-        elif taken and (option in WHOLE or len(taken) == OPTIONS[option]):
-            values = statement.numbers(taken)
-            options[option] = (*values, *WHOLE.get(option, ())[len(values) :])
-        else:
-            message = text.comma_message(unread) or f"{option} needs {OPTIONS[option]} numbers"
-            raise statement.error(message)
-    return unread.strip(), options
 
 
 def _placed(path: Path, options: Options, raw: bool) -> Bitmap:
@@ -588,11 +497,3 @@ def _is_normal_map(pixels: NDArray[np.float32]) -> bool:
 
 def _transmits(material: Material) -> bool:
     return any(part.transmits for part in parts(material))
-
-
-def _is_neutral(key: str, statement: Statement) -> bool:
-    """Return whether a statement asks for nothing."""
-    try:
-        return (*statement.numbers(),) in NEUTRAL.get(key, ())
-    except SceneError:
-        return False

@@ -201,7 +201,7 @@ def example(cls: type[Kind]) -> list[tuple[str, str]]:
         return []
     chosen = _chosen(cls)
     arguments = ", ".join(f"{name}={value!r}" for name, value in chosen.items())
-    code = f"{cls.__module__.rpartition('.')[2]}.{cls.__name__}({arguments})"
+    code = f"{cls.__module__.split('.')[2]}.{cls.__name__}({arguments})"
     return [(json.dumps({"type": cls.kind, **chosen}), code)]
 
 

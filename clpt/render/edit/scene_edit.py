@@ -15,7 +15,7 @@ from clpt.arrays import on_device
 from clpt.errors import SceneError
 from clpt.geometry import shapes
 from clpt.geometry.instancing import distinct
-from clpt.render.records.device_arrays import fresh_view, readable
+from clpt.render.records.tables import fresh_view, readable
 from clpt.scalars import is_whole
 from clpt.scene import Scene
 from clpt.scene.materials import Material, parts

@@ -18,8 +18,7 @@ from clpt.render.lights.encode import LightRows
 from clpt.render.lights.find import row_order
 from clpt.render.records import LayerFeatures
 from clpt.render.records.film import LayerNames
-from clpt.render.records.lowering_cache import LoweringCache
-from clpt.render.records.tables import TableStore
+from clpt.render.records.tables import LoweringCache, TableStore
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import materials as mt
 from clpt.scene.layers import MOST_NAMED

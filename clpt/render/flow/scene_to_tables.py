@@ -17,12 +17,12 @@ from clpt.geometry import shape_records, shapes
 from clpt.geometry.instancing import Instances
 from clpt.geometry.refining import is_refined
 from clpt.records import SHAPE_BITS
-from clpt.render.camera.encode import encode_camera
+from clpt.render.camera import encode_camera
 from clpt.render.film import filters
 from clpt.render.film.colour import sensor
+from clpt.render.flow.check import warnings_of
 from clpt.render.flow.find import Analysis, Before, analyse
 from clpt.render.flow.layer_names import lower_names
-from clpt.render.flow.remarks import warnings_of
 from clpt.render.flow.settings import settings_of
 from clpt.render.geometry.encode import (
     encode_attributes,
@@ -39,7 +39,7 @@ from clpt.render.media.bodies import BodyWords
 from clpt.render.media.encode import MediumWords, media_features, medium_aims
 from clpt.render.media.grids import DeviceGrid
 from clpt.render.media.light_media import light_media_words
-from clpt.render.motion.encode import lower_motion
+from clpt.render.motion import lower_motion
 from clpt.render.records import (
     CameraFeatures,
     Features,
@@ -49,10 +49,9 @@ from clpt.render.records import (
     SpectraFeatures,
     TransportFeatures,
 )
-from clpt.render.records.device_arrays import is_table
 from clpt.render.records.film import LayerNames
-from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.records.materials import row_words
+from clpt.render.records.tables import LoweringCache, is_table
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.find import Density, density, emissions
 from clpt.render.textures.image_files import ImageFiles

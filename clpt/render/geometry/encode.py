@@ -24,8 +24,7 @@ from clpt.render.geometry.find import Geometry, Owner, Stored, spheres_move
 from clpt.render.materials.encode import MaterialWords
 from clpt.render.materials.encoder import Encoder
 from clpt.render.records import GeometryFeatures, MotionFeatures
-from clpt.render.records.lowering_cache import LoweringCache
-from clpt.render.records.tables import TableStore
+from clpt.render.records.tables import LoweringCache, TableStore
 from clpt.render.records.textures import TextureFeatures
 from clpt.render.scene_index import SceneIndex
 from clpt.render.textures.encode import TextureTable

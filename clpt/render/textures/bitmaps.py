@@ -26,8 +26,7 @@ from clpt.errors import SceneError
 from clpt.files import budget
 from clpt.images import Stored
 from clpt.images.stored import checked
-from clpt.render.records.lowering_cache import LoweringCache, version
-from clpt.render.records.tables import TableStore
+from clpt.render.records.tables import LoweringCache, TableStore, version
 from clpt.render.records.textures import KINDS, MIPS
 from clpt.render.textures.texels import texels
 from clpt.scene.pixels import channel, image_file

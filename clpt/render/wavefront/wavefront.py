@@ -27,9 +27,8 @@ from clpt.render.wavefront import strategy
 from clpt.render.wavefront.bounce_loop import BounceLoop, Ending, Kernels, OnCounters, Step
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.film import Film
-from clpt.render.wavefront.guide import Guide
+from clpt.render.wavefront.light_caches import Guide, Photons
 from clpt.render.wavefront.path_buffers import COUNTERS, PathBuffers, divide_film
-from clpt.render.wavefront.photons import Photons
 from clpt.render.wavefront.strategy import UNTUNED, Strategy, Tuning
 
 log = logging.getLogger(__name__)
@@ -96,14 +95,14 @@ class Wavefront:
                 **scene.arguments, **paths.arguments, **film.arguments, **learned
             },
         )  # fmt: skip
-        self.leave = device.Flag(self.device)
+        self.leave, pause = device.Flag(self.device), device.Flag(self.device)
         self.begun = False
         self._in_flight: BounceLoop | None = None  # whose paths may not have ended
         self._counted = np.zeros(len(COUNTERS), np.uint64), Counts()  # read last, and what it gives
         self.loops = [
             BounceLoop(
                 self.kernels, scene, paths, self.timings, looped, which,
-                Ending(None if guide and which == 0 else self.leave, tuning.cancel_seconds),
+                Ending(pause, None if guide and which == 0 else self.leave, tuning.cancel_seconds),
             )
             for which in range(len(features.passes))
         ]  # fmt: skip

@@ -10,7 +10,7 @@ import pytest
 from clpt import transforms as tf
 from clpt.render.flow.find import Before, analyse
 from clpt.render.flow.scene_to_tables import lower
-from clpt.render.records.lowering_cache import LoweringCache
+from clpt.render.records.tables import LoweringCache
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Auto, Path, Vcm

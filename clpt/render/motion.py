@@ -1,4 +1,5 @@
-"""Motion as words: the tracks of moving objects, and the shutter."""
+"""Motion as words: the tracks of moving objects, and the shutter.
+"""
 
 from __future__ import annotations
 
