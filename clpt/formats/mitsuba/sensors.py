@@ -37,7 +37,8 @@ REPLAYED_DEPTH = 6  # default of integrators that differentiate
 # Parameters of integrators that differentiate at edges; they change derivatives alone.
 OF_EDGES = (
     *("sppc", "sppp", "sppi", "guiding", "guiding_proj", "guiding_rounds"),
-    *(f"reparam_{n}" for n in "max_depth rays kappa exp antithetic unroll".split()),
+    *("reparam_max_depth", "reparam_rays", "reparam_kappa", "reparam_exp"),
+    *("reparam_antithetic", "reparam_unroll"),
 )
 DEFAULT_SAMPLER = "independent"
 LAYERS = {  # of the values that the integrator aov names

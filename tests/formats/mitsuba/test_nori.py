@@ -96,7 +96,8 @@ def test_ao_is_the_open_share(read):
     picture = np.asarray(clpt.render(scene, 256, mode="rgb"))
     assert picture[4, 4].mean() == pytest.approx(1.0, abs=5 / 16 / 16), "5 sigma of a share"
     up = CAMERA.replace('target="0,0,0"', 'target="0,0,9"')
-    assert not np.asarray(clpt.render(read('<integrator type="ao"/>' + floor(), up), 4, mode="rgb")).any()
+    away = read('<integrator type="ao"/>' + floor(), up)
+    assert not np.asarray(clpt.render(away, 4, mode="rgb")).any()
 
 
 def albedo_of_microfacet(kd: float, alpha: float, inner: float, outer: float) -> float:
@@ -106,11 +107,12 @@ def albedo_of_microfacet(kd: float, alpha: float, inner: float, outer: float) ->
     dwo = 4 cos(theta_h) dwh. D is Beckmann's, G1 is Smith's of 1 for wi.
     """
     theta = (np.arange(200_000) + 0.5) / 200_000 * math.pi / 4  # beyond it goes below the surface
-    cos_h, cos_o = np.cos(theta), np.cos(2.0 * theta)
+    cos_h = np.cos(theta)
     d = np.exp(-(np.tan(theta) ** 2) / alpha**2) / (math.pi * alpha**2 * cos_h**4)
     eta = inner / outer
     cos_t = np.sqrt(1.0 - (1.0 - cos_h**2) / eta**2)
-    s, p = (cos_h - eta * cos_t) / (cos_h + eta * cos_t), (eta * cos_h - cos_t) / (eta * cos_h + cos_t)
+    s = (cos_h - eta * cos_t) / (cos_h + eta * cos_t)
+    p = (eta * cos_h - cos_t) / (eta * cos_h + cos_t)
     a = 1.0 / (alpha * np.tan(2.0 * theta))
     tail = (3.535 * a + 2.181 * a**2) / (1.0 + 2.276 * a + 2.577 * a**2)
     g = np.where(a < 1.6, tail, 1.0)
