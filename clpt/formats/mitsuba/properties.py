@@ -219,9 +219,11 @@ class Properties:
     def object(self, tag: str) -> Element | None:
         """Take the single nested object of a tag, or None."""
         objects = self.objects(tag)
-        if len(objects) > 1:
+        if len(objects) > 1 and not self.context.old:
             raise self.element.error(f"holds more than one <{tag}>")
-        return objects[0] if objects else None
+        if len(objects) > 1:
+            self.context.warn(self.element, f"holds more than one <{tag}>: the last counts")
+        return objects[-1] if objects else None
 
     def number(self, name: str, default: float) -> float:
         """Take a finite number."""

@@ -1,11 +1,12 @@
-"""Mitsuba 0.6's `maxSmoothAngle`: normals of a mesh that stays sharp at its creases."""
+"""Shapes of a Mitsuba scene, and the sharp creases of Mitsuba 0.6's `maxSmoothAngle`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -106,10 +107,15 @@ def _single(element: Element, context: Context) -> list[Shape]:
     """Make the shape of an element; None for an unknown kind if missing kinds are grey."""
     if element.type == "instance":
         return [_instance(element, context)]
-    if element.type not in PLUGINS:
-        known = (*PLUGINS, "shapegroup", "instance", "merge")
+    plugins = _plugins(context)
+    if element.type not in plugins:
+        known = (*plugins, "shapegroup", "instance", "merge")
         return context.stand_in(unknown(element, known), element, [])
     return [shape(element, context)]
+
+
+def _plugins(context: Context) -> dict[str, tuple[type[Shape], PluginReader[Parameters]]]:
+    return {**PLUGINS, **OF_OLD} if context.old else PLUGINS
 
 
 def _merged(element: Element, context: Context) -> list[Element]:
@@ -124,7 +130,7 @@ def _merged(element: Element, context: Context) -> list[Element]:
 
 def shape(element: Element, context: Context) -> Shape:
     """Make the shape that a <shape> describes, which is no group and no instance."""
-    cls, read = PLUGINS[element.type]
+    cls, read = _plugins(context)[element.type]
     props = Properties(element, context)
     props.ignore("silhouette_sampling_weight")
     material, emitter = props.object("bsdf"), props.object("emitter")
@@ -323,17 +329,35 @@ def _linear_curve(props: Properties) -> Parameters:
     return {"basis": "linear", **_curves(props)}
 
 
+def _hair(props: Properties) -> Parameters:
+    """Mitsuba 0.x: strands of an even radius, which `to_world` scales: src/shapes/hair.cpp."""
+    props.ignore("angle_threshold")
+    if props.number("reduction", 0.0) != 0.0:
+        props.context.warn(props.element, "'reduction' is left out: all strands are there")
+    radius = props.number("radius", 0.025)
+    arrays, to_world = _strands(props, spheres_curves.read_hair)
+    radii = np.full(len(arrays["points"]), radius * np.linalg.norm(to_world[:3, 2]), np.float32)
+    return {**arrays, "basis": "linear", "points": np.column_stack([arrays["points"], radii])}
+
+
 def _curves(props: Properties) -> Parameters:
     """Read strands; `to_world` moves their points and, as in Mitsuba, leaves their radii."""
+    return _strands(props, spheres_curves.read_strands)[0]
+
+
+def _strands(
+    props: Properties, read: Callable[[Path], dict[str, Any]]
+) -> tuple[Parameters, transforms.Matrix]:
+    """Return the strands of a file in the world, and `to_world`."""
     path, to_world = props.file(), props.placement(thin=True)
     try:
-        arrays = spheres_curves.read_strands(path)
+        arrays = read(path)
     except SceneError as error:
         line = f":{error.line}" if error.line else ""
         raise props.element.error(f"{path.name}{line}: {error.message}") from None
     points = arrays["points"]
     points[:, :3] = transforms.transform_points(to_world, points[:, :3])
-    return arrays
+    return arrays, to_world
 
 
 def _sdf_grid(props: Properties) -> Parameters:
@@ -362,4 +386,7 @@ PLUGINS: dict[str, tuple[type[Shape], PluginReader[Parameters]]] = {
     "bsplinecurve": (shapes.Curves, _bspline_curve),
     "linearcurve": (shapes.Curves, _linear_curve),
     "sdfgrid": (shapes.SdfGrid, _sdf_grid),
+}
+OF_OLD: dict[str, tuple[type[Shape], PluginReader[Parameters]]] = {  # of Mitsuba 0.x alone
+    "hair": (shapes.Curves, _hair),
 }
