@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from clpt.errors import SceneError
 
@@ -29,7 +29,7 @@ PER_REPEAT = 256  # a file that is read again counts as a part for each so many 
 SECONDS = 600.0
 SHARE = 2  # a load may take the available memory divided by this
 UNKNOWN = 4 << 30  # bytes, if the system does not tell
-Result = TypeVar("Result")
+Function = TypeVar("Function", bound=Callable[..., object])
 # Files of a control group, versions 2 and 1: the limit, what is used, and the pages of files that
 # nobody has used of late. These count as used, but the kernel gives them up first.
 _CGROUPS = (
@@ -151,18 +151,18 @@ def _drawn_from(account: Account) -> Iterator[None]:
         _account.reset(token)
 
 
-def carried(function: Callable[..., Result]) -> Callable[..., Result]:
+def carried(function: Function) -> Function:
     """Return the function such that it draws from this account in other threads too."""
     account = _account.get()
 
-    def carrying(*arguments: object) -> Result:
+    def carrying(*arguments: object) -> object:
         token = _account.set(account)
         try:
             return function(*arguments)
         finally:
             _account.reset(token)
 
-    return carrying
+    return cast(Function, carrying)
 
 
 def take(size: int, subject: str, file: Path | None = None) -> None:

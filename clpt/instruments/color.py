@@ -50,7 +50,7 @@ def _each_spectrum(function: Callable[[Any], float], pixels: Floats) -> Floats:
     """Apply a function to spectra (..., bands) at WAVELENGTHS; the value of darkness is NaN."""
     distribution = _colour().SpectralDistribution
     spectra = pixels.reshape(-1, len(WAVELENGTHS))
-    with _colour().utilities.suppress_warnings(colour_warnings=True):
+    with _colour().utilities.suppress_warnings(colour_runtime_warnings=True):
         values = [
             function(distribution(spectrum, WAVELENGTHS)) if spectrum.any() else np.nan
             for spectrum in spectra

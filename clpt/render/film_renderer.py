@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clpt import device as dev
-from clpt import images, scalars
-from clpt.arrays import Image
+from clpt import images
+from clpt.arrays import Image, is_whole, whole
 from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.denoise import needs
 from clpt.errors import LONGEST_WARNING, ClptError, DeviceError, SceneError, one_line
@@ -525,7 +525,7 @@ def next_range(first: int, samples: int) -> tuple[int, int]:
 
 def checked_number(number: int) -> int:
     """Return a sample's number. Raises SceneError for a number below 0, and for a large number."""
-    number = scalars.whole(number, 0, where="first_sample")
+    number = whole(number, 0, where="first_sample")
     if number > MOST_SAMPLES:
         raise SceneError(f"a pixel cannot have more than {MOST_SAMPLES} samples", where="samples")
     return number
@@ -533,6 +533,6 @@ def checked_number(number: int) -> int:
 
 def checked_samples(samples: int) -> int:
     """Return a number of samples. Raises SceneError unless it is whole and above 0."""
-    if not scalars.is_whole(samples) or samples < 1:
+    if not is_whole(samples) or samples < 1:
         raise SceneError(f"samples per pixel must be a whole number above zero, not {samples!r}")
     return int(samples)

@@ -1,5 +1,4 @@
-"""Motion as words: the tracks of moving objects, and the shutter.
-"""
+"""Motion as words: the tracks of moving objects, and the shutter."""
 
 from __future__ import annotations
 

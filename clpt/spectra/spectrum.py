@@ -17,9 +17,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.arrays import Floats
+from clpt.arrays import Floats, real
 from clpt.errors import SceneError
-from clpt.scalars import real
 from clpt.spectra import cie, data, upsampling
 
 Role = Literal["reflectance", "unbounded", "emission"]

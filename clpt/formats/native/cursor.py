@@ -9,16 +9,16 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from clpt.arrays import is_number
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.files import budget
 from clpt.files import text as text_files
 from clpt.formats.reading import Located
-from clpt.scalars import is_number
 
 LARGEST_INTEGER = 2**31 - 1
 PER_LETTER = 16  # bytes of memory for each letter of JSON, while it is read
@@ -119,6 +119,9 @@ class Cursor(Located):
     def numbers(self, count: int = 0) -> list[float]:
         """Return a list of finite numbers, `count` of them unless that is 0."""
         return [entry.number() for entry in self.entries(count)]
+
+
+ReadCursor = Callable[[Cursor], Any]  # reads the value at a cursor
 
 
 def parse(path: Path, confined: bool = False) -> Cursor:

@@ -38,18 +38,6 @@ from clpt.scene.media import Medium
 
 
 @dataclass(frozen=True)
-class Before:
-    """Decisions before an edit, which stay.
-
-    integrator: its film has sums for light paths, or none; lit_ghosts: whether light paths were
-    ghosts of a lens.
-    """
-
-    integrator: Integrator
-    lit_ghosts: bool
-
-
-@dataclass(frozen=True)
 class Analysis:
     """The facts about a scene that lowering encodes.
 
@@ -72,21 +60,29 @@ class Analysis:
     warnings: tuple[str, ...]
 
 
-def analyse(scene: Scene, cache: LoweringCache, before: Before | None = None) -> Analysis:
+def analyse(
+    scene: Scene,
+    cache: LoweringCache,
+    former: Integrator | None = None,
+    *,
+    lit_before: bool | None = None,
+) -> Analysis:
     """Return the facts about a scene; cache: with results of the analysis before.
+
+    former: the integrator before an edit, which stays: its film has sums for light paths, or none;
+    lit_before: whether light paths were ghosts of a lens then.
 
     Raises SceneError for an invalid scene; it names the shape, light or material.
     """
     scene = at_rest(scene)
     check_at_rest(scene, cache)
     scene = plainly_lit(scene)
-    index = replace(SceneIndex.of(scene), lit_before=before.lit_ghosts if before else None)
+    index = replace(SceneIndex.of(scene), lit_before=lit_before)
     geometry = assembled(index, cache)
     sphere = geometry.bounding_sphere()
     look = Look.of(scene.film, cache)
     sources = sources_of(index, geometry, sphere[1], look)
     index, lit = _media_at_lights(index, geometry, sources, sphere, cache)
-    former = before.integrator if before else None
     lights = Lit(index, geometry, look, sources, sphere, lit.extinction)
     index, reason = decided(lights, former)
     around, warnings = _at_the_camera(scene, index, cache)

@@ -21,7 +21,7 @@ from clpt.render.camera import encode_camera
 from clpt.render.film import filters
 from clpt.render.film.colour import sensor
 from clpt.render.flow.check import warnings_of
-from clpt.render.flow.find import Analysis, Before, analyse
+from clpt.render.flow.find import Analysis, analyse
 from clpt.render.flow.layer_names import lower_names
 from clpt.render.flow.settings import settings_of
 from clpt.render.geometry.encode import (
@@ -139,12 +139,13 @@ def lower(
     has left.
     """
     cache = LoweringCache(former.cache if former else None)
-    before = None
+    integrator = lit_ghosts = None
     if former is not None and not anew:
-        before = Before(former.integrator, former.features.transport.lit_ghosts)
+        integrator, lit_ghosts = former.integrator, former.features.transport.lit_ghosts
     with budget.resumed(scene.account):
         files = ImageFiles.of(named_files(scene), former.files if former else ImageFiles())
-        lowered = encode(analyse(scene, cache, before), cache, texture_budget)
+        analysis = analyse(scene, cache, integrator, lit_before=lit_ghosts)
+        lowered = encode(analysis, cache, texture_budget)
         files.check()
     return replace(lowered, files=files)
 

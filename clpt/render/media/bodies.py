@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import is_whole
 from clpt.errors import SceneError
 from clpt.geometry import shapes
 from clpt.geometry.winding import box
@@ -30,7 +31,6 @@ from clpt.render.materials.encoder import Encoder
 from clpt.render.media.encode import MediumWords
 from clpt.render.records.tables import LoweringCache
 from clpt.render.scene_index import SceneIndex, any_of, leaves_of
-from clpt.scalars import is_whole
 from clpt.scene import materials as mt
 from clpt.scene import roles
 from clpt.scene.materials import CLEAR, Material

@@ -8,12 +8,11 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clpt import device
 from clpt.device.stream import Timings
@@ -34,7 +33,7 @@ LEAST_ITEMS = 1 << 12  # of a part
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
 IDLE = {"samples": (0, 0), "begin": 0, "bounces": 0, "restart": 0, "leave": None}  # nothing to do
 
-OnCounters = Callable[[NDArray[np.uint64]], bool]  # returns whether a run goes on
+OnBatch = Callable[[Any], bool]  # called with counters; returns whether a run goes on
 
 
 @dataclass(frozen=True)
@@ -55,16 +54,29 @@ class Step:
             yield first, min(most, items - first)
 
 
+class HasArguments(Protocol):
+    """An owner of buffers."""
+
+    @property
+    def arguments(self) -> Mapping[str, Any]:
+        """The arguments of kernels by name."""
+
+
 class Kernels:
     """Programs of a device by name, and their kernels with the arguments that they all share.
 
-    arguments: returns the arguments by name. seconds: of building.
+    owners: of buffers, each with `arguments` by name. seconds: of building.
     """
 
-    def __init__(self, on: device.Device, arguments: Callable[[], dict[str, Any]]):
-        self.device, self.arguments = on, arguments
+    def __init__(self, on: device.Device, owners: Sequence[HasArguments]):
+        self.device, self._owners = on, owners
         self.programs: dict[str, device.Program] = {}
         self.seconds = 0.0
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The present arguments of all owners by name."""
+        return {name: value for owner in self._owners for name, value in owner.arguments.items()}
 
     def build(self, texts: dict[str, device.Source]) -> None:
         """Build those programs that are not built yet."""
@@ -83,7 +95,7 @@ class Kernels:
     def bind(self, program: str, name: str, **more: object) -> device.BoundKernel:
         """Return a kernel of a program with its arguments, by the names in its signature."""
         kernel = self.programs[program].kernel(name)
-        arguments = {**self.arguments(), **more}
+        arguments = {**self.arguments, **more}
         return kernel.bind(**{a.name: arguments[a.name] for a in kernel.arguments})
 
 
@@ -187,7 +199,7 @@ class BounceLoop:
         event = self.stream.run(self.loop, (self._items,), self._group)
         self.timings.add(f"{self._label}loop", event)
 
-    def run(self, first: int, end: int, on_batch: OnCounters) -> bool:
+    def run(self, first: int, end: int, on_batch: OnBatch) -> bool:
         """Trace the paths of samples first to end - 1 of every pixel, and wait.
 
         on_batch is called every few iterations with the counters; if it returns False, every path
@@ -211,7 +223,7 @@ class BounceLoop:
         self._ending.pause.lower()
         self._go_on((self._first, self._first), self._ending.pause, lambda _: False)
 
-    def _go_on(self, numbers: tuple[int, int], leave: device.Flag, on_batch: OnCounters) -> bool:
+    def _go_on(self, numbers: tuple[int, int], leave: device.Flag, on_batch: OnBatch) -> bool:
         """Trace paths of these numbers until none is in flight; see `run`.
 
         leave: is raised for a moment if a launch takes too long.

@@ -149,9 +149,7 @@ def test_its_functions_and_constants_are_its_own() -> None:
             return x * table[0];
         }
     """
-    text = device.Source(
-        "own", materials.text(type("Own", (Paint,), {"source": helped})).text, ()
-    )
+    text = device.Source("own", materials.text(type("Own", (Paint,), {"source": helped})).text, ())
     private = text.with_private("own").text
     assert "\nstatic constant float table[2]" in private
     assert "\nstatic real helper(real x)" in private and "static return" not in private
