@@ -296,7 +296,7 @@ class Spot(PoweredLamp):
     beam_width: float = real(15.0, "half angle of full intensity", "degrees", 0.0, 180.0)
     edge: str = choice(
         "linear",
-        "how it falls off: linear in the angle; in the cosine smooth, by a cubic, or by the 4th power",
+        "how it falls off: linear in the angle; smooth, a cubic in the cosine, or its 4th power",
         SPOT_EDGES,
     )
     image: Textured = reflectance(
