@@ -101,11 +101,11 @@ def _materials(shapes: Iterable[Shape]) -> tuple[dict[int, int], list[mt.Materia
 
 def _groups(index: SceneIndex, geometry: Geometry, lights: LightRows) -> list[str]:
     """The group of each row of `lights`."""
-    lamps = index.lights
+    lamps, starts = index.lights, lights.sources.first
     groups = [lamps[i].group or REST for i in row_order(lamps)]
-    groups += [REST] * (next(iter(lights.first), len(lights.rows)) - len(groups))  # of media
-    ends = (*lights.first, len(lights.rows))[1:]
-    for emitter, first, end in zip(geometry.emitters, lights.first, ends, strict=True):
+    groups += [REST] * (next(iter(starts), len(lights.rows)) - len(groups))  # of media
+    ends = (*starts, len(lights.rows))[1:]
+    for emitter, first, end in zip(geometry.emitters, starts, ends, strict=True):
         emission = emitter.shape.emission
         groups += [(emission.group if emission else "") or REST] * (end - first)
     return groups

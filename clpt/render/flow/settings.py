@@ -49,7 +49,7 @@ def settings_of(
         settings["guide_side"] = side * sphere[1]
     settings["mis_area_unit"] = mis_area_unit(sphere[1])
     settings["light_count"] = len(lights.rows)
-    settings["infinite_count"] = lights.infinite
+    settings["infinite_count"] = lights.sources.infinite
     settings["first_analytic"] = geometry.first_analytic
     settings["analytic_count"] = len(geometry.boxes)
     settings["single_count"] = geometry.single_count
@@ -57,7 +57,7 @@ def settings_of(
     settings["tanh_min"], settings["tanh_max"] = tanh_ends(density.lo, density.hi)
     film = index.film
     matrix = output_matrix(film, index.mode)
-    scale = settings["film_scale"] = film_scale(film, light_level(index, lights, sphere))
+    scale = settings["film_scale"] = film_scale(film, light_level(index, lights.sources, sphere))
     settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
     settings["center"], settings["scene_radius"] = sphere
     _set_layers(settings, layers)

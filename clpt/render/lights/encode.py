@@ -141,38 +141,32 @@ FEW_LIGHTS = 256  # up to this number a single random number chooses a light and
 
 @dataclass(frozen=True)
 class LightRows:
-    """The table `lights`, and what features and settings need to know of it.
+    """The table `lights`.
 
-    rows: structured (n,) of LIGHT.dtype; power: (n,) float64 [W/nm]; radiance: the largest mean
-    radiance of a shape [W m^-2 sr^-1 nm^-1]; infinite: the number of infinite rows, the first of
-    all; kinds: present kinds, for `dispatch_text`; first: per emitter, its first row; whole: per
-    emitter, whether a single row stands for it; visible: whether rays see any; two_sided: whether
-    any shines from the back of its shape too; unseen: whether any shines from a shape, but no ray
-    sees it; bounds: of the rows of each source; tree: words of the light tree behind the rows, None
-    where the alias table chooses.
+    rows: structured (n,) of LIGHT.dtype, those of `sources` in their order; tree: words of the
+    light tree behind the rows, None where the alias table chooses.
     """
 
+    sources: Sources
     rows: np.ndarray
-    power: NDArray[np.float64]
-    radiance: float
-    infinite: int
-    kinds: tuple[str, ...]
-    first: tuple[int, ...]
-    whole: tuple[bool, ...]
-    visible: bool
-    two_sided: bool
-    unseen: bool
-    bounds: tuple[light_bounds.Bounds, ...]
     tree: NDArray[np.uint32] | None
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds that occur, in their order."""
+        return tuple(KINDS[i] for i in sorted({*self.rows["kind"].tolist()}))
 
     def features(self, gloss: int = 0) -> LightFeatures:
         """Return the features of these rows; gloss: see `LightFeatures`."""
+        modes = self.rows["emission_mode"]
+        shine = (self.rows["shape"] >= 0) & (modes & (ALONG | UNSEEN) == 0)
+        infinite = self.sources.infinite > 0
         return LightFeatures(
             kinds=self.kinds,
-            infinite=self.infinite > 0,
-            visible=self.visible,
-            two_sided=self.two_sided,
-            unseen=self.unseen,
+            infinite=infinite,
+            visible=infinite or bool(shine.any()),
+            two_sided=bool((modes & BOTH).any()),
+            unseen=bool((modes & UNSEEN).any()),
             tree=self.tree is not None,
             few=len(self.rows) <= FEW_LIGHTS,
             gloss=gloss,
@@ -198,30 +192,15 @@ def light_rows(
     blocks = [_lamp_rows(lamps[i], encoder) for i in sources.order]
     blocks += [_volume_rows(word, part, encoder) for word, part in volumes]
     blocks += [_emitter_rows(emitter, encoder) for emitter in emitters]
-    every, infinite, power = sources.every, sources.infinite, sources.power
     rows = np.concatenate([np.zeros(0, LIGHT.dtype), *blocks])
     tree = None
     if len(rows):
-        weights = _shared(power, infinite)
+        weights = _shared(sources.power, sources.infinite)
         by = content(weights)
         rows["pmf"], rows["keep"], rows["alias"] = encoder.cache(alias_table, weights, by=(by,))
-        if tree_from is not None and has_tree(every, tree_from):
-            tree = _tree(every, encoder)
-    shine = (rows["shape"] >= 0) & (rows["emission_mode"] & (ALONG | UNSEEN) == 0)
-    return LightRows(
-        rows=rows,
-        power=power,
-        radiance=max((source.radiance for source in every), default=0.0),
-        infinite=infinite,
-        kinds=tuple(KINDS[i] for i in sorted({*rows["kind"].tolist()})),
-        first=sources.first,
-        whole=tuple(is_whole(emitter.shape) for emitter in emitters),
-        visible=infinite > 0 or bool(shine.any()),
-        two_sided=bool((rows["emission_mode"] & BOTH).any()),
-        unseen=bool((rows["emission_mode"] & UNSEEN).any()),
-        bounds=tuple(source.bounds for source in every),
-        tree=tree,
-    )
+        if tree_from is not None and has_tree(sources.every, tree_from):
+            tree = _tree(sources.every, encoder)
+    return LightRows(sources, rows, tree)
 
 
 def has_tree(every: Sequence[Source], tree_from: int) -> bool:
@@ -326,7 +305,7 @@ def alias_table(
 
 
 def light_level(
-    index: SceneIndex, lights: LightRows, sphere: tuple[NDArray[np.float64], float]
+    index: SceneIndex, sources: Sources, sphere: tuple[NDArray[np.float64], float]
 ) -> float:
     """Estimate the largest radiance that the camera may see [W m^-2 sr^-1 nm^-1].
 
@@ -336,14 +315,15 @@ def light_level(
     """
     centre, radius = sphere
     arrives = 0.0
-    if lights.bounds:
-        bounds = light_bounds.concatenated(list(lights.bounds))
+    every = sources.every
+    if every:
+        bounds = light_bounds.concatenated([source.bounds for source in every])
         away = np.square((bounds.low + bounds.high) / 2.0 - centre).sum(axis=1)
         square = np.where(bounds.placed, np.maximum(away, radius**2), radius**2)
-        arrives = float((lights.power / (4.0 * np.pi * square)).sum())
+        arrives = float((sources.power / (4.0 * np.pi * square)).sum())
     look = Look.of(index.film)
     media = [medium.light for medium in index.emitting if medium.light is not None]
     glow = [look.brightness(light) * radius for light in media]
     ambient = index.integrator.ambient
     around = 0.0 if ambient is None else mean(ambient, look)
-    return max(lights.radiance, arrives, around, *glow)
+    return max(*(source.radiance for source in every), arrives, around, *glow)
