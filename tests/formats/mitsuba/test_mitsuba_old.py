@@ -451,3 +451,21 @@ def test_the_texture_of_a_normal_map_needs_no_name(material, tmp_path):
     texture = '<texture type="bitmap"><string name="filename" value="n.png"/></texture>'
     mapped = material(f'<bsdf type="normalmap">{texture}<bsdf type="diffuse"/></bsdf>')
     assert isinstance(mapped, materials.NormalMap)
+
+
+@pytest.mark.parametrize(
+    ("body", "scattered", "absorbed"),
+    [
+        ('<spectrum name="sigmaS" value="2"/><spectrum name="sigmaA" value="1"/>', 1.0, 1.0),
+        ('<spectrum name="sigmaT" value="3"/><spectrum name="albedo" value="0.5"/>', 0.75, 1.5),
+    ],
+)
+def test_g_of_a_medium_reduces_its_scattering(read, body, scattered, absorbed):
+    medium = f'<medium name="interior" type="homogeneous">{body}<float name="g" value="0.5"/>'
+    inside = read(f'<shape type="cube">{medium}</medium></shape>').shapes[0].interior
+    if "sigmaS" in body:
+        assert (level(inside.sigma_s), level(inside.sigma_a)) == (scattered, absorbed)
+    else:
+        sigma_t, albedo = level(inside.sigma_t), level(inside.albedo)
+        assert (sigma_t * albedo, sigma_t * (1 - albedo)) == pytest.approx((scattered, absorbed))
+    assert inside.phase.kind == "isotropic"
