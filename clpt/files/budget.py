@@ -4,6 +4,11 @@ A file of a few bytes can announce gigabytes. So each reader asks here before it
 has an account. The scene keeps it, and the preparation of the scene for its first sample draws
 from the same account. The contents of files are always allowed while there is memory; data that a
 small file expands to is limited. A scene without a file has the limit of the machine alone.
+
+Whatever takes time consists of steps that many scenes share. Each reports by `check_time`: the
+fields of an object are read, a shape is placed, a spectrum is evaluated, words are appended to a
+table, a lowering is looked up, a level of a tree or of an image is made. So a preparation ends soon
+after its time is spent, whatever the scene has many of.
 """
 
 from __future__ import annotations
@@ -30,6 +35,7 @@ SECONDS = 600.0
 SHARE = 2  # a load may take the available memory divided by this
 UNKNOWN = 4 << 30  # bytes, if the system does not tell
 Function = TypeVar("Function", bound=Callable[..., object])
+T = TypeVar("T")
 # Files of a control group, versions 2 and 1: the limit, what is used, and the pages of files that
 # nobody has used of late. These count as used, but the kernel gives them up first.
 _CGROUPS = (
@@ -251,6 +257,13 @@ def check_time(file: Path | None = None) -> None:
     if account.spent + time.monotonic() - account.began > seconds:
         message = f"reading the scene takes more than {seconds:g} s: {_advice('seconds')}"
         raise SceneError(message, file=file)
+
+
+def steps(members: Iterable[T]) -> Iterator[T]:
+    """Yield the members of a long list; each is a step. Raises as `check_time` does."""
+    for member in members:
+        check_time()
+        yield member
 
 
 def reads(status: os.stat_result) -> None:

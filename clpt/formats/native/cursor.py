@@ -94,7 +94,7 @@ class Cursor(Located):
         values = self.expect(list)
         if count and len(values) != count:
             raise self.error(f"must have {count} entries, not {len(values)}")
-        return [self.at(i) for i in range(len(values))]
+        return [self.at(i) for i in budget.steps(range(len(values)))]
 
     def number(self) -> float:
         """Return a finite number."""
@@ -138,6 +138,8 @@ def parse(path: Path, confined: bool = False) -> Cursor:
         raise _syntax_error(error, path) from None
     except RecursionError:
         raise SceneError("is nested too deeply", file=path) from None
+    except SceneError as error:  # the time is spent
+        raise SceneError(str(error), file=path) from None
     except ValueError as error:
         raise SceneError(f"is not JSON: {str(error)[:100]}", file=path) from None
     cursor = Cursor(value, path, text, confined=confined)
@@ -157,6 +159,7 @@ def _syntax_error(error: json.JSONDecodeError, path: Path) -> SceneError:
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any] | DuplicateKey:
+    budget.check_time()
     values = dict(pairs)
     if len(values) == len(pairs):
         return values

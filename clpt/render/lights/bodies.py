@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats, on_device, on_host
+from clpt.files import budget
 from clpt.geometry import analytic, shapes
 from clpt.geometry.analytic import keeps_its_kind
 from clpt.geometry.winding import box
@@ -207,8 +208,10 @@ def brick_counts(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def parts_of(count: int) -> Iterator[slice]:
-    """Return slices of batches."""
-    return (slice(first, first + AT_ONCE) for first in range(0, count, AT_ONCE))
+    """Yield slices of batches. Raises SceneError if the time of the load is spent."""
+    for first in range(0, count, AT_ONCE):
+        budget.check_time()
+        yield slice(first, first + AT_ONCE)
 
 
 class Windows:

@@ -19,6 +19,7 @@ from clpt import images
 from clpt.arrays import Floats, Floats32
 from clpt.device import buffers
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.images import spectral_exr
 from clpt.images.spectral_exr import SpectralImage
 from clpt.render.lights import block_grids
@@ -200,6 +201,7 @@ def _at_least_two_rows(values: Floats32) -> Floats32:
 def _scaled(image: SpectralImage, scale: float, where: str) -> SpectralImage:
     """Return an image of spectra times a scale. Raises SceneError if a value is not finite."""
     values = _at_least_two_rows(image.values * np.float32(scale))
+    budget.check_time()
     if not np.isfinite(values).all():
         raise SceneError("has a texel that is not finite", where=where)
     return dataclasses.replace(image, values=np.maximum(values, np.float32(0.0)))

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import is_whole
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.geometry import shapes
 from clpt.geometry.winding import box
 from clpt.render.geometry.surroundings import bounds_media, every
@@ -57,7 +58,7 @@ def check_bodies(placed: Iterable[Shape]) -> None:
     Where a shape has a priority, bodies must be closed and name no exterior.
     """
     listed = list(placed)
-    for shape in listed:
+    for shape in budget.steps(listed):
         _check_priority(shape)
     if not any(shape.priority for shape in listed):
         return

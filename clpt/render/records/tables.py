@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from clpt.arrays import Words, on_device
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.records import TABLES
 from clpt.scene.params import fields_of
 from clpt.scene.pixels import image_file
@@ -68,6 +69,7 @@ class TableStore:
     def _append(self, name: str, element: str, values: ArrayLike) -> int:
         if TABLES[name][0] != element:
             raise TypeError(f"table {name!r} holds {TABLES[name][0]}, not {element}")
+        budget.check_time()
         first, size = self._sizes[name], np.size(values)
         if first + size > MOST_ELEMENTS:
             raise SceneError(
@@ -189,6 +191,7 @@ class LoweringCache:
 
         by: the values that the result depends on, in place of all arguments.
         """
+        budget.check_time()
         by = arguments if by is None else by
         key = function, *map(_key, by)
         if key not in self._results:

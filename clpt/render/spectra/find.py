@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra
 from clpt.arrays import Floats
+from clpt.files import budget
 from clpt.images import spectral_exr
 from clpt.records import DENSITY_SIZES
 from clpt.render.film.colour import sensor
@@ -132,6 +133,7 @@ def _second_moment(density: Density, nodes: Floats, light: Floats) -> float:
 
 def _integral(values: Floats, nodes: Floats) -> float:
     """Return the integral of a function that is linear between nodes."""
+    budget.check_time()
     return float(((values[1:] + values[:-1]) / 2.0) @ np.diff(nodes))
 
 
