@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.files import budget, input_files, numpy_files, output_files, text
+from clpt.files import budget, input_files, numpy_files, output_files
 from clpt.scene.shapes import Spheres
 from clpt.scene.textures import ATTRIBUTES
 
@@ -69,7 +69,7 @@ def read_strands(path: Path, names: str = "x, y, z and a radius") -> dict[str, A
     line that has fewer numbers, and for an empty file.
     """
     width = len(names.replace(" and", ",").split(","))
-    data = text.plain(input_files.read_bytes(path))
+    data = input_files.plain(input_files.read_bytes(path))
     budget.check(PER_BYTE * len(data), "its points", path)
     rows = [line.split() for line in data.split(b"\n")]
     columns = np.array([len(row) for row in rows])
@@ -85,7 +85,7 @@ def read_strands(path: Path, names: str = "x, y, z and a radius") -> dict[str, A
         points = np.array(words).astype(np.float64).reshape(-1, width)
     except ValueError:
         line = _wrong(rows, width)
-        comma = text.comma_message(text.decode(b" ".join(rows[line - 1])))
+        comma = input_files.comma_message(input_files.decode(b" ".join(rows[line - 1])))
         raise SceneError(comma or "is not all numbers", file=path, line=line) from None
     starts = np.flatnonzero(occupied & ~np.r_[False, occupied[:-1]])
     ends = np.flatnonzero(occupied & ~np.r_[occupied[1:], False])

@@ -25,11 +25,11 @@ from clpt.formats.mitsuba.spectra import texture
 from clpt.formats.mitsuba.xml import Document, Element, parse
 from clpt.formats.reading import attempt
 from clpt.scene import Scene, integrators
-from clpt.scene.framing import framing_camera, world_bounds
 from clpt.scene.integrators import Film, Integrator
 from clpt.scene.lights import Light
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Instance, Shape
+from clpt.scene.studio import framing_camera, world_bounds
 
 __all__ = ["load", "load_dict"]
 

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.choices import Missing
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
-from clpt.formats.colours import GREY, grey_for
 from clpt.formats.mitsuba.xml import MAX_NESTING, Document, Element
-from clpt.formats.reading import note
+from clpt.formats.reading import GREY, grey_for, note
 from clpt.scene.motion import Keys
 
 OLD_VALUES, OLD_OBJECTS = {"blackbody"}, {"subsurface"}  # of Mitsuba 0.x alone

@@ -8,7 +8,7 @@ import numpy as np
 
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError, did_you_mean
-from clpt.files import text
+from clpt.files import input_files
 from clpt.formats.pbrt import old_words
 from clpt.formats.pbrt.lexer import UPGRADE
 from clpt.formats.pbrt.params import Parameter, Parameters
@@ -48,7 +48,7 @@ class _Reader(TransformDirectives):
 
     def directive(self) -> None:
         """Take the next directive and do what it says."""
-        self.name = text.decode(self.lexer.next("a directive"))
+        self.name = input_files.decode(self.lexer.next("a directive"))
         if self.contents.shared.old:
             self._modernise()
         action = DIRECTIVES.get(self.name)

@@ -15,9 +15,9 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats.colours import colour
 from clpt.formats.pbrt.params import Parameter, Parameters
 from clpt.formats.pbrt.state import State
+from clpt.formats.reading import colour
 from clpt.scene.roles import EMISSION, REFLECTANCE, ROUNDING, Spectral
 from clpt.spectra import Blackbody, Spectrum, Tabulated, cie, scaled, spaces
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from clpt import images, transforms
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats.colours import EVEN, GREY
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import SPECTRUM_TYPES, TEXTURE, spectrum, value_of
 from clpt.formats.pbrt.state import Definition, State
+from clpt.formats.reading import EVEN, GREY
 from clpt.images import Stored
 from clpt.scene.params import fields_of
 from clpt.scene.roles import REAL, Role, Spectral

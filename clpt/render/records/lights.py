@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from clpt.geometry import shape_records
+from clpt.geometry import shapes
 from clpt.layout import Record
 from clpt.render.records.macros import flag, macro
 from clpt.scene.lights import KINDS as LIGHTS
@@ -201,7 +201,7 @@ BASES = {
 }  # a kind uses the functions of its base
 
 # LightRow.kind is a position in this tuple
-KINDS = (*(kind for kind in RECORDS if kind not in VOLUMES), *shape_records.RECORDS, *VOLUMES)
+KINDS = (*(kind for kind in RECORDS if kind not in VOLUMES), *shapes.RECORDS, *VOLUMES)
 NODE = Record(
     "LightNode",
     "A node of the tree over lights; children of a node are a group, neighbours in the table.",
