@@ -547,7 +547,10 @@ FORMATS: dict[str, Format] = {
     "stl text": Format(".stl", lambda: [STL], words, mesh.read_mesh),
     "off": Format(".off", lambda: [OFF], words, mesh.read_mesh),
     "serialized": Format(
-        ".serialized", lambda: [_serialized()], serialized, lambda path: read_serialized(path, 0)
+        ".serialized",
+        lambda: [_serialized()],
+        serialized,
+        lambda path: read_serialized(path, 0, {}),
     ),
     "strands": Format(".txt", lambda: [STRANDS], words, spheres_curves.read_strands),
     "spheres": Format(

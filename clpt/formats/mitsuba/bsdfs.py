@@ -391,6 +391,9 @@ def _bent(props: Properties) -> Parameters:
 
 def _normal_map(props: Properties) -> Parameters:
     values = _bent(props)
+    unnamed = nested_textures(props) if props.context.old else []
+    if len(unnamed) == 1 and "normalmap" not in props.named:
+        props.named["normalmap"] = unnamed[0]  # Mitsuba 0.6 does not name it
     if "normalmap" not in props.named:
         raise props.element.error("needs the texture 'normalmap'")
     result = factor(props, "normalmap", None)

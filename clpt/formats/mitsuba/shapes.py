@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -80,12 +80,15 @@ class _Stream:
         return characters.decode("utf-8", "replace")
 
 
-def read(path: Path, index: int) -> tuple[Mesh, bool, list[str]]:
+def read(path: Path, index: int, archives: dict[Path, bytes]) -> tuple[Mesh, bool, list[str]]:
     """Return the mesh number `index` of a file, whether it is to be flat, and what was left out.
 
+    archives: the contents of the files that were read before, by path; a file is read once.
     Raises SceneError for a file that is missing or broken, or has no such mesh.
     """
-    data = input_files.read_bytes(path)
+    if path not in archives:
+        archives[path] = input_files.read_bytes(path)
+    data = archives[path]
     first, end, version = _mesh_range(path, data, index)
     stream = _Stream(path, data[first + 4 : end])
     (flags,) = struct.unpack("<I", stream.take(4))
@@ -206,10 +209,15 @@ def _single(element: Element, context: Context) -> list[Shape]:
     """Make the shape of an element; None for an unknown kind if missing kinds are grey."""
     if element.type == "instance":
         return [_instance(element, context)]
-    if element.type not in PLUGINS:
-        known = (*PLUGINS, "shapegroup", "instance", "merge")
+    plugins = _plugins(context)
+    if element.type not in plugins:
+        known = (*plugins, "shapegroup", "instance", "merge")
         return context.stand_in(unknown(element, known), element, [])
     return [shape(element, context)]
+
+
+def _plugins(context: Context) -> dict[str, tuple[type[Shape], PluginReader[Parameters]]]:
+    return {**PLUGINS, **OF_OLD} if context.old else PLUGINS
 
 
 def _merged(element: Element, context: Context) -> list[Element]:
@@ -224,7 +232,7 @@ def _merged(element: Element, context: Context) -> list[Element]:
 
 def shape(element: Element, context: Context) -> Shape:
     """Make the shape that a <shape> describes, which is no group and no instance."""
-    cls, read = PLUGINS[element.type]
+    cls, read = _plugins(context)[element.type]
     props = Properties(element, context)
     props.ignore("silhouette_sampling_weight")
     material, emitter = props.object("bsdf"), props.object("emitter")
@@ -385,7 +393,8 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
         raise props.element.error(f"{path.name!r} is not a {suffix} file")
     try:
         if suffix == ".serialized":
-            whole, own_flat, warnings = read(path, props.integer("shape_index", 0))
+            index = props.integer("shape_index", 0)
+            whole, own_flat, warnings = read(path, index, props.context.archives)
             flat |= own_flat
         else:
             loaded = mesh.read_mesh(path, materials=False)
@@ -396,6 +405,7 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
         props.context.warn(props.element, f"{path.name}: {warning}")
     if crease >= 0.0 and not flat:
         whole = creased(whole, crease)
+    flat |= whole.normals is None and not props.context.document.makes_normals
     vertices, moves = whole.vertices, not np.array_equal(to_world, transforms.IDENTITY)
     if moves:
         vertices = transforms.transform_points(to_world, vertices).astype(np.float32)
@@ -421,17 +431,35 @@ def _linear_curve(props: Properties) -> Parameters:
     return {"basis": "linear", **_curves(props)}
 
 
+def _hair(props: Properties) -> Parameters:
+    """Mitsuba 0.x: strands of an even radius, which `to_world` scales: src/shapes/hair.cpp."""
+    props.ignore("angle_threshold")
+    if props.number("reduction", 0.0) != 0.0:
+        props.context.warn(props.element, "'reduction' is left out: all strands are there")
+    radius = props.number("radius", 0.025)
+    arrays, to_world = _strands(props, spheres_curves.read_hair)
+    radii = np.full(len(arrays["points"]), radius * np.linalg.norm(to_world[:3, 2]), np.float32)
+    return {**arrays, "basis": "linear", "points": np.column_stack([arrays["points"], radii])}
+
+
 def _curves(props: Properties) -> Parameters:
     """Read strands; `to_world` moves their points and, as in Mitsuba, leaves their radii."""
+    return _strands(props, spheres_curves.read_strands)[0]
+
+
+def _strands(
+    props: Properties, read: Callable[[Path], dict[str, Any]]
+) -> tuple[Parameters, transforms.Matrix]:
+    """Return the strands of a file in the world, and `to_world`."""
     path, to_world = props.file(), props.placement(thin=True)
     try:
-        arrays = spheres_curves.read_strands(path)
+        arrays = read(path)
     except SceneError as error:
         line = f":{error.line}" if error.line else ""
         raise props.element.error(f"{path.name}{line}: {error.message}") from None
     points = arrays["points"]
     points[:, :3] = transforms.transform_points(to_world, points[:, :3])
-    return arrays
+    return arrays, to_world
 
 
 def _sdf_grid(props: Properties) -> Parameters:
@@ -460,4 +488,7 @@ PLUGINS: dict[str, tuple[type[Shape], PluginReader[Parameters]]] = {
     "bsplinecurve": (shapes.Curves, _bspline_curve),
     "linearcurve": (shapes.Curves, _linear_curve),
     "sdfgrid": (shapes.SdfGrid, _sdf_grid),
+}
+OF_OLD: dict[str, tuple[type[Shape], PluginReader[Parameters]]] = {  # of Mitsuba 0.x alone
+    "hair": (shapes.Curves, _hair),
 }

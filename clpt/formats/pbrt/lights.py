@@ -257,8 +257,6 @@ def _spot(params: Parameters, state: State) -> Light:
     beam = cone - params.one("conedeltaangle", "float", 5.0)
     if not 0.0 <= beam <= cone <= 180.0:
         raise SceneError("'conedeltaangle' must lie between 0 and 'coneangle'")
-    if state.shared.old:
-        state.warn(params, "its edge is smooth, not the fourth power of version 3")
     full, edge = np.cos(np.radians([beam, cone]))
     start, direction = _from_to(params, state)
     return lights.Spot(
@@ -266,7 +264,7 @@ def _spot(params: Parameters, state: State) -> Light:
         intensity=_intensity(params, state, 2.0 * np.pi * (1.0 - 0.5 * (full + edge))),
         cutoff=cone,
         beam_width=beam,
-        edge="smooth",
+        edge="quartic" if state.shared.old else "smooth",
     )
 
 
@@ -410,10 +408,11 @@ def _image(file: str, state: State) -> Any:
 
 
 def _read(path: Path, state: State) -> Any:
-    stored = images.read_stored(path)
-    for note in stored.notes_of(raw=False):
+    """Read an image; versions 2 and 3 take its numbers as light: src/core/imageio.cpp."""
+    stored, raw = images.read_stored(path), state.shared.old
+    for note in stored.notes_of(raw):
         state.tell(f"{path}: {note}")
-    return stored.decoded()
+    return stored.decoded(linear=not raw)
 
 
 def _square(file: str, state: State) -> Any:

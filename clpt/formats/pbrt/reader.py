@@ -95,10 +95,15 @@ class _Reader(TransformDirectives):
             raise self._unknown()
 
     def option(self) -> None:
-        """Camera, Film and the like."""
-        self.only(False)
+        """Camera, Film and the like; versions 2 and 3 ignore them after WorldBegin."""
+        ignored = self.contents.shared.old and self.in_world
+        self.only(ignored)
         name = self.name
-        self.contents.options[name] = self._definition(f'{name} "{{}}"')
+        definition = self._definition(f'{name} "{{}}"')
+        if ignored:
+            self.warn("stands after WorldBegin and is left out")
+            return
+        self.contents.options[name] = definition
         if name == "Camera":
             ctm, end = self.state.ctm, self.state.end
             if transforms.is_singular(ctm) or (end is not None and transforms.is_singular(end)):
@@ -289,8 +294,13 @@ class _Reader(TransformDirectives):
             raise definition.params.error("is already defined")
 
     def named_material(self) -> None:
+        """Take a material for the shapes to come; version 3 keeps the former for unknown names."""
         self.only(True)
-        self.state.material = self.lexer.string("a name")
+        name, shared = self.lexer.string("a name"), self.contents.shared
+        if shared.old and name not in shared.materials:
+            self.warn(f"there is no material {name!r} so far: the material before it stays")
+            return
+        self.state.material = name
 
     def texture(self) -> None:
         self.only(True)

@@ -70,7 +70,7 @@ _PLACEMENT = {
 _CONE = {
     "cutoff": ("real", "half angle beyond which it is dark [rad]"),
     "beam_width": ("real", "half angle of full intensity [rad]"),
-    "smooth": ("integer", "1: it falls off smoothly in the cosine; 0: linearly in the angle"),
+    "edge": ("integer", "falls linearly in the angle: 0; in the cosine by a cubic: 1, x^4: 2"),
 }
 _RADIANCE = ("integer", "first word of the emission parameter in `light_params`")
 _SCALE = ("real", "what the image's values were divided by")
