@@ -25,7 +25,7 @@ import clpt
 from bench.traversal import Tracer
 from clpt import bvh
 from clpt import device as dev
-from clpt.bench.checks import world
+from clpt.bench.rays import world
 from clpt.bvh import building, layouts
 from clpt.render.flow.scene_to_tables import lower
 
