@@ -43,7 +43,7 @@ def measure(scene: str, rounds: int) -> Iterator[dict[str, Any]]:
         for name, integrator in INTEGRATORS.items():
             command = [sys.executable, "-c", CHILD, scene, integrator]
             with tempfile.TemporaryDirectory() as caches:
-                cold, warm = (run(command, Path(caches)).cpu for _ in range(2))
+                cold, warm = (run(command, Path(caches))[1] for _ in range(2))
             taken[name].append(cold - warm)
     for name, seconds in taken.items():
         yield {"scene": scene, "integrator": name, "cpu": round(statistics.median(seconds), 2)}

@@ -19,7 +19,7 @@ import pyopencl as cl
 from bench import machine
 from clpt import device
 from clpt.records import SETTINGS, TABLES
-from clpt.render.camera.encode import encode_camera
+from clpt.render.camera import encode_camera
 from clpt.render.flow import stages
 from clpt.render.flow.signatures import scene_text
 from clpt.render.records import CameraFeatures

@@ -12,7 +12,6 @@ import dataclasses
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -87,7 +86,9 @@ def measure(path: Path, mode: str, bounces: int = BOUNCES) -> dict[str, Any]:
     seconds: dict[str, float] = defaultdict(float)
     counts = dict.fromkeys(("intersect", "shadow"), 0)
 
-    def note(step: Any, enqueue: Callable[[], Any]) -> None:
+    for _ in range(WARM):
+        flight.bounce()
+    for step in flight.wavefront.stages * bounces:
         kernel = step.bound.kernel.name
         if kernel in counts:
             traced = rays(flight, kernel)
@@ -97,14 +98,10 @@ def measure(path: Path, mode: str, bounces: int = BOUNCES) -> dict[str, Any]:
                 seconds[f"bare {name}"] += bare.trace(name, traced)
         on.queue.finish()
         start = time.process_time()
-        enqueue()
+        flight.stage(step)
         on.queue.finish()
         seconds[step.name] += time.process_time() - start
 
-    for _ in range(WARM):
-        flight.bounce()
-    for _ in range(bounces):
-        flight.bounce(note)
     alone = sum(s for name, s in seconds.items() if name.startswith("bare"))
     total = sum(seconds.values()) - alone
     millions = counts["intersect"] * 1e-6

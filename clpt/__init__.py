@@ -40,10 +40,10 @@ if TYPE_CHECKING:
     from clpt.images.spectral_exr import write as write_spectral
     from clpt.instruments import Measurement, measure
     from clpt.rays import Accel, AllHits, Hits, InstancedAccel
-    from clpt.render.film.denoised_picture import DenoisedPicture
-    from clpt.render.film.layer_channels import write_layers
+    from clpt.render.film.layers import write_layers
+    from clpt.render.film.pictures import DenoisedPicture
     from clpt.render.film.state import FilmState
-    from clpt.render.flow.library import kernel_source
+    from clpt.render.flow.programs import kernel_source
     from clpt.render.one_call import render
     from clpt.render.options import RenderOptions
     from clpt.render.progress import Progress
@@ -79,9 +79,9 @@ _HOMES = {  # the module of each name, and what it is called there
     "AllHits": ("rays", "AllHits"),
     "Hits": ("rays", "Hits"),
     "InstancedAccel": ("rays", "InstancedAccel"),
-    "kernel_source": ("render.flow.library", "kernel_source"),
-    "DenoisedPicture": ("render.film.denoised_picture", "DenoisedPicture"),
-    "write_layers": ("render.film.layer_channels", "write_layers"),
+    "kernel_source": ("render.flow.programs", "kernel_source"),
+    "DenoisedPicture": ("render.film.pictures", "DenoisedPicture"),
+    "write_layers": ("render.film.layers", "write_layers"),
     "RenderOptions": ("render.options", "RenderOptions"),
     "Progress": ("render.progress", "Progress"),
     "Renderer": ("render.renderer", "Renderer"),

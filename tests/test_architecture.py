@@ -27,7 +27,7 @@ PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
     "arrays", "choices", "errors", "files", "images", "layout", "measured", "records",
-    "scalars", "spectra", "transforms", "version",
+    "spectra", "transforms", "version",
 }  # fmt: skip
 RENDERS = BASE | {"scene", "device", "denoise", "render", "formats"}
 # What a part may import of the others; itself always. Every part has a row.

@@ -387,7 +387,7 @@ LIMITS = (  # on the page, and where the code has them
     ("| 1024 |", "clpt.scene.integrators", "MOST_BANDS", 1024),
     ("| 4000 |", "clpt.scene.integrators", "DEEPEST", 4000),
     ("715 827 882", "clpt.bvh.build", "MOST", 715827882),
-    ("| 255 |", "clpt.render.records.custom_materials", "MOST", 255),
+    ("| 255 |", "clpt.render.records.materials", "MOST", 255),
     ("| 32 |", "clpt.scene.textures", "MOST_OCTAVES", 32),
     ("768 MiB", "clpt.files.budget", "FREE", 768 << 20),
     ("256 bytes for each byte of its files", "clpt.files.budget", "RATIO", 256),

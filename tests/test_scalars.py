@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import clpt
-from clpt import scalars
+from clpt import arrays
 from clpt.errors import SceneError
 from clpt.scene import KINDS, cameras, integrators, lights, materials, media, shapes
 from clpt.scene.params import Kind, defaults, params
@@ -28,16 +28,16 @@ NO_NUMBERS = (
 
 def test_what_is_a_number() -> None:
     for value in (3, 3.0, Fraction(3), *(make(3) for make in (*WHOLE, *REAL))):
-        assert scalars.number(value) == 3.0 and type(scalars.number(value)) is float
+        assert arrays.number(value) == 3.0 and type(arrays.number(value)) is float
     for value in (3, *(make(3) for make in WHOLE)):
-        assert type(scalars.whole(value, 1, 3)) is int
+        assert type(arrays.whole(value, 1, 3)) is int
     for value in (True, *(make(True) for make in FLAGS)):
-        assert scalars.flag(value) is True
+        assert arrays.flag(value) is True
 
 
 @pytest.mark.parametrize("value", NO_NUMBERS, ids=repr)
 def test_what_is_none(value: Any) -> None:
-    for check in (scalars.number, scalars.real, scalars.whole):
+    for check in (arrays.number, arrays.real, arrays.whole):
         with pytest.raises(SceneError, match=r"must be a .*number.*, not"):
             check(value)
 
@@ -45,7 +45,7 @@ def test_what_is_none(value: Any) -> None:
 @pytest.mark.parametrize("value", [np.nan, np.float32("inf"), 10**400, 1e39, np.array(-np.inf)])
 def test_numbers_that_kernels_cannot_hold(value: Any) -> None:
     with pytest.raises(SceneError, match=r"must be finite|beyond"):
-        scalars.number(value)
+        arrays.number(value)
 
 
 def scalar_parameters() -> Iterator[tuple[type[Kind], str, Any]]:

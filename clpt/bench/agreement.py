@@ -12,16 +12,13 @@ from dataclasses import dataclass
 from clpt import device
 from clpt.bench.figures import Figure
 from clpt.bench.flight import Flight
-from clpt.bench.launches import PLAIN, Comparison, Launch, launches
+from clpt.bench.launches import PLAIN, Comparison, launches
 from clpt.errors import ClptError, UnknownKindError
-from clpt.layout import SLAB_BLOCK
-from clpt.records import SLABS
 from clpt.scene import Scene
 
 PART = "agreement"
 SLOTS = 1 << 12
 WARM = 4  # bounces before the check, so that paths of all depths are in flight
-NAMED = 4  # the most members in a message
 
 
 @dataclass(frozen=True)
@@ -31,24 +28,6 @@ class Witness:
     on: device.Device
     options: tuple[str, ...]
     name: str
-
-
-@dataclass(frozen=True, eq=False)
-class Checked:
-    """A launch with the witness's words, the device's comparison, and the members that differ."""
-
-    launch: Launch
-    comparison: Comparison
-    members: Sequence[str]
-
-    @property
-    def problem(self) -> str:
-        """The error as text, or ""."""
-        if not self.comparison.wrong:
-            return ""
-        names = ", ".join(self.members[:NAMED]) + (", ..." if len(self.members) > NAMED else "")
-        share = max(self.comparison.share, 0.01)
-        return f"{share:.0%} of what it writes is wrong ({names})".replace("%", " %")
 
 
 def witness_of(on: device.Device) -> Witness:
@@ -64,8 +43,8 @@ def witness_of(on: device.Device) -> Witness:
 
 def checked(
     on: device.Device, scene: Scene, witness: Witness, only: Sequence[str] = ()
-) -> Iterator[Checked]:
-    """Run a bounce of a scene; yield each stage's launch beside the witness's.
+) -> Iterator[Comparison]:
+    """Run a bounce of a scene; compare each stage with the witness's words.
 
     only: names of stages, by default all. Raises UnknownKindError for another name; errors of
     Flight; KernelBuildError, DeviceError, MemoryBudgetError of the witness.
@@ -80,8 +59,7 @@ def checked(
     for launch in launches(flight):
         if not only or launch.stage in only:
             expected = launch.expecting(launch.again(witness.on, witness.options), flight)
-            comparison = expected.compare(launch.after)
-            yield Checked(expected, comparison, members(flight, comparison))
+            yield expected.compare(launch.after, flight)
 
 
 def measure(on: device.Device, scene: Scene, only: Sequence[str] = ()) -> Iterator[Figure]:
@@ -90,36 +68,19 @@ def measure(on: device.Device, scene: Scene, only: Sequence[str] = ()) -> Iterat
     only: names of stages, by default all. Raises like `checked`.
     """
     witness = witness_of(on)
-    for result in checked(on, scene, witness, only):
-        stage, share = result.launch.stage, 100.0 * (1.0 - result.comparison.share)
+    for comparison in checked(on, scene, witness, only):
+        stage, share = comparison.launch.stage, 100.0 * (1.0 - comparison.share)
         more = {"witness": witness.name, "stage": stage, "mode": scene.film.mode}
         figure = Figure(PART, stage, "%", (share,), scene.name, more)
-        problem = result.problem and f"wrong: {result.problem}, beside {witness.name}"
-        yield figure.refuse(problem)
+        wrong = comparison.problem and f"wrong: {comparison.problem}, beside {witness.name}"
+        yield figure.refuse(wrong)
 
 
 def first_wrong(on: device.Device, scene: Scene) -> str:
     """Return a line on the first stage with wrong words, or that all stages are right."""
     witness = witness_of(on)
-    for result in checked(on, scene, witness):
-        if result.problem:
-            stage = result.launch.stage.replace("_", " ")
-            return f"first in {stage}: {result.problem}, beside {witness.name}"
+    for comparison in checked(on, scene, witness):
+        if comparison.problem:
+            stage = comparison.launch.stage.replace("_", " ")
+            return f"first in {stage}: {comparison.problem}, beside {witness.name}"
     return f"its rays are right, and its stages agree with {witness.name}: look at accumulate"
-
-
-def members(flight: Flight, comparison: Comparison) -> list[str]:
-    """Return the names of slabs' members, and of other buffers, with wrong words."""
-    names: dict[str, None] = {}
-    for name, words in comparison.off.items():
-        record = next((slab for slab in SLABS if f"{slab.name.lower()}_words" == name), None)
-        if record is None:
-            names |= dict.fromkeys([name] if len(words) else [])
-            continue
-        stride = flight.wavefront.paths.rows(record, 0).pitch // 4
-        in_blocks = flight.wavefront.lanes == 1
-        rows = words // SLAB_BLOCK % record.step if in_blocks else words // stride
-        for member in record.members:
-            if ((rows >= member.word) & (rows < member.word + member.words)).any():
-                names[member.name] = None
-    return list(names)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt import device
+from clpt.bench.figures import Taken, timed
 from clpt.layout import Record
 from clpt.records import HIT, PATH, PATH_BITS, SHADOW
 from clpt.render.flow.scene_to_tables import lower
@@ -49,26 +49,18 @@ class Flight:
         self.wavefront.paths.restart()
         self.wavefront.stages[0].bound.set_args(samples=(0, ENDLESS))
 
-    def bounce(self, around: Callable[[Step, Callable[[], Any]], Any] | None = None) -> None:
-        """Enqueue the stages of a bounce.
-
-        around: called with each stage and its `enqueue`, which it must call.
-        """
+    def bounce(self) -> None:
+        """Enqueue the stages of a bounce."""
         for step in self.wavefront.stages:
-            self.stage(step, around)
+            self.stage(step)
 
-    def stage(
-        self, step: Step, around: Callable[[Step, Callable[[], Any]], Any] | None = None
-    ) -> None:
-        """Enqueue a stage; around: see `bounce`."""
+    def stage(self, step: Step) -> Any:
+        """Enqueue a stage; return its event."""
+        return self.wavefront.stream.run(step.bound, step.size, step.group)
 
-        def enqueue() -> Any:
-            return self.wavefront.stream.run(step.bound, step.size, step.group)
-
-        if around is None:
-            enqueue()
-        else:
-            around(step, enqueue)
+    def timed(self, step: Step) -> tuple[int, Taken]:
+        """Run a stage; return its items and their time."""
+        return self.items(step), timed(self.device, lambda: [self.stage(step)])
 
     def read(self, record: Record, name: str) -> NDArray:
         """Return a member of all slots: (slots,), or (slots, components)."""

@@ -35,6 +35,7 @@ ROUNDING = 1e-3  # margin of a float, over its size plus the mean size of its me
 EXACT, FREE = -1.0, np.inf  # margins
 MOST_OFF = 0.01  # of a launch's changed words: a rounding may decide a path's choice
 FREE_MEMBERS = ("low", "high", "cone")  # low digits of sums; packed halves
+NAMED = 4  # the most members in a message
 COUNTS = ("queue_starts", "queue_counts")  # other compared buffers; the order in queues is free
 DATA = Path(__file__).parent / "data"
 HOSTS = ("launch.c", "launch.py")  # stored as .txt: they are no part of clpt
@@ -104,7 +105,7 @@ class Launch:
         margins = {name: _margins(flight, name, after[name]) for name in self.margins}
         return dataclasses.replace(self, after={**self.after, **after}, margins=margins)
 
-    def compare(self, words: Mapping[str, Words]) -> Comparison:
+    def compare(self, words: Mapping[str, Words], flight: Flight) -> Comparison:
         """Compare a device's output words with this launch's."""
         changed, off = 0, {}
         for name, margins in self.margins.items():
@@ -112,16 +113,20 @@ class Launch:
             which = is_off(words[name], expected, margins)
             changed += int(((self.before[name] != expected) & (margins != FREE)).sum())
             off[name] = np.flatnonzero(which)
-        return Comparison(self.stage, changed, off)
+        return Comparison(self, changed, off, _members(flight, off))
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A comparison of launches: the number of changed words, and the indices of wrong words."""
+    """A device's words beside a launch: the number of changed words, the indices of wrong words.
 
-    stage: str
+    members: names of slabs' members, and of other buffers, with wrong words.
+    """
+
+    launch: Launch
     changed: int
     off: Mapping[str, NDArray[np.intp]]
+    members: Sequence[str]
 
     @property
     def share(self) -> float:
@@ -133,6 +138,15 @@ class Comparison:
     def wrong(self) -> bool:
         """Whether rounding cannot explain all wrong words."""
         return self.share > MOST_OFF
+
+    @property
+    def problem(self) -> str:
+        """The error as text, or ""."""
+        if not self.wrong:
+            return ""
+        names = ", ".join(self.members[:NAMED]) + (", ..." if len(self.members) > NAMED else "")
+        share = f"{max(self.share, 0.01):.0%}".replace("%", " %")
+        return f"{share} of what it writes is wrong ({names})"
 
 
 def launches(flight: Flight) -> Iterator[Launch]:
@@ -201,6 +215,23 @@ def _margins(flight: Flight, name: str, expected: Words) -> NDArray[np.float32]:
             digit = ("low", "middle", "high")[word - member.word] if member.type == "fixed" else ""
             limits[:, word] = _member_margins(digit or member.name, member.type, rows[:, word])
     return margins
+
+
+def _members(flight: Flight, off: Mapping[str, NDArray[np.intp]]) -> list[str]:
+    """Return the names of slabs' members, and of other buffers, with wrong words."""
+    names: dict[str, None] = {}
+    for name, words in off.items():
+        record = next((slab for slab in SLABS if f"{slab.name.lower()}_words" == name), None)
+        if record is None:
+            names |= dict.fromkeys([name] if len(words) else [])
+            continue
+        stride = flight.wavefront.paths.rows(record, 0).pitch // 4
+        in_blocks = flight.wavefront.lanes == 1
+        rows = words // SLAB_BLOCK % record.step if in_blocks else words // stride
+        for member in record.members:
+            if ((rows >= member.word) & (rows < member.word + member.words)).any():
+                names[member.name] = None
+    return list(names)
 
 
 def rows_of(flight: Flight, record: Record, words: NDArray) -> NDArray:

@@ -7,7 +7,7 @@ triangle, `any` for any hit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +22,6 @@ from clpt.bench.flight import Flight
 from clpt.errors import SceneError
 from clpt.rays import Accel, Hits
 from clpt.records import HIT, PATH, SHADOW
-from clpt.render.wavefront.bounce_loop import Step
 from clpt.scene import Scene
 
 CPU_RAYS, GPU_RAYS = 1 << 16, 1 << 20
@@ -64,8 +63,8 @@ def sets(on: device.Device, scene: Scene, count: int | None = None) -> Sets:
         raise SceneError("rays are measured on triangles, and the scene has none")
     rays_by_set: dict[str, Rays] = {}
 
-    def look(step: Step, enqueue: Callable[[], Any]) -> None:
-        enqueue()
+    for step in flight.wavefront.stages:
+        flight.stage(step)
         name = step.bound.kernel.name
         if name in ("generate", "emit"):
             rays_by_set["primary"] = _path_rays(flight)
@@ -73,8 +72,6 @@ def sets(on: device.Device, scene: Scene, count: int | None = None) -> Sets:
             rays_by_set["diffuse"] = _diffuse(flight)
         elif name == "shade":
             rays_by_set["shadow"] = _shadow_rays(flight)
-
-    flight.bounce(look)
     return Sets(vertices, faces, {name: rays for name, rays in rays_by_set.items() if len(rays)})
 
 

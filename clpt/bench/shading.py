@@ -6,16 +6,15 @@ is a box of constant `diffuse`, which takes turns with each other kind.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from clpt import device, transforms
-from clpt.bench.figures import Figure, Taken, clock_complaint, timed
+from clpt.bench.figures import Figure, Taken, clock_complaint
 from clpt.bench.flight import Flight
 from clpt.errors import UnknownKindError
-from clpt.render.wavefront.bounce_loop import Step
 from clpt.scene import Scene, integrators, lights, params, textures
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Film
@@ -130,13 +129,10 @@ def _shade(flight: Flight) -> tuple[int, Taken]:
     """Return the number of items shaded in a few bounces, and the time."""
     launches: list[tuple[int, Taken]] = []
 
-    def around(step: Step, enqueue: Callable[[], Any]) -> None:
+    for step in flight.wavefront.stages * BOUNCES:
         if step.bound.kernel.name == "shade":
-            launches.append((flight.items(step), timed(flight.device, lambda: [enqueue()])))
+            launches.append(flight.timed(step))
         else:
-            enqueue()
-
-    for _ in range(BOUNCES):
-        flight.bounce(around)
+            flight.stage(step)
     taken = Taken(sum(t.device for _, t in launches), sum(t.host for _, t in launches))
     return sum(items for items, _ in launches), taken

@@ -9,7 +9,7 @@ bound.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +23,6 @@ from clpt.records import SLABS
 from clpt.render.film.state import FILM_WORDS
 from clpt.render.flow import blocks, programs
 from clpt.render.records import Features
-from clpt.render.wavefront.bounce_loop import Step
 from clpt.render.wavefront.path_buffers import queue_sizes, queue_steps
 from clpt.scene import Scene
 
@@ -99,14 +98,9 @@ def measure(
     for _ in range(WARM):
         flight.bounce()
     noted: dict[str, list[Work]] = {}
-
-    def note(step: Step, enqueue: Callable[[], Any]) -> None:
-        items = flight.items(step)
-        noted.setdefault(step.name, []).append((items, timed(on, lambda: [enqueue()])))
-
     for number in range(rounds):
-        for _ in range(BOUNCES):
-            flight.bounce(note)
+        for step in flight.wavefront.stages * BOUNCES:
+            noted.setdefault(step.name, []).append(flight.timed(step))
         for name, each in noted.items():
             noted[name] = [*each[:number], _round(each[number:])]
     wave = flight.wavefront

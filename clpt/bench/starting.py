@@ -13,7 +13,6 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,16 +27,11 @@ CACHES = (  # variables for cache folders of clpt and drivers
 SIDE = 64
 
 
-@dataclass(frozen=True)
-class Process:
-    """A process's time from start to end, and its processor time [s]."""
+def run(command: Sequence[str], caches: Path, **environment: str) -> tuple[float, float]:
+    """Run a command with caches in a folder. Raises DeviceError with its last line.
 
-    seconds: float
-    cpu: float
-
-
-def run(command: Sequence[str], caches: Path, **environment: str) -> Process:
-    """Run a command with caches in a folder. Raises DeviceError with its last line."""
+    Returns the time from start to end, and the processor time [s].
+    """
     variables = {name: str(caches / name.lower()) for name in CACHES}
     for folder in variables.values():
         os.makedirs(folder, exist_ok=True)
@@ -57,7 +51,7 @@ def run(command: Sequence[str], caches: Path, **environment: str) -> Process:
             output.seek(0)
             words = output.read().strip().splitlines()[-1:] or [f"status {process.returncode}"]
             raise DeviceError(f"a measured process failed: {words[0]}")
-    return Process(seconds, cpu)
+    return seconds, cpu
 
 
 def measure(
@@ -73,22 +67,23 @@ def measure(
         main = f"from {__name__} import main; main(*sys.argv[1:])"
         command = child_processes.command(main, str(report), scene, mode or "", str(device))
         for kind, times in (("cold", 1), ("warm", rounds)):
-            taken, stats = [], []
+            run_times, stats = [], []
             for _ in range(times):
                 report.unlink(missing_ok=True)
-                taken.append(run(command, Path(folder) / "caches"))
+                run_times.append(run(command, Path(folder) / "caches"))
                 stats.append(json.loads(report.read_text(encoding="utf-8")))
-            yield _figure(f"{kind} start", taken, stats, name)
+            yield _figure(f"{kind} start", run_times, stats, name)
 
 
-def _figure(name: str, taken: list[Process], stats: list[dict[str, Any]], scene: str) -> Figure:
-    middle = sorted(range(len(taken)), key=lambda i: taken[i].seconds)[len(taken) // 2]
-    more = {**stats[middle], "cpu": taken[middle].cpu}
-    figure = Figure(
-        "start", name, SECONDS, tuple(process.seconds for process in taken), scene, more
-    )
+def _figure(
+    name: str, times: list[tuple[float, float]], stats: list[dict[str, Any]], scene: str
+) -> Figure:
+    seconds = [wall for wall, _ in times]
+    middle = sorted(range(len(times)), key=seconds.__getitem__)[len(times) // 2]
+    more = {**stats[middle], "cpu": times[middle][1]}
+    figure = Figure("start", name, SECONDS, tuple(seconds), scene, more)
     dark = any(not fact["mean"] > 0.0 for fact in stats)
-    longer = any(s["ready"] > process.seconds for s, process in zip(stats, taken, strict=True))
+    longer = any(fact["ready"] > wall for fact, wall in zip(stats, seconds, strict=True))
     return figure.refuse(
         "its picture is black or not finite" if dark else "",
         "it was ready later than its process ended" if longer else "",

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ..render.progress import Progress
 from .process import terminal
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
-LoadProgress: TypeAlias = Callable[[float, str], None]  # of `clpt.load`
+    from ..formats.reading import Progress as LoadProgress
+
 
 EVERY = 5.0  # seconds between lines
 PATIENCE = 1.0  # seconds of reading or compiling before a line or a bar tells of it

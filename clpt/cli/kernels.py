@@ -124,12 +124,12 @@ def _reproduce(plan: Scene, scene: Path, folder: Path, stage: str, which: str | 
     on = device.choose(which)
     witness = agreement.witness_of(on)
     only = () if stage == FIRST else (stage,)
-    for result in agreement.checked(on, plan, witness, only):
-        if only or result.problem:
+    for comparison in agreement.checked(on, plan, witness, only):
+        if only or comparison.problem:
             break
     else:
         raise SceneError(f"no stage is wrong beside {witness.name}", file=scene)
-    verdict, launch = result.problem or "right", result.launch
+    verdict, launch = comparison.problem or "right", comparison.launch
     launches.write_program(folder, launch, str(scene), on.info, witness.name, verdict)
     terminal.say(f"{launch.stage} on {on.info.label}: {verdict}, beside {witness.name}", err=False)
     terminal.say(f"{folder / 'README.txt'} says how to run it without clpt", err=False)

@@ -53,7 +53,8 @@ def measure(
     """Measure light in SCENE at points or along rays, with standard errors.
 
     Quantities at points: irradiance, spectral_irradiance, scalar_irradiance, illuminance,
-    scalar_illuminance, photon_flux_density. Along rays: radiance, spectral_radiance, luminance.
+    scalar_illuminance, photon_flux_density, tristimulus, and by `clpt[measure]` cct, cri and rf.
+    Along rays: radiance, spectral_radiance, luminance.
     """
     locate(scene)
     locate(points)

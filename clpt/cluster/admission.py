@@ -161,7 +161,7 @@ class Admission:
 
     def _files(self, digests: list[str]) -> dict[str, Any]:
         """Return Dask tasks that give files of the bundle; workers share their results."""
-        named = self.job.bundle.files.items()
+        named = self.job.bundle.items()
         paths = {digest: self.job.folder / name for name, digest in named}
         return {
             digest: self.calls.client.submit(

@@ -46,18 +46,6 @@ def gaps(taken: Ranges, first: int, end: int) -> list[tuple[int, int]]:
     return [(a, b) for a, b in missing if a < b]
 
 
-@dataclass(frozen=True)
-class Block:
-    """Samples first to end - 1 of every pixel."""
-
-    first: int
-    end: int
-
-    @property
-    def samples(self) -> int:
-        return self.end - self.first
-
-
 @dataclass
 class WorkerRecord:
     """A worker's record; samples are of the whole picture.
@@ -94,7 +82,7 @@ class Blocks:
         self.taken, self.seconds = taken, seconds
         self.workers: dict[Worker, WorkerRecord] = {}
         self._free = gaps(taken, 0, end)
-        self._flights: dict[Worker, Block] = {}
+        self._flights: dict[Worker, range] = {}
 
     @property
     def done(self) -> bool:
@@ -120,10 +108,10 @@ class Blocks:
         self.workers.pop(worker, None)
         block = self._flights.pop(worker, None)
         if block is not None:
-            self._free.insert(0, (block.first, block.end))
+            self._free.insert(0, (block.start, block.stop))
 
-    def take(self, worker: Worker) -> Block | None:
-        """Return the next block of a worker; None where no block is free or others are faster.
+    def take(self, worker: Worker) -> range | None:
+        """Return a worker's next block of samples; None if no block is free or others are faster.
 
         Raises KeyError for a worker that did not join.
         """
@@ -133,15 +121,15 @@ class Blocks:
         first, end = self._free[0]
         size = min(self._size(record), end - first)
         self._free[:1] = [(first + size, end)] if first + size < end else []
-        block = self._flights[worker] = Block(first, first + size)
-        record.size = block.samples
+        block = self._flights[worker] = range(first, first + size)
+        record.size = size
         return block
 
     def finish(self, worker: Worker, seconds: float) -> None:
         """Note that a worker has finished its block, and how long it took."""
         block = self._flights.pop(worker)
-        self.taken = with_range(self.taken, block.first, block.end)
-        self.workers[worker].note(block.samples, seconds)
+        self.taken = with_range(self.taken, block.start, block.stop)
+        self.workers[worker].note(len(block), seconds)
 
     def _leaves_to_others(self, record: WorkerRecord) -> bool:
         """Whether the fastest worker finishes all samples before this worker finishes a sample."""

@@ -15,9 +15,8 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from clpt.device import disk_cache
 from clpt.errors import ClusterError
@@ -34,39 +33,32 @@ _NAME = re.compile(r"[A-Za-z0-9_][\w.-]{0,199}", re.ASCII)
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 
 
-@dataclass(frozen=True)
-class Bundle:
-    """The files of a scene: digests by name, including scene.json."""
+Bundle: TypeAlias = dict[str, str]  # digests of a scene's files by name, including scene.json
 
-    files: dict[str, str]
 
-    @property
-    def digests(self) -> set[str]:
-        return set(self.files.values())
+def to_json(bundle: Bundle) -> dict[str, Any]:
+    """Return what `from_json` reads."""
+    return {"format": "clpt bundle", "version": VERSION, "files": bundle}
 
-    def to_json(self) -> dict[str, Any]:
-        """Return what `from_json` reads."""
-        return {"format": "clpt bundle", "version": VERSION, "files": self.files}
 
-    @classmethod
-    def from_json(cls, document: object) -> Bundle:
-        """Read a bundle's list.
+def from_json(document: object) -> Bundle:
+    """Read a bundle's list.
 
-        Raises ClusterError for an unknown version, a name that is no plain file name, and a text
-        that is no digest.
-        """
-        if not isinstance(document, dict) or document.get("format") != "clpt bundle":
-            raise ClusterError("this is no bundle of a scene")
-        version, files = document.get("version"), document.get("files")
-        if version != VERSION:
-            raise ClusterError(f"the bundle has version {version!r}; this clpt reads {VERSION}")
-        if not isinstance(files, dict) or SCENE not in files:
-            raise ClusterError(f"the bundle has no {SCENE}")
-        for name, digest in files.items():
-            if not _NAME.fullmatch(name):
-                raise ClusterError(f"the bundle names a file outside of its folder: {name!r}")
-            check_digest(digest)
-        return cls(dict(files))
+    Raises ClusterError for an unknown version, a name that is no plain file name, and a text that
+    is no digest.
+    """
+    if not isinstance(document, dict) or document.get("format") != "clpt bundle":
+        raise ClusterError("this is no bundle of a scene")
+    version, files = document.get("version"), document.get("files")
+    if version != VERSION:
+        raise ClusterError(f"the bundle has version {version!r}; this clpt reads {VERSION}")
+    if not isinstance(files, dict) or SCENE not in files:
+        raise ClusterError(f"the bundle has no {SCENE}")
+    for name, digest in files.items():
+        if not _NAME.fullmatch(name):
+            raise ClusterError(f"the bundle names a file outside of its folder: {name!r}")
+        check_digest(digest)
+    return files
 
 
 def pack(scene: Scene, folder: Path) -> Bundle:
@@ -76,7 +68,7 @@ def pack(scene: Scene, folder: Path) -> Bundle:
     nothing but clpt.
     """
     native.save(scene, folder / SCENE, copies=True)
-    return Bundle({path.name: file_digest(path) for path in sorted(folder.iterdir())})
+    return {path.name: file_digest(path) for path in sorted(folder.iterdir())}
 
 
 class Store:
@@ -90,7 +82,7 @@ class Store:
 
     def lacks(self, bundle: Bundle) -> list[str]:
         """Return the digests of missing files; damaged files are deleted."""
-        return sorted(digest for digest in bundle.digests if not self._holds(digest))
+        return sorted(digest for digest in {*bundle.values()} if not self._holds(digest))
 
     def add(self, digest: str, content: bytes) -> None:
         """Keep a file. Raises ClusterError if its digest is another, OSError."""
@@ -109,7 +101,7 @@ class Store:
         """
         self._clear_old()
         with tempfile.TemporaryDirectory(prefix=_OPENED, dir=self.folder) as folder:
-            for name, digest in bundle.files.items():
+            for name, digest in bundle.items():
                 try:
                     os.close(disk_cache.own_file(self.folder / digest))
                 except OSError:

@@ -18,7 +18,7 @@ from clpt.cluster.farm import Farm, Film
 from clpt.cluster.host_maker import HostMaker
 from clpt.denoise import needs
 from clpt.errors import SceneError
-from clpt.render.edit.plan import Plan
+from clpt.render.edit.plans import Plan
 from clpt.render.film.state import FilmState, Ranges
 from clpt.render.makers import planning
 from clpt.render.makers.contents import Contents, Settle

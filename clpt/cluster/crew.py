@@ -14,11 +14,11 @@ from dataclasses import replace
 from functools import partial
 from typing import NoReturn
 
-from clpt.cluster.blocks import Block, Blocks, WorkerRecord, gaps
+from clpt.cluster.blocks import Blocks, WorkerRecord, gaps
 from clpt.cluster.device_worker import TICK, DeviceWorker, Threads
 from clpt.errors import ClusterError
 from clpt.render.film.state import FilmState, Ranges, join_ranges
-from clpt.render.makers.maker import Held
+from clpt.render.makers.maker import Held, Tick
 from clpt.render.wavefront.tracer import Selection
 from clpt.render.wavefront.wavefront import Counts
 
@@ -74,7 +74,7 @@ class Crew:
         """Samples of all pixels."""
         return Selection("all", self.first.film.wavefront.paths.pixels)
 
-    def run(self, selection: Selection, ranges: Ranges, tick: Callable[[], bool]) -> bool:
+    def run(self, selection: Selection, ranges: Ranges, tick: Tick) -> bool:
         """Add ranges of a selection's samples; return False after a stop.
 
         tick: called repeatedly; if it returns False, devices stop. Its exceptions pass on after
@@ -85,7 +85,7 @@ class Crew:
             finished = self.repeat(tick)
         return finished
 
-    def repeat(self, tick: Callable[[], bool]) -> bool:
+    def repeat(self, tick: Tick) -> bool:
         """Render lost samples again, see `run`."""
         selection = self.lost[0][0]
         again: Ranges = ()
@@ -168,7 +168,7 @@ class Crew:
         message = f"no device is left; the last one, {worker.name}, failed: {error}"
         raise ClusterError(message) from error
 
-    def _share(self, selection: Selection, ranges: Ranges, tick: Callable[[], bool]) -> bool:
+    def _share(self, selection: Selection, ranges: Ranges, tick: Tick) -> bool:
         """Add ranges of a selection's samples; failures may leave `lost` samples."""
         end = ranges[-1][1]
         others = tuple(gaps(ranges, 0, end))
@@ -216,7 +216,7 @@ class Crew:
                 worker.clear()
             while (block := self._next(worker, blocks, goes_on)) is not None:
                 began = time.perf_counter()
-                finished = worker.do(selection, block.first, block.end, goes_on)
+                finished = worker.do(selection, block.start, block.stop, goes_on)
                 seconds = time.perf_counter() - began
                 self._note(worker, blocks, selection, block, seconds, finished)
                 if worker.unsaved_seconds > SAVE_SECONDS:
@@ -227,9 +227,7 @@ class Crew:
                 blocks.lose(worker)
                 self._tell()
 
-    def _next(
-        self, worker: DeviceWorker, blocks: Blocks, goes_on: Callable[[], bool]
-    ) -> Block | None:
+    def _next(self, worker: DeviceWorker, blocks: Blocks, goes_on: Tick) -> range | None:
         """Wait for a block; return None at the end."""
         with self._changed:
             while goes_on() and not blocks.done:
@@ -244,17 +242,17 @@ class Crew:
         worker: DeviceWorker,
         blocks: Blocks,
         selection: Selection,
-        block: Block,
+        block: range,
         seconds: float,
         finished: bool,
     ) -> None:
         """Note that a device's film has a block, or a part of it after a stop."""
         with self._changed:
-            worker.unsaved.append((selection, block.first, block.end))
+            worker.unsaved.append((selection, block.start, block.stop))
             worker.unsaved_seconds += seconds
             if finished:
                 blocks.finish(worker, seconds)
-                worker.paths += block.samples * selection.pixels
+                worker.paths += len(block) * selection.pixels
                 worker.rate = blocks.workers[worker].rate * selection.pixels
             self._tell()
 

@@ -13,8 +13,9 @@ from clpt.device import Device
 from clpt.errors import SceneError
 from clpt.render.film.state import FilmState, Ranges, join_ranges
 from clpt.render.makers.device_film import DeviceFilm
+from clpt.render.wavefront.bounce_loop import OnBatch
 from clpt.render.wavefront.tracer import Selection, use_all_pixels
-from clpt.render.wavefront.wavefront import Counts, OnBatch, Wavefront
+from clpt.render.wavefront.wavefront import Counts, Wavefront
 
 TICK = 0.05  # seconds between two polls for changes without notice
 _Value = TypeVar("_Value")

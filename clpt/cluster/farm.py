@@ -21,6 +21,7 @@ from clpt.cluster.blocks import gaps
 from clpt.cluster.tasks import Call, Calls, reply_of
 from clpt.errors import ClusterError
 from clpt.render.film.state import FilmState, Ranges
+from clpt.render.makers.maker import Tick
 from clpt.render.wavefront.tracer import Selection
 from clpt.render.wavefront.wavefront import Counts
 
@@ -92,7 +93,7 @@ class Farm:
 
     def run(
         self, job: Job, selection: Selection, pixels: int, samples: tuple[int, int], taken: Ranges,
-        add: Callable[[Film], None], tick: Callable[[], bool],
+        add: Callable[[Film], None], tick: Tick,
     ) -> bool:  # fmt: skip
         """Let workers render samples of a selection; return whether all were rendered.
 

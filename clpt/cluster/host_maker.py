@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
 
 from clpt import device as dev
 from clpt.errors import ClusterError
 from clpt.render.film.state import FilmState
-from clpt.render.makers.maker import Maker
+from clpt.render.makers.maker import Maker, Tick
+from clpt.render.wavefront.bounce_loop import OnBatch
 from clpt.render.wavefront.tracer import Selection, Tracer
-from clpt.render.wavefront.wavefront import OnBatch
 
 
 class HostMaker(Maker):
@@ -31,7 +30,7 @@ class HostMaker(Maker):
         """None: calls return when their work is done."""
 
     @abstractmethod
-    def add(self, selection: Selection, first: int, end: int, tick: Callable[[], bool]) -> bool:
+    def add(self, selection: Selection, first: int, end: int, tick: Tick) -> bool:
         """Add samples first to end - 1 of a selection; return False after a stop."""
 
     def use_all_pixels(self) -> None:

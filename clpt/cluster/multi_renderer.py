@@ -14,7 +14,7 @@ from clpt.cluster.crew import Crew
 from clpt.cluster.device_worker import DeviceWorker, Once, device_names, results_where_possible
 from clpt.cluster.host_maker import HostMaker
 from clpt.errors import DeviceError, SceneError
-from clpt.render.edit.plan import Plan
+from clpt.render.edit.plans import Plan
 from clpt.render.film.state import FilmState, Ranges
 from clpt.render.makers import planning
 from clpt.render.makers.contents import Contents, Settle

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from distributed import Client, Scheduler, Worker
     from distributed.security import Security
 
+Tell = Callable[[str], object]  # called with a text for people
+
 KEYS_FILE = "clpt-cluster.pem"
 LOOPBACK = "127.0.0.1"
 SETTINGS = {
@@ -153,7 +155,7 @@ def run_worker(
     host: str | None = None,
     folder: Path | None = None,
     name: str | None = None,
-    tell: Callable[[str], None] = lambda text: None,
+    tell: Tell = lambda text: None,
 ) -> int:
     """Render for a scheduler until it ends or a signal arrives; return the exit status.
 
@@ -171,7 +173,7 @@ async def _worker(
     host: str | None,
     folder: Path | None,
     name: str | None,
-    tell: Callable[[str], object],
+    tell: Tell,
 ) -> int:
     with _scratch() as scratch:
         host = host or (LOOPBACK if is_loopback(address) else None)
@@ -254,7 +256,7 @@ def run_scheduler(
     port: int,
     *,
     folder: Path | None = None,
-    tell: Callable[[str], None] = lambda text: None,
+    tell: Tell = lambda text: None,
 ) -> int:
     """Run a scheduler until a signal arrives; return the exit status.
 
@@ -267,7 +269,7 @@ def run_scheduler(
     return asyncio.run(_scheduler(host, port, folder, tell))
 
 
-async def _scheduler(host: str, port: int, folder: Path, tell: Callable[[str], object]) -> int:
+async def _scheduler(host: str, port: int, folder: Path, tell: Tell) -> int:
     with _scratch() as scratch:
         try:
             scheduler = new_scheduler(host, port, folder, scratch)

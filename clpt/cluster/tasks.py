@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 
 from clpt import device as dev
-from clpt.cluster.bundle import Bundle, Store, canonical
+from clpt.cluster.bundle import Bundle, Store, canonical, from_json, to_json
 from clpt.cluster.multi_renderer import MultiRenderer
 from clpt.errors import ClptError, ClusterError, MemoryBudgetError, SceneError
 from clpt.render.film.state import DIMENSIONS, FilmState
@@ -126,7 +126,7 @@ def describe_job(bundle: Bundle, options: dict[str, Any]) -> str:
     """Return a job's description as JSON; its SHA-256 is the job's digest."""
     return canonical({
         "format": "clpt job", "version": VERSION, "clpt": VERSION_OF_CLPT,
-        "kernels": kernels_digest(), "bundle": bundle.to_json(), "options": options,
+        "kernels": kernels_digest(), "bundle": to_json(bundle), "options": options,
     })  # fmt: skip
 
 
@@ -161,7 +161,7 @@ def _open_job(job: str, files: dict[str, bytes]) -> Reply:
         if document.get(part) != version:
             theirs, ours = (str(v)[:12] for v in (document.get(part), version))
             raise ClusterError(f"it has {part} {ours}, the client {theirs}")
-    bundle, store = Bundle.from_json(document.get("bundle")), Store()
+    bundle, store = from_json(document.get("bundle")), Store()
     options = document.get("options")
     if not isinstance(options, dict) or not options.keys() <= set(OPTIONS):
         raise ClusterError("the job has unknown options")

@@ -16,8 +16,8 @@ import pyopencl as cl
 
 from clpt.device import native_programs, runtimes, speed_trial
 
+from ..arrays import is_whole
 from ..errors import DeviceError
-from ..scalars import is_whole
 from .compilers import Compilers, spare_cores
 from .context import Device, DeviceInfo, devices
 

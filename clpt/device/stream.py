@@ -92,11 +92,14 @@ class Stream:
 
     def fill_rows(self, buffer: cl.Buffer, word: int, rows: Rows) -> cl.Event:
         """Enqueue a fill of a buffer's rows with a word."""
+        return self.write_rows(buffer, np.full(rows.count * rows.size // 4, word, np.uint32), rows)
+
+    def write_rows(self, buffer: cl.Buffer, source: np.ndarray, rows: Rows) -> cl.Event:
+        """Enqueue a copy of an array without gaps to a buffer's rows; it may change at once."""
         flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
-        host = np.full(rows.count * rows.size // 4, word, np.uint32)
-        staged = host_buffer(self.queue.context, flags, host)
+        staged = host_buffer(self.queue.context, flags, source)
         return self._enqueue(
-            "a fill", host.nbytes, cl.enqueue_copy, buffer, staged,
+            "a copy to rows", source.nbytes, cl.enqueue_copy, buffer, staged,
             src_origin=(0, 0, 0), src_pitches=(rows.size,),
             dst_origin=(rows.first, 0, 0), dst_pitches=(rows.pitch,), region=rows.region,
         )  # fmt: skip

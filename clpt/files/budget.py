@@ -4,6 +4,11 @@ A file of a few bytes can announce gigabytes. So each reader asks here before it
 has an account. The scene keeps it, and the preparation of the scene for its first sample draws
 from the same account. The contents of files are always allowed while there is memory; data that a
 small file expands to is limited. A scene without a file has the limit of the machine alone.
+
+Whatever takes time consists of steps that many scenes share. Each reports by `check_time`: the
+fields of an object are read, a shape is placed, a spectrum is evaluated, words are appended to a
+table, a lowering is looked up, a level of a tree or of an image is made. So a preparation ends soon
+after its time is spent, whatever the scene has many of.
 """
 
 from __future__ import annotations
@@ -16,7 +21,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from clpt.errors import SceneError
 
@@ -29,7 +34,8 @@ PER_REPEAT = 256  # a file that is read again counts as a part for each so many 
 SECONDS = 600.0
 SHARE = 2  # a load may take the available memory divided by this
 UNKNOWN = 4 << 30  # bytes, if the system does not tell
-Result = TypeVar("Result")
+Function = TypeVar("Function", bound=Callable[..., object])
+T = TypeVar("T")
 # Files of a control group, versions 2 and 1: the limit, what is used, and the pages of files that
 # nobody has used of late. These count as used, but the kernel gives them up first.
 _CGROUPS = (
@@ -151,18 +157,18 @@ def _drawn_from(account: Account) -> Iterator[None]:
         _account.reset(token)
 
 
-def carried(function: Callable[..., Result]) -> Callable[..., Result]:
+def carried(function: Function) -> Function:
     """Return the function such that it draws from this account in other threads too."""
     account = _account.get()
 
-    def carrying(*arguments: object) -> Result:
+    def carrying(*arguments: object) -> object:
         token = _account.set(account)
         try:
             return function(*arguments)
         finally:
             _account.reset(token)
 
-    return carrying
+    return cast(Function, carrying)
 
 
 def take(size: int, subject: str, file: Path | None = None) -> None:
@@ -251,6 +257,13 @@ def check_time(file: Path | None = None) -> None:
     if account.spent + time.monotonic() - account.began > seconds:
         message = f"reading the scene takes more than {seconds:g} s: {_advice('seconds')}"
         raise SceneError(message, file=file)
+
+
+def steps(members: Iterable[T]) -> Iterator[T]:
+    """Yield the members of a long list; each is a step. Raises as `check_time` does."""
+    for member in members:
+        check_time()
+        yield member
 
 
 def reads(status: os.stat_result) -> None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import Matrices, Points, on_host, single
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.geometry import analytic, shape_records, shapes, strands, triangles, tubes
 from clpt.geometry.analytic import keeps_its_kind, tessellate
 from clpt.geometry.shapes import where
@@ -166,9 +167,8 @@ def _met_as(shape: Shape, to_world: Matrices | None = None) -> Shape:
 def matrices(instances: Sequence[Shape]) -> Matrices:
     """Return the transforms of instances, (k, 4, 4), checked all at once. Raises as `sort` does."""
     try:
-        stacked = np.stack(
-            [np.asarray(on_host(instance.to_world), np.float64) for instance in instances]
-        )
+        placements = (on_host(instance.to_world) for instance in budget.steps(instances))
+        stacked = np.stack([np.asarray(matrix, np.float64) for matrix in placements])
         affine = stacked.shape[1:] == (4, 4) and (stacked[:, 3] == transforms.IDENTITY[3]).all()
         linear = stacked[:, :3, :3]
         with np.errstate(all="ignore"):

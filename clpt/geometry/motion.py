@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import Boxes
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.geometry import shapes, triangles
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
@@ -131,6 +132,7 @@ def at_rest(scene: Scene) -> Scene:
 
 
 def _deforms(shape: Shape) -> bool:
+    budget.check_time()
     return any(member.deformation is not None for member in shape.members)
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import fits_single, on_host
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape
 
@@ -28,6 +29,7 @@ def geometry(shape: Shape) -> tuple[Any, ...]:
 
 def placement(shape: Shape) -> NDArray[np.float64]:
     """Return a shape's transform. Raises SceneError if it is singular, or no affine 4x4 matrix."""
+    budget.check_time()
     try:
         matrix = np.asarray(on_host(shape.to_world), np.float64)
     except (TypeError, ValueError) as error:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats32, Matrix, on_host, single
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.images.transfer import decoded, srgb_to_linear
 
 BLOCK = 1 << 22  # values that are decoded at once, so that what is between takes no memory
@@ -73,6 +74,7 @@ class Stored:
         linear = np.empty((height, width, count), np.float32)
         rows = max(BLOCK // max(width * count, 1), 1)
         for first in range(0, height, rows):
+            budget.check_time()
             part = slice(first, first + rows)
             linear[part] = self._linear(self.values[part])
         return linear

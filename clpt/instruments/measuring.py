@@ -3,7 +3,8 @@
 A point becomes a receiver: a white, matt, one-sided triangle of a tenth of a millimetre, just above
 the point; or a white ball, where all directions count alike. A white surface of irradiance E has
 the radiance E / pi, so a ray onto it measures E by every integrator. Each entry has REPLICAS
-pixels, which are independent: their mean is the value, and their scatter its standard error.
+pixels, which are independent: their mean gives the value, and their scatter its standard error, by
+the jackknife (Efron 1982): quantities such as color temperature are no linear functions of light.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ class Measurement:
     """Values of a quantity of light, and their standard errors.
 
     values, errors: (...) as the points or directions are, float64; spectral quantities have an axis
-    of bands behind. unit: of both. wavelengths: middles of the bands (bands,) [nm], or None.
+    of bands behind, `tristimulus` has X, Y, Z. The color of darkness is NaN.
+    unit: of both. wavelengths: middles of the bands (bands,) [nm], or None.
     samples: paths of each entry.
     """
 
@@ -126,13 +128,17 @@ def _pixels(image: Image, turns: int, count: int) -> Floats:
 def _measured(quantity: str, pixels: Floats, film: Film, shape: tuple[int, ...]) -> Measurement:
     """Return what the pixels (REPLICAS, turns, count, channels) of a film measure."""
     kind = QUANTITIES[quantity]
-    replicas = kind.value(pixels.sum(axis=1) / (1.5 if kind.everywhere else 1.0), film)
-    shape = (*shape, *replicas.shape[2:])
+    replicas = pixels.sum(axis=1) / (1.5 if kind.everywhere else 1.0)
+    total = replicas.sum(axis=0)
+    value = kind.value(total / REPLICAS, film)
+    without = np.stack([kind.value((total - each) / (REPLICAS - 1), film) for each in replicas])
+    spread = ((without - without.mean(axis=0)) ** 2).sum(axis=0)
+    shape = (*shape, *value.shape[1:])
     return Measurement(
         quantity,
         kind.unit,
-        replicas.mean(axis=0).reshape(shape),
-        (replicas.std(axis=0, ddof=1) / math.sqrt(REPLICAS)).reshape(shape),
+        value.reshape(shape),
+        np.sqrt(spread * (REPLICAS - 1) / REPLICAS).reshape(shape),
         samples=0,
         wavelengths=film.band_centres if kind.spectral else None,
     )

@@ -8,11 +8,13 @@ gone from both.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from clpt.arrays import Floats
+from clpt.instruments import color
 from clpt.scene.integrators import Film
 from clpt.spectra.emission import UNIT_LUMINANCE
 
@@ -27,7 +29,8 @@ class Quantity:
 
     unit: of its values. at: "points", with normals, or "rays", with directions. weighs: "eye" for
     the photopic observer, "photons" for their count, "" for energy; spectral: a value for each band
-    [unit per nm]; everywhere: all directions count alike.
+    [unit per nm]; everywhere: all directions count alike; color: turns pixels
+    into values, of light as the eye ("eye") or a spectrometer ("spectrum") has it.
     """
 
     unit: str
@@ -35,6 +38,7 @@ class Quantity:
     weighs: str = ""
     spectral: bool = False
     everywhere: bool = False
+    color: Callable[[Floats], Floats] | None = None
 
     def film(self, film: Film, bands: int) -> Film:
         """Return a film that measures it; bands: of a spectral quantity."""
@@ -47,10 +51,19 @@ class Quantity:
         if self.weighs == "photons":
             low, high = PHOTOSYNTHESIS
             return dataclasses.replace(film, lambda_min=low, lambda_max=high, bands=BANDS)
+        if self.weighs == "spectrum":
+            low, high = color.WAVELENGTHS[0] - 2.5, color.WAVELENGTHS[-1] + 2.5
+            bands = len(color.WAVELENGTHS)
+            return dataclasses.replace(film, lambda_min=low, lambda_max=high, bands=bands)
         return dataclasses.replace(film, bands=bands if self.spectral else 1)
 
     def value(self, pixels: Floats, film: Film) -> Floats:
-        """Return values (...) or (..., bands) of a film's pixels (..., channels)."""
+        """Return values (...) or (..., bands) of a film's pixels (..., channels).
+
+        Raises SceneError for a quantity of color where `colour-science` is not installed.
+        """
+        if self.color is not None:
+            return self.color(pixels)
         if self.weighs == "eye":
             return UNIT_LUMINANCE * pixels[..., 1]
         if self.spectral:
@@ -68,6 +81,10 @@ QUANTITIES = {
     "scalar_irradiance": Quantity("W/m^2", "points", everywhere=True),
     "illuminance": Quantity("lx", "points", "eye"),
     "scalar_illuminance": Quantity("lx", "points", "eye", everywhere=True),
+    "tristimulus": Quantity("lx", "points", "eye", color=color.tristimulus),
+    "cct": Quantity("K", "points", "eye", color=color.temperature),
+    "cri": Quantity("Ra", "points", "spectrum", color=color.rendering_index),
+    "rf": Quantity("Rf", "points", "spectrum", color=color.fidelity_index),
     "photon_flux_density": Quantity("umol/m^2/s", "points", "photons"),
     "radiance": Quantity("W/m^2/sr", "rays"),
     "spectral_radiance": Quantity("W/m^2/sr/nm", "rays", spectral=True),

@@ -62,6 +62,8 @@ def written(points: Floats, measured: Measurement) -> str:
     writer = csv.writer(text, lineterminator="\n")
     name = f"{measured.quantity} [{measured.unit}]"
     bands = [""]
+    if measured.quantity == "tristimulus":
+        bands = [f" {component}" for component in "XYZ"]
     if measured.wavelengths is not None:
         bands = [f" at {wavelength:g} nm" for wavelength in measured.wavelengths]
     values = measured.values.reshape(len(points), -1)

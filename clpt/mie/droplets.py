@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import scalars, spectra
+from clpt import spectra
+from clpt.arrays import number
 from clpt.choices import DROP_SIZES
 from clpt.errors import SceneError
 from clpt.mie.sphere import spheres
@@ -196,4 +197,4 @@ def _index(value: float | str | Spectrum, at: NDArray[np.float64]) -> NDArray[np
 def _values(value: float | Spectrum, at: NDArray[np.float64]) -> NDArray[np.float64]:
     if isinstance(value, Spectrum):
         return np.asarray(value.sample(at), np.float64)
-    return np.full(len(at), scalars.number(value))
+    return np.full(len(at), number(value))

@@ -11,7 +11,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 from pyopencl.array import Array
 
-from .. import scalars
+from ..arrays import real
 from ..device import host_buffer
 from ..errors import SceneError
 
@@ -133,7 +133,7 @@ def rays(
         arrays[name] = each or DeviceArg(None, count)
         arguments |= {
             f"{name}s": arrays[name].buffer,
-            name: 0.0 if each else scalars.real(limit, name),
+            name: 0.0 if each else real(limit, name),
         }
     return Rays(count, from_host, arguments, tuple(arrays.values()))
 

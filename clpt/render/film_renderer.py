@@ -13,22 +13,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clpt import device as dev
-from clpt import images, scalars
-from clpt.arrays import Image
+from clpt import images
+from clpt.arrays import Image, is_whole, whole
 from clpt.choices import MOST_SAMPLES, Exposure
 from clpt.denoise import needs
 from clpt.errors import LONGEST_WARNING, ClptError, DeviceError, SceneError, one_line
 from clpt.images.colour import View
-from clpt.render.edit.plan import Plan
+from clpt.render.edit.plans import Plan
 from clpt.render.edit.scene_edit import MaterialKey, ShapeKey
-from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.developed import Developed
 from clpt.render.film.film_file import (
     classes_text,
     other_devices,
 )
-from clpt.render.film.layer_channels import write_picture
-from clpt.render.film.pictures import PictureForm, Pictures
+from clpt.render.film.layers import write_picture
+from clpt.render.film.pictures import DenoisedPicture, PictureForm, Pictures
 from clpt.render.film.state import join_ranges
 from clpt.render.makers.contents import (
     Change,
@@ -526,7 +525,7 @@ def next_range(first: int, samples: int) -> tuple[int, int]:
 
 def checked_number(number: int) -> int:
     """Return a sample's number. Raises SceneError for a number below 0, and for a large number."""
-    number = scalars.whole(number, 0, where="first_sample")
+    number = whole(number, 0, where="first_sample")
     if number > MOST_SAMPLES:
         raise SceneError(f"a pixel cannot have more than {MOST_SAMPLES} samples", where="samples")
     return number
@@ -534,6 +533,6 @@ def checked_number(number: int) -> int:
 
 def checked_samples(samples: int) -> int:
     """Return a number of samples. Raises SceneError unless it is whole and above 0."""
-    if not scalars.is_whole(samples) or samples < 1:
+    if not is_whole(samples) or samples < 1:
         raise SceneError(f"samples per pixel must be a whole number above zero, not {samples!r}")
     return int(samples)

@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from clpt import device as dev
 from clpt import formats
-from clpt.arrays import Image
+from clpt.arrays import Image, is_number, is_whole, plain
 from clpt.errors import SceneError
 from clpt.render.film_renderer import OnProgress, checked_samples
 from clpt.render.options import RenderOptions, check_names, check_scene
 from clpt.render.renderer import Renderer
-from clpt.scalars import is_number, is_whole, plain
 from clpt.scene import Film, Scene, viewpoint
 from clpt.scene.cameras import Camera
 

@@ -9,8 +9,8 @@ from typing import Any, TypedDict, get_args
 
 import pyopencl as cl
 
-from clpt import bvh, scalars
-from clpt.arrays import check_unmasked
+from clpt import bvh
+from clpt.arrays import check_unmasked, flag, is_number, whole
 from clpt.denoise import needs, oidn
 from clpt.errors import SceneError, UnknownKindError, nearest
 from clpt.scene import Scene
@@ -88,13 +88,13 @@ def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
         raise UnknownKindError("quality", str(quality), get_args(bvh.Quality), where="tree_quality")
     for name in ("queued", "looped", "halves", "profiling"):
         if options.get(name) is not None:
-            scalars.flag(options[name], name)
+            flag(options[name], name)
     seconds = options.get("cancel_seconds")
-    if seconds is not None and not (scalars.is_number(seconds) and seconds > 0.0):
+    if seconds is not None and not (is_number(seconds) and seconds > 0.0):
         raise SceneError(f"must be seconds above 0, not {seconds!r}", where="cancel_seconds")
     for name, least in (("slots", 1), ("texture_budget", 0), ("first_sample", 0)):
         if options.get(name) is not None:
-            scalars.whole(options[name], least, where=name)
+            whole(options[name], least, where=name)
 
 
 def check_changes(camera: object, **by_key: object) -> None:

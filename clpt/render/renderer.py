@@ -12,8 +12,7 @@ from clpt import device as dev
 from clpt.render.film_renderer import OnProgress, next_range
 from clpt.render.makers.contents import synchronized
 from clpt.render.makers.device_film import DeviceFilm, open_device
-from clpt.render.makers.device_maker import DeviceMaker
-from clpt.render.makers.maker import Call
+from clpt.render.makers.maker import Call, DeviceMaker
 from clpt.render.options import RenderOptions, check_options, check_scene
 from clpt.render.progress import Progress
 from clpt.render.resumable import ResumableRenderer

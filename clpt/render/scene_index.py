@@ -9,7 +9,7 @@ from typing import Any
 from clpt.geometry import instancing, shapes
 from clpt.geometry.instancing import Placed, Prototype
 from clpt.geometry.motion import Motions
-from clpt.render.records import GridFeatures, custom_materials
+from clpt.render.records import GridFeatures, materials
 from clpt.scene import Film, Scene
 from clpt.scene import materials as mt
 from clpt.scene.cameras import Camera
@@ -281,7 +281,7 @@ def _leaf_kinds(shapes_: tuple[Shape, ...]) -> tuple[type[mt.Material], ...]:
                 kinds[leaf] = shapes.where(shape)
     if any(shape.priority for shape in shapes_):
         kinds.setdefault(mt.Null, "")  # a surface within a body of higher priority
-    return custom_materials.ordered(kinds) or (mt.Diffuse,)
+    return materials.ordered(kinds) or (mt.Diffuse,)
 
 
 def _media(camera: Camera, shapes_: tuple[Shape, ...]) -> list[Medium]:

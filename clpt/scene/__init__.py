@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from clpt import scalars
+from clpt.arrays import is_number, whole
 from clpt.choices import MOST_SEED
 from clpt.errors import SceneError
 from clpt.files.budget import Account
@@ -218,7 +218,7 @@ class Scene:
     def __post_init__(self) -> None:
         self.shapes, self.lights = _listed(self.shapes, "shapes"), _listed(self.lights, "lights")
         check_parts(self)
-        self.spp = scalars.whole(self.spp, 1, where="spp")
+        self.spp = whole(self.spp, 1, where="spp")
         self.seed = checked_seed(self.seed)
         if self.noise is not None:
             self.noise = checked_noise(self.noise)
@@ -226,7 +226,7 @@ class Scene:
 
 def checked_seed(seed: object) -> int:
     """Return a seed. Raises SceneError unless it is a whole number of 32 bits, as in kernels."""
-    return scalars.whole(seed, 0, MOST_SEED, where="seed")
+    return whole(seed, 0, MOST_SEED, where="seed")
 
 
 def check_parts(scene: Scene) -> None:
@@ -264,7 +264,7 @@ def _check_kind(value: object, base: type[Kind], where: str) -> None:
 
 def checked_noise(noise: object) -> float:
     """Return a limit of noise. Raises SceneError unless it is a finite number above 0."""
-    if not scalars.is_number(noise) or not 0.0 < noise < math.inf:
+    if not is_number(noise) or not 0.0 < noise < math.inf:
         message = f"must be a number above zero, such as 0.02, not {noise!r}"
         raise SceneError(message, where="noise")
     return float(noise)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import logging
 import math
+from collections.abc import Sequence
 from dataclasses import InitVar, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -13,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import lenses, spectra, transforms
 from clpt.arrays import fits_single, vectors
 from clpt.errors import SceneError
-from clpt.lenses import Prescription
+from clpt.lenses import Prescription, projections
+from clpt.lenses.projections import Projection
 from clpt.lenses.tracing import MARGIN, FocusedLens, focused_lens
 from clpt.scene import roles
 from clpt.scene.media import Medium
@@ -23,7 +27,10 @@ from clpt.scene.roles import Param
 from clpt.scene.values import IndexLike, Matrix4, Vector3
 from clpt.spectra import Constant, Spectrum
 
+log = logging.getLogger(__name__)
+
 MOST_BLADES = 24
+FLIPPED = np.array([-1.0, -1.0, 1.0])  # from OpenCV's camera space, x right and y down, and back
 DESIGN_WAVELENGTH = 587.56  # [nm], the helium line d, of a lens's focal length
 
 
@@ -115,10 +122,10 @@ class Camera(Kind):
         """
         raise NotImplementedError
 
-    def record_tables(self) -> dict[str, NDArray[np.float32]]:
+    def record_tables(self, width: int, height: int) -> dict[str, NDArray[np.float32]]:
         """Return tables (n, words) float32 behind its record, by the member that finds each.
 
-        Raises SceneError for values that cannot be used.
+        width, height: of the film [pixels]. Raises SceneError for values that cannot be used.
         """
         return {}
 
@@ -528,7 +535,7 @@ class Rays(Camera):
         """Return the film's size and the count of rays."""
         return {"columns": width, "rows": height, "count": len(self._origins())}
 
-    def record_tables(self) -> dict[str, NDArray[np.float32]]:
+    def record_tables(self, width: int, height: int) -> dict[str, NDArray[np.float32]]:
         """Return rows of origin, unit direction and weight in the world. Raises SceneError."""
         matrix, origins = self.affine_matrix(), self._origins()
         directions = vectors(self.directions, "rays.directions").reshape(-1, 3)
@@ -553,5 +560,90 @@ class Rays(Camera):
         return np.asarray(transforms.transform_points(self.affine_matrix(), mean), np.float64)
 
 
-KINDS = (Perspective, ThinLens, Lens, Orthographic, Spherical, Matrix, Rays)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Calibrated(Camera):
+    """A camera as calibration describes it: intrinsics in pixels, and a model of its distortion.
+
+    Camera space and pixels are OpenCV's in `project`, `unproject` and the coefficients: x right,
+    y down, z forward; (0, 0) is the middle of the top left pixel. A film of another size than
+    `size` scales the intrinsics. Pixels whose distortion cannot be inverted are black; the log
+    "clpt.scene.cameras" counts them.
+    """
+
+    model: str = choice("opencv", "of the projection", projections.MODELS)
+    intrinsics: Sequence[float] = host(
+        (320.0, 320.0, 319.5, 239.5), "fx, fy, cx, cy", "pixels", form="numbers"
+    )
+    distortion: Sequence[float] = host((), "coefficients of the model", form="numbers")
+    size: Sequence[float] = host(
+        (),
+        "width, height of the calibration's pictures; none: the film's",
+        "pixels",
+        form="numbers",
+    )
+
+    def project(self, points: ArrayLike, width: int, height: int) -> NDArray[np.float64]:
+        """Return pixels (..., 2) of points (..., 3) in the world [m]; NaN for what is not seen.
+
+        width, height: of the film [pixels]. `motion` does not count. Raises SceneError.
+        """
+        away = transforms.transform_points(np.linalg.inv(self.rigid_matrix()), points)
+        scale, focal, middle = self._pixels(width, height)
+        plane = self._projection().project(np.asarray(away, np.float64) * FLIPPED)
+        return (plane * focal + middle + 0.5) * scale - 0.5
+
+    def unproject(self, pixels: ArrayLike, width: int, height: int) -> NDArray[np.float64]:
+        """Return unit directions (..., 3) in the world of pixels (..., 2); NaN where none leads.
+
+        width, height: of the film [pixels]. `motion` does not count. Raises SceneError.
+        """
+        scale, focal, middle = self._pixels(width, height)
+        plane = ((np.asarray(pixels, np.float64) + 0.5) / scale - 0.5 - middle) / focal
+        directions = self._projection().directions(plane) * FLIPPED
+        return np.asarray(transforms.transform_vectors(self.rigid_matrix(), directions), np.float64)
+
+    def _projection(self) -> Projection:
+        return Projection(self.model, tuple(float(k) for k in self.distortion))
+
+    def _pixels(self, width: int, height: int) -> NDArray[np.float64]:
+        """Return the film's pixels over those of the calibration, (fx, fy) and (cx, cy): (3, 2)."""
+        values = np.asarray(self.intrinsics, np.float64)
+        if values.shape != (4,) or not np.isfinite(values).all() or not (values[:2] > 0.0).all():
+            message = f"must be fx, fy above 0, cx and cy, not {list(self.intrinsics)}"
+            raise SceneError(message, where="calibrated.intrinsics")
+        whole = tuple(self.size) or (width, height)
+        if len(whole) != 2 or not min(whole) >= 1:
+            raise SceneError(f"must be width, height, not {[*whole]}", where="calibrated.size")
+        return np.array([[width / whole[0], height / whole[1]], values[:2], values[2:]])
+
+    def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
+        """Return its matrix and the film's size."""
+        self._pixels(width, height)
+        self._projection()
+        return {"to_world": self.rigid_matrix(), "columns": width, "rows": height}
+
+    def record_tables(self, width: int, height: int) -> dict[str, NDArray[np.float32]]:
+        """Return directions in camera space of the pixels' corners, row by row; 0: none."""
+        scaled = self._pixels(width, height).tobytes()
+        return {"directions": _corner_directions(self._projection(), width, height, scaled)}
+
+
+@functools.lru_cache(maxsize=8)
+def _corner_directions(
+    projection: Projection, width: int, height: int, pixels: bytes
+) -> NDArray[np.float32]:
+    """Return unit directions ((height + 1) * (width + 1), 3) of `pixels`, see `Calibrated`."""
+    scale, focal, middle = np.frombuffer(pixels).reshape(3, 2)
+    corners = np.stack(np.meshgrid(np.arange(width + 1), np.arange(height + 1)), -1)
+    directions = projection.directions((corners / scale - 0.5 - middle) / focal) * FLIPPED
+    seen = ~np.isnan(directions[..., 0])
+    whole = seen[:-1, :-1] & seen[1:, :-1] & seen[:-1, 1:] & seen[1:, 1:]
+    if not whole.all():
+        message = "%d of %d pixels are black: the distortion (%s) cannot be inverted there"
+        log.warning(message, (~whole).sum(), whole.size, projection.model)
+    directions[~seen] = 0.0
+    return directions.reshape(-1, 3).astype(np.float32)
+
+
+KINDS = (Perspective, ThinLens, Lens, Orthographic, Spherical, Matrix, Rays, Calibrated)
 CONNECTED = tuple(camera.kind for camera in KINDS if camera.connects)

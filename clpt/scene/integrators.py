@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clpt import scalars
-from clpt.arrays import Floats
+from clpt import arrays
+from clpt.arrays import Floats, is_number, is_whole, plain, whole, wholes
 from clpt.choices import AUTO, MOST_LIGHT_PATHS
 from clpt.errors import SceneError, UnknownKindError
-from clpt.scalars import is_number, is_whole, plain, whole, wholes
 from clpt.scene import roles
 from clpt.scene.layers import LAYERS
 from clpt.scene.params import Kind, Shorthand, choice, emission, fields_of, flag, host, real
@@ -538,7 +537,7 @@ def _white_balance(value: Any) -> str | float | tuple[float, float]:
             raise SceneError(message, where=where)
         return float(value)
     try:
-        x, y = (scalars.real(value) for value in value)
+        x, y = (arrays.real(value) for value in value)
     except (TypeError, ValueError):
         message = f"must be none, an illuminant, a temperature [K] or (x, y), not {value!r}"
         raise SceneError(message, where=where) from None

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra
-from clpt.arrays import on_host
+from clpt.arrays import is_number, on_host
 from clpt.errors import SceneError
 from clpt.records import CLOUD_OCTAVES
-from clpt.scalars import is_number
 from clpt.scene.params import (
     Kind,
     coefficient,

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms
-from clpt.arrays import in_memory
+from clpt.arrays import in_memory, number
 from clpt.errors import SceneError
-from clpt.scalars import number
 
 SHAPES = {"box": (1.0, 1.0), "triangle": (0.0, 1.0, 0.0)}  # of shutters, by name
 

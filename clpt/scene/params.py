@@ -42,6 +42,7 @@ import numpy as np
 
 from clpt.arrays import check_unmasked, in_memory
 from clpt.errors import SceneError, UnusedParameterError
+from clpt.files import budget
 from clpt.scene import roles
 from clpt.scene.roles import HostForm, Param
 from clpt.spectra import Constant, Spectrum
@@ -214,6 +215,7 @@ class KindType(type):
 
     def __call__(cls, /, *values: object, **arguments: object) -> Any:
         kind = cast("type[Kind]", cls)
+        budget.check_time()
         if values:
             example = next(iter((*device_params(kind), *_field_names(kind))), "")
             message = f"{cls.__name__} takes its parameters by name: {cls.__name__}({example}=...)"
@@ -372,7 +374,8 @@ def _valid_defaults(cls: type[Kind]) -> Mapping[str, Any]:
 
 
 def fields_of(kind: Kind) -> dict[str, Any]:
-    """Return the values of an object's fields by name."""
+    """Return the values of an object's fields by name. Raises as `budget.check_time` does."""
+    budget.check_time()
     names, read = _fields(type(kind))
     return dict(zip(names, read(kind), strict=False))
 

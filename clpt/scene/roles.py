@@ -16,12 +16,12 @@ from typing import Any, Literal, Protocol, TypeGuard, cast, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import scalars, spectra
+from clpt import arrays, spectra
+from clpt.arrays import LARGEST
 from clpt.errors import SceneError
 from clpt.images.transfer import from_hex
 from clpt.measured import Measurement, MerlTable
 from clpt.records import GRATING_SIZES
-from clpt.scalars import LARGEST
 from clpt.spectra import (
     RGB,
     Constant,
@@ -56,7 +56,7 @@ class Role:
 
     def check(self, value: object, param: Param, where: str | None) -> Any:
         """Return the checked value of a parameter that is no texture. Raises SceneError."""
-        return scalars.plain(value)
+        return arrays.plain(value)
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Real(Role):
     """A number within its limits."""
 
     def check(self, value: object, param: Param, where: str | None) -> float:
-        number = scalars.number(value, where)
+        number = arrays.number(value, where)
         if param.positive and number <= 0.0:
             raise SceneError(f"must be above 0, not {value}", where=where)
         if not param.low <= number <= param.high:
@@ -94,14 +94,14 @@ class Whole(Role):
     """A whole number; the kind that has it knows its limits."""
 
     def check(self, value: object, param: Param, where: str | None) -> int:
-        return scalars.whole(value, where=where)
+        return arrays.whole(value, where=where)
 
 
 class Flag(Role):
     """True or false."""
 
     def check(self, value: object, param: Param, where: str | None) -> bool:
-        return scalars.flag(value, where)
+        return arrays.flag(value, where)
 
 
 def _is_list(value: object) -> TypeGuard[list[Any] | tuple[Any, ...] | NDArray[Any]]:
@@ -192,7 +192,7 @@ class Spectral(Role):
         if isinstance(value, Spectrum):
             self._check_limits(value, param, where)
             return value
-        if scalars.is_number(value):
+        if arrays.is_number(value):
             return self._constant(REAL.check(value, param, where))
         if _is_list(value) and len(value) == 3:
             return self._colour([REAL.check(v, param, where) for v in value], param, where)

@@ -60,6 +60,8 @@ WRAPS = ("repeat", "clamp", "mirror", "zero")
 class Placed(Texture):
     """Base of the textures over uv: a surface's uv, or uv that a mapping derives from positions."""
 
+    fills = "uv"
+
     to_uv: np.ndarray = host(np.eye(3), "uv transform, (3, 3) float64")
     mapping: str = choice(
         "uv", "where u and v come from; uv1: attributes vertex_u1, vertex_v1", MAPPINGS
@@ -91,6 +93,8 @@ class Placed(Texture):
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solid(Texture):
     """Base of the textures that fill space."""
+
+    fills = "space"
 
     to_texture: Matrix4 = host(np.eye(4), "from the world to the texture's space, (4, 4)")
 
@@ -403,6 +407,10 @@ class Noise(Solid):
         super().check()
         _octaves(self)
 
+    def record_members(self) -> dict[str, Any]:
+        pattern = PATTERNS.index(self.pattern)
+        return {"pattern": pattern, "octaves": self.octaves, "roughness": self.roughness}
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Marble(Solid):
@@ -416,6 +424,10 @@ class Marble(Solid):
     def check(self) -> None:
         super().check()
         _octaves(self)
+
+    def record_members(self) -> dict[str, Any]:
+        octaves = {"octaves": self.octaves, "roughness": self.roughness}
+        return {**octaves, "scale": self.scale, "variation": self.variation}
 
 
 KINDS = (Bitmap, Checkerboard, Product, Mix, MeshAttribute, Dots, Checkers, Noise, Marble)

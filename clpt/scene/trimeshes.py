@@ -8,7 +8,8 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt import images, scalars
+from clpt import images
+from clpt.arrays import number
 from clpt.scene import gltf_material
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Area, Light
@@ -128,7 +129,7 @@ def _levels(material: object, name: str, default: tuple[float, ...]) -> tuple[fl
 def _number(material: object, name: str, default: float) -> float:
     """Return a number of a material."""
     value = _of(material, name, object)
-    return default if value is None else scalars.number(value, f"material.{name}")
+    return default if value is None else number(value, f"material.{name}")
 
 
 _T = TypeVar("_T")

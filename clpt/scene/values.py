@@ -33,7 +33,7 @@ class OnDevice(Protocol):
 
 
 class Look(Protocol):
-    """The weights of emissions for a film, see `clpt.render.spectra.look.Look`."""
+    """The weights of emissions for a film, see `clpt.render.spectra.find.Look`."""
 
     def brightness(self, light: Spectrum) -> float:
         """Return the weight of a spectrum."""
@@ -52,11 +52,17 @@ class Texture(Kind):
     """Base of all textures.
 
     factor_name: the parameter that stays a factor in an emission, "" without such a parameter;
-    attributes: the names of the mesh attributes that the texture itself reads.
+    attributes: the names of the mesh attributes that the texture itself reads; fills: "uv" or
+    "space", where its pattern lies, or "".
     """
 
     is_texture = True
     attributes: ClassVar[tuple[str, ...]] = ()
+    fills: ClassVar[str] = ""
+
+    def record_members(self) -> dict[str, Any]:
+        """Return members of its record beside its place and its colours, by name."""
+        return {}
 
     @property
     def factor_name(self) -> str:

@@ -17,9 +17,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.arrays import Floats
+from clpt.arrays import Floats, real
 from clpt.errors import SceneError
-from clpt.scalars import real
+from clpt.files import budget
 from clpt.spectra import cie, data, upsampling
 
 Role = Literal["reflectance", "unbounded", "emission"]
@@ -290,6 +290,7 @@ def gridded(spectrum: Spectrum, grid: Floats) -> Floats:
     A spectrum that has `knots` between the nodes is averaged around each node (`hat_means`), so
     that lines between the nodes keep their power. Any other spectrum is sampled.
     """
+    budget.check_time()
     if spectrum.knots is None:
         return spectrum.sample(grid)
     at, values = spectrum.knots

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats
+from clpt.files import budget
 from clpt.spectra.data import ROOT
 
 NODES = 40
@@ -65,11 +66,12 @@ def uplift(rgb: ArrayLike) -> NDArray[np.float32]:
 
     Colours are clipped to [0, 1]; nan counts as black.
     """
-    colours = np.clip(np.nan_to_num(np.asarray(rgb, np.float64)), 0.0, 1.0)
+    colours = np.asarray(rgb)
     flat = colours.reshape(-1, 3)
     coefficients = np.empty(flat.shape, np.float32)
     for start in range(0, len(flat), CHUNK):
-        coefficients[start : start + CHUNK] = _look_up(flat[start : start + CHUNK])
+        part = np.nan_to_num(flat[start : start + CHUNK].astype(np.float64))
+        coefficients[start : start + CHUNK] = _look_up(np.clip(part, 0.0, 1.0))
     return coefficients.reshape(colours.shape)
 
 
@@ -95,7 +97,7 @@ def unbounded(rgb: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.float32]]
     starts = range(0, len(flat), CHUNK)
     if len(starts) > 1:
         with ThreadPoolExecutor(min(os.cpu_count() or 1, len(starts))) as pool:
-            list(pool.map(fill, starts))
+            list(pool.map(budget.carried(fill), starts))
     elif starts:
         fill(0)
     return scale.reshape(colours.shape[:-1]), coefficients.reshape(colours.shape)
@@ -138,6 +140,7 @@ def _half_table() -> NDArray[np.float32]:
 
 def _look_up(rgb: Floats, *, half: bool = False) -> Floats:
     """Return coefficients (n, 3) of colours (n, 3); `half`: each largest component is 1/2 or 0."""
+    budget.check_time()
     r, g, b = rgb.T
     largest = np.where((b > r) & (b > g), 2, (g > r).astype(np.int64))
     rows = np.arange(len(rgb))

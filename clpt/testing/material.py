@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clpt import device, spectra
-from clpt.render.records import custom_materials
+from clpt.render.records import materials
 from clpt.render.records.materials import ORDERS_WORDS
 from clpt.scene import roles
 from clpt.scene.materials import LEAVES, Material
@@ -47,7 +47,7 @@ def check_material(
     """
     cls = material if isinstance(material, type) else type(material)
     if cls not in LEAVES:
-        custom_materials.check(cls)
+        materials.check(cls)
     for mode in modes:
         fixed = {} if isinstance(material, type) else _values(material, mode)
         rng, probe = np.random.default_rng(seed), Probe(cls, mode, on=_chosen(device))

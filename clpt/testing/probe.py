@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import device
-from clpt.render.flow.library import BSDF
+from clpt.render.flow.programs import BSDF
 from clpt.render.materials import rough_coat_table
 from clpt.render.materials.cases import struct_text
 from clpt.render.materials.thin_films import film_colours
-from clpt.render.records import custom_materials
+from clpt.render.records import materials
 from clpt.render.records.materials import FILM_COSINES, array_size, lane_type
 from clpt.render.spectra import measurements
 from clpt.render.spectra.encode import angular_values
@@ -125,7 +125,7 @@ class Probe:
             extra = self._merl_text(len(streams))
         virtual: dict[str, str | device.Part] = {"probe.cl": self._text(*extra)}
         if self.cls.source is not None:
-            virtual[f"{self.cls.folder}/{self.cls.kind}.cl"] = custom_materials.text(self.cls)
+            virtual[f"{self.cls.folder}/{self.cls.kind}.cl"] = materials.text(self.cls)
         table = self._table(params, layers)
         out = run(self.on, virtual, self.lanes, streams, 8 + 4 * c, table).T
         parts = np.split(out, np.cumsum([3, c, 1, 1, 1, c, 1, c, 1]), axis=1)

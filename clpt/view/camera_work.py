@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import logging
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -114,7 +113,7 @@ class CameraWork:
 
     def post(self, request: Request, reply: Reply) -> None: ...
 
-    def _ask_hit(self, x: int, y: int, reply: Reply, then: Callable[[Any], None]) -> None: ...
+    def _ask_hit(self, x: int, y: int, reply: Reply, then: Reply) -> None: ...
 
     def _do_display(self, reply: Reply, exposure: float, tone: str) -> None: ...
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Protocol
 
+from clpt.arrays import is_flag, is_number, is_whole
 from clpt.errors import ClptError, KernelBuildError, SceneError, one_line
 from clpt.images.colour import TONES
-from clpt.scalars import is_flag, is_number, is_whole
 from clpt.spectra import illuminants
 
 log = logging.getLogger(__name__)

@@ -14,9 +14,8 @@ from clpt import images
 from clpt.arrays import Bytes, Image
 from clpt.denoise import oidn
 from clpt.images.colour import SCALE, View, false_colours
-from clpt.render.film.denoised_picture import DenoisedPicture
 from clpt.render.film.layers import viewable
-from clpt.render.film.pictures import Pictures
+from clpt.render.film.pictures import DenoisedPicture, Pictures
 from clpt.render.renderer import Renderer
 from clpt.scene.layers import LAYERS
 from clpt.view.messages import OF_VIEW, CommandError

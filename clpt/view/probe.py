@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import threading
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -103,7 +102,7 @@ class Question:
     y: int
     reply: Reply
     spectrum: bool = True
-    then: Callable[[dict[str, Any]], None] | None = None
+    then: Reply | None = None
 
 
 class Probe:

@@ -341,7 +341,7 @@ class Session(CameraWork):
         if not (x < film.width and y < film.height):
             raise CommandError(f"the film has {film.width}x{film.height} pixels")
 
-    def _ask_hit(self, x: int, y: int, reply: Reply, then: Callable[[Any], None]) -> None:
+    def _ask_hit(self, x: int, y: int, reply: Reply, then: Reply) -> None:
         self._check_pixel(x, y)
         self._ask(Question(self._loop.scene, x, y, reply, then=then))
 

@@ -65,7 +65,7 @@ inline LightRay distant_emit(Scene scene, LightSample s, vec2 v)
     return r;
 }
 
-/* Step emit: a ray from a light that `pick` chooses by its power. clpt/render/lights/emission_cases.py generates
+/* Step emit: a ray from a light that `pick` chooses by its power. clpt/render/lights/cases.py generates
  * `lamp_emit`, for lights off all shapes, and `area_surface_point`, a point of a light on a shape with its texture
  * point. */
 inline LightRay light_emit(Scene scene, real pick, vec2 u, vec2 v, Wavelengths lambdas)

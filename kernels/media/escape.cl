@@ -5,7 +5,7 @@
  * if it hits a lamp. Escape ray and phase function both sample a direction at the collision; MIS (balance heuristic)
  * combines them, so the cone may be a guess.
  *
- * Balls around lamps stand in `distributions`, see clpt/render/media/sealed.py. */
+ * Balls around lamps stand in `distributions`, see clpt/render/media/bodies.py. */
 #include "core/rows.cl"
 
 #define ESCAPE_WORDS 5           /* of a ball: centre, radius and an unused word */

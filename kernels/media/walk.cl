@@ -20,9 +20,9 @@ called int queue_walks(Slab path, Slab hit, int kind, int n, integer *ended, uin
 called void queue_walked(Slab path, integer ended, uint block) { store_path_state(path, block, ended != 0, ended); }
 
 /* Takes all paths that wait for a phase function through the medium, then sorts their slots again. starts: of each
- * kind's queue; block: the first of LANES slots for a block. */
+ * kind's queue; block: the first of LANES slots for a block; leave: raised, it lets all paths stay where they are. */
 inline void bounce_walk(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uint *queue, uint *starts, uint first,
-                        uint end)
+                        uint end, global const volatile uint *leave)
 {
     SLABS
     constant BlockWords *words = BLOCK_WORDS(which);
@@ -32,7 +32,7 @@ inline void bounce_walk(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uin
         for (uint entry = starts[kind]; entry < ends; entry += LANES) {
             integer ended = 0;
             queue_take(path, hit, shadow, words, queue, entry, ends, block);
-            for (int n = 0; queue_walks(path, hit, kind, n, &ended, block); n++) {
+            for (int n = 0; !(leave && *leave) && queue_walks(path, hit, kind, n, &ended, block); n++) {
                 bounce_shade(kind, block, block + LANES);
                 bounce_join(block, block + LANES);
                 bounce_intersect(block, block + LANES);
@@ -48,4 +48,4 @@ inline void bounce_walk(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uin
 
 /* Twin, where no camera path is in a medium. */
 inline void bounce_walk(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uint *queue, uint *starts, uint first,
-                        uint end) {}
+                        uint end, global const volatile uint *leave) {}

@@ -1,5 +1,5 @@
 /* Shading that several kinds of materials share, as a part of the loop (stage/loop.cl) that is compiled
- * once for all of them: clpt/render/flow/common.py. No kind's flags reach it. */
+ * once for all of them: clpt/render/flow/vertices.py. No kind's flags reach it. */
 #include "core/base.cl"
 #include "generated/sampler.cl"
 #include "shapes/shape.cl"

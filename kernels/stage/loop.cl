@@ -1,10 +1,12 @@
 /* The bounce loop on the device: every work-item takes `share` neighbouring slots through all stages, again and again
- * until they are at the end of their work lists, or `bounces` times. On a CPU it is a core's own small wavefront: its
+ * until they are at the end of their work lists, or `bounces` times. The slots of a launch begin at the slot `begin`:
+ * where bounces take long, a launch takes a part of the slots. On a CPU it is a core's own small wavefront: its
  * paths stay in the core's cache, and are sorted by material before they are shaded. The host need not wait for a count
  * of the rest, so it can enqueue a whole exposure at once; `restart` begins the lists. `which` is the kind of paths,
  * where a scene has paths from lights (0) and from the camera (1). The host raises `leave` while the loop runs, if the
- * paths are of no use any more; a null pointer is never raised. The stages are those of the other files here, each
- * compiled by itself as a function (stage/stage.cl), in its own number of lanes, and linked. */
+ * paths are of no use any more, or if the launch takes too long; a null pointer is never raised. The stages are those
+ * of the other files here, each compiled by itself as a function (stage/stage.cl), in its own number of lanes, and
+ * linked. */
 #include "stage/stage.cl"
 #include "generated/loop_args.cl"
 #include "transport/queue.cl"
@@ -20,7 +22,8 @@
         bounce_shade_at(SLAB_PASSED, SCENE_PASSED, LOOP_PASSED, which, kind, slot)
 #include "generated/walk.cl"
 
-inline void bounce_paths(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uint *queue, uint first, uint end)
+inline void bounce_paths(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global uint *queue, uint first, uint end,
+                         global const volatile uint *leave)
 {
     SLABS
     uint starts[BSDF_COUNT + 1], block = BLOCK;
@@ -33,7 +36,7 @@ inline void bounce_paths(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global ui
     bounce_mix(first, end); /* a material of a mixture is chosen */
     if (PATHS_ARE_SHADED) {
         queue_sort(path, hit, queue, starts, first, end);
-        if (PATHS_WALK) bounce_walk(SLAB_PASSED, SCENE_PASSED, LOOP_PASSED, which, queue, starts, first, end);
+        if (PATHS_WALK) bounce_walk(SLAB_PASSED, SCENE_PASSED, LOOP_PASSED, which, queue, starts, first, end, leave);
         for (int kind = 0; kind < BSDF_COUNT; kind++) {
             uint begins = starts[kind], ends = starts[kind + 1];
             if (queue_is_dense(ends - begins, end - first)) {
@@ -50,11 +53,11 @@ inline void bounce_paths(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global ui
     bounce_join(first, end); /* to lights or, paths from lights, to the camera */
 }
 
-kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, global uint *queue, uint share, uint bounces,
-                              uint restart, uint which, global const volatile uint *leave)
+kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, global uint *queue, uint share, uint begin,
+                              uint bounces, uint restart, uint which, global const volatile uint *leave)
 {
     SLABS
-    uint first = get_global_id(0) * share, end = min(first + share, (uint)settings->slots);
+    uint first = begin + get_global_id(0) * share, end = min(first + share, (uint)settings->slots);
     if (restart) {
         for (uint at = first; at < end; at += LANES) store_path_state(path, at, mask_of(1), (integer)(PATH_FRESH));
     }
@@ -65,6 +68,6 @@ kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, global uint *que
             left |= any((load_path_state(path, at) & PATH_DONE) == 0);
         }
         if (!left) break;
-        bounce_paths(SLAB_PASSED, SCENE_PASSED, LOOP_PASSED, which, queue, first, end);
+        bounce_paths(SLAB_PASSED, SCENE_PASSED, LOOP_PASSED, which, queue, first, end, leave);
     }
 }

@@ -16,12 +16,12 @@ TELL = "import json, os, sys; json.dump(dict(os.environ), open(sys.argv[1], 'w')
 
 def test_a_process_has_its_own_caches(tmp_path: Path) -> None:
     told = tmp_path / "told.json"
-    taken = starting.run([sys.executable, "-c", TELL, str(told)], tmp_path / "caches")
+    seconds, cpu = starting.run([sys.executable, "-c", TELL, str(told)], tmp_path / "caches")
     environment = json.loads(told.read_text())
     for name in starting.CACHES:
         assert Path(environment[name]).is_relative_to(tmp_path) and Path(environment[name]).is_dir()
     assert environment["PATH"]
-    assert taken.cpu > 0.0 and taken.seconds > 0.0
+    assert cpu > 0.0 and seconds > 0.0
 
 
 def test_a_process_that_fails_tells_its_last_line(tmp_path: Path) -> None:
@@ -42,8 +42,8 @@ def test_cold_and_warm() -> None:
 
 def test_a_black_picture_is_refused() -> None:
     stats = {"mean": 0.0, "ready": 0.5}
-    figure = starting._figure("cold start", [starting.Process(1.0, 1.0)], [stats], "box")
+    figure = starting._figure("cold start", [(1.0, 1.0)], [stats], "box")
     assert "black" in figure.refused
     stats = {"mean": 0.5, "ready": 2.0}
-    figure = starting._figure("cold start", [starting.Process(1.0, 1.0)], [stats], "box")
+    figure = starting._figure("cold start", [(1.0, 1.0)], [stats], "box")
     assert "later" in figure.refused

@@ -16,7 +16,7 @@ from clpt.bvh import layouts
 from clpt.cli import COMMANDS, cli
 from clpt.cli.options.records import HEADINGS, OTHER, Grouped
 from clpt.images import colour
-from clpt.render.film import layer_channels
+from clpt.render.film import layers
 from clpt.scene import kinds
 from clpt.scene.layers import LAYERS
 from clpt.spectra import sensors, spaces
@@ -107,7 +107,7 @@ def test_choices_are_the_names_of_what_there_is() -> None:
         "LAYOUTS": layouts.LAYOUTS,
         "TREES": layouts.TREES,
         "TONES": colour.TONES,
-        "CHANNEL_NAMES": layer_channels.SETS,
+        "CHANNEL_NAMES": layers.SETS,
     }
     for name, table in tables.items():
         assert vars(choices)[name] == (*table,), name

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from clpt.cluster.blocks import Block, Blocks, WorkerRecord
+from clpt.cluster.blocks import Blocks, WorkerRecord
 
 
 def joined(blocks, *names):
@@ -18,10 +18,10 @@ def test_one_worker_gets_all_samples_in_order():
     sizes, at = [], 0
     while not blocks.done:
         block = blocks.take("a")
-        assert block.first == at
-        at = block.end
-        sizes.append(block.samples)
-        blocks.finish("a", block.samples / 20)
+        assert block.start == at
+        at = block.stop
+        sizes.append(len(block))
+        blocks.finish("a", len(block) / 20)
     assert blocks.taken == ((0, 100),)
     assert sizes[:3] == [1, 3, 9]  # grows to a second's samples
     assert max(sizes) <= 20 and sizes[-1] <= 2  # and shrinks at the end, to a tenth
@@ -33,7 +33,7 @@ def test_what_was_taken_is_not_done_again():
     done = []
     while not blocks.done:
         block = blocks.take("a")
-        done += range(block.first, block.end)
+        done += block
         blocks.finish("a", 1.0)
     assert done == [0, 1, 4, 5, 7, 8, 9]
 
@@ -56,12 +56,12 @@ def test_a_slow_worker_leaves_the_last_samples_to_others():
     blocks.take("fast")
     blocks.finish("fast", 0.1)
     blocks.finish("slow", 1.0)  # ten left, which take the fast one a second
-    assert blocks.take("slow") == Block(2, 3)
+    assert blocks.take("slow") == range(2, 3)
     blocks.finish("slow", 1.0)
-    assert blocks.take("fast").first == 3
+    assert blocks.take("fast").start == 3
     assert blocks.take("slow") is None
     blocks.lose("fast")
-    assert blocks.take("slow").first == 3
+    assert blocks.take("slow").start == 3
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -72,7 +72,7 @@ def test_every_sample_is_taken_once_whatever_happens(seed):
     names = [f"w{i}" for i in range(chance.randint(2, 12))]
     blocks = joined(Blocks(total), *names)
     speeds = {name: chance.uniform(1, 50) for name in names}
-    flying: dict[str, tuple[Block, float]] = {}
+    flying: dict[str, tuple[range, float]] = {}
     taken: list[int] = []
     now = 0.0
     while not blocks.done:
@@ -87,8 +87,8 @@ def test_every_sample_is_taken_once_whatever_happens(seed):
             if chance.random() < 0.01 and name != "w0":
                 del flying[name]
                 blocks.lose(name)
-            elif now - since >= block.samples / speeds[name]:
+            elif now - since >= len(block) / speeds[name]:
                 del flying[name]
                 blocks.finish(name, now - since)
-                taken += range(block.first, block.end)
+                taken += block
     assert sorted(taken) == list(range(total)) and blocks.taken == ((0, total),)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import clpt
-from clpt.cluster.bundle import SCENE, Bundle, Store, canonical, pack
+from clpt.cluster.bundle import SCENE, Store, canonical, from_json, pack, to_json
 from clpt.errors import ClusterError, SceneError
 from clpt.scene import materials, textures
 
@@ -24,9 +24,9 @@ def sent(scene, tmp_path):
     (tmp_path / "packed").mkdir()
     bundle = pack(scene, tmp_path / "packed")
     store = Store(tmp_path / "cache" / "bundles")
-    for name, digest in bundle.files.items():
+    for name, digest in bundle.items():
         store.add(digest, (tmp_path / "packed" / name).read_bytes())
-    return Bundle.from_json(json.loads(canonical(bundle.to_json()))), store
+    return from_json(json.loads(canonical(to_json(bundle)))), store
 
 
 def same(a, b):
@@ -67,7 +67,7 @@ def test_images_are_copied(tmp_path):
     wood = materials.Diffuse(reflectance=textures.Bitmap(image=picture))
     scene.shapes[0] = dataclasses.replace(scene.shapes[0], material=wood)
     bundle, store = sent(scene, tmp_path)
-    assert len([name for name in bundle.files if name.endswith(".png")]) == 1
+    assert len([name for name in bundle if name.endswith(".png")]) == 1
     with store.opened(bundle) as arrived:
         found = arrived.shapes[0].material.reflectance.image
         assert found.parent != picture.parent
@@ -77,9 +77,9 @@ def test_images_are_copied(tmp_path):
 def test_a_file_that_is_there_is_not_asked_for_again(tmp_path):
     bundle, store = sent(clpt.load(ROOT / "scenes/three_spheres"), tmp_path)
     assert store.lacks(bundle) == []
-    victim = store.folder / bundle.files[SCENE]
+    victim = store.folder / bundle[SCENE]
     victim.write_bytes(victim.read_bytes()[:-1])  # damaged on the disk
-    assert store.lacks(bundle) == [bundle.files[SCENE]]
+    assert store.lacks(bundle) == [bundle[SCENE]]
     with pytest.raises(ClusterError, match=r"scene\.json of the bundle is missing"):
         store.opened(bundle).__enter__()
 
@@ -97,7 +97,7 @@ def test_a_wrong_digest_is_refused(tmp_path):
 def test_a_path_that_leaves_the_folder_is_refused(name):
     files = {SCENE: "0" * 64, name: "1" * 64}
     with pytest.raises(ClusterError, match="outside of its folder"):
-        Bundle.from_json({"format": "clpt bundle", "version": 1, "files": files})
+        from_json({"format": "clpt bundle", "version": 1, "files": files})
 
 
 @pytest.mark.parametrize("named", ["../secret.ply", "/etc/secret.ply"])
@@ -111,7 +111,7 @@ def test_a_scene_cannot_name_files_elsewhere(named, tmp_path):
     store = Store(tmp_path / "cache" / "bundles")
     store.add(digest, text.encode())
     with pytest.raises(SceneError, match="not in the folder of this file"):
-        store.opened(Bundle({SCENE: digest})).__enter__()
+        store.opened({SCENE: digest}).__enter__()
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_a_scene_cannot_name_files_elsewhere(named, tmp_path):
 )
 def test_what_is_no_bundle_is_refused(document, message):
     with pytest.raises(ClusterError, match=message):
-        Bundle.from_json(document)
+        from_json(document)
 
 
 def test_the_cache_is_bounded(tmp_path):

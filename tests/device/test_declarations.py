@@ -14,7 +14,7 @@ import clpt
 from clpt import device as dev
 from clpt.device import building, native_programs
 from clpt.render.flow.scene_to_tables import Lowered, lower
-from clpt.render.wavefront import guide, photons
+from clpt.render.wavefront import light_caches
 from clpt.scene import Film
 from tests.front_end import CLANG, OURS, errors
 from tests.test_other_compilers import builders, of_every_material, texts_of
@@ -42,7 +42,8 @@ def test_builders() -> None:
 @needs_clang
 def test_programs_that_know_no_scene() -> None:
     """Developing pictures, denoising, the trial of a device; of photons and of the guide."""
-    alone = ["stage/resolve.cl", "stage/denoise.cl", "stage/trial.cl", photons.ROOT, guide.ROOT]
+    light = [light_caches.PHOTON_ROOT, light_caches.GUIDE_ROOT]
+    alone = ["stage/resolve.cl", "stage/denoise.cl", "stage/trial.cl", *light]
     defines = {"LANES": 8, "TRIAL_NODES": 64}
     check(dev.assemble(root, {}, defines).text for root in alone)
 

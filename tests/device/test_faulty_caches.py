@@ -16,7 +16,7 @@ import pytest
 
 import clpt
 from clpt import device
-from clpt.cluster.bundle import Bundle, Store
+from clpt.cluster.bundle import Store
 from clpt.device import disk_cache, runtimes
 from clpt.device.building import has_own_cache
 from clpt.device.source import Source
@@ -59,7 +59,7 @@ def vendors(folder: Path) -> Path:
 
 def bundle(folder: Path) -> Path:
     """Open a scene that a client has sent."""
-    store, asked = Store(), Bundle({"scene.json": DIGEST})
+    store, asked = Store(), {"scene.json": DIGEST}
     for digest in store.lacks(asked):
         try:
             store.add(digest, SCENE)
@@ -214,7 +214,7 @@ def test_ten_processes_and_damage(user: Path) -> None:
 
 def test_a_file_of_a_scene_that_is_swapped_is_missing(user: Path) -> None:
     """Between the check of its digest and its use."""
-    store, asked = Store(), Bundle({"scene.json": DIGEST})
+    store, asked = Store(), {"scene.json": DIGEST}
     path = bundle(user)
     linked(path)
     with pytest.raises(ClusterError, match="is missing"), store.opened(asked):

@@ -14,7 +14,7 @@ import pytest
 import clpt
 from clpt import device as dev
 from clpt.cluster.device_worker import Threads, on_all
-from clpt.render.wavefront.noise_meter import NoiseMeter
+from clpt.render.wavefront.noise import NoiseMeter
 from tests.faults.interrupts import (
     Injected,
     Trial,

@@ -90,7 +90,7 @@ class Lit:
     def _settings(self) -> np.ndarray:
         settings = np.zeros(1, SETTINGS.dtype)
         settings["light_count"] = len(self.rows.rows)
-        settings["infinite_count"] = self.rows.infinite
+        settings["infinite_count"] = self.rows.sources.infinite
         settings["lambda_min"], settings["lambda_max"] = 360.0, 830.0
         settings["scene_radius"] = self.radius
         return settings
@@ -161,7 +161,7 @@ def lit(
     emitting = [emitter for _, emitter in made]
     found = sources.measured(lamps, emitting, radius, encoder.look)
     rows = lights.light_rows(lamps, emitting, encoder, found, 1 if tree else None)
-    for (row, _), at in zip(made, rows.first, strict=True):
+    for (row, _), at in zip(made, rows.sources.first, strict=True):
         row["light"] = at
         encoder.store.append("shapes", row.view(np.uint32))
     encoder.store.append("lights", rows.rows.view(np.uint32))

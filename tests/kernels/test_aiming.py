@@ -19,7 +19,6 @@ from clpt.render.flow import flags, stages
 from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.render.geometry import cases as shapes
 from clpt.render.lights import cases as lights
-from clpt.render.lights import emission_cases as emission
 from clpt.render.textures import cases as textures
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
@@ -121,7 +120,7 @@ def probe(lowered: Lowered, aimed: bool) -> SceneProbe:
         **shapes.virtual_files(features),
         **lights.virtual_files(),
         "generated/lights.cl": stages.lights_text(sent),
-        "generated/emission.cl": emission.dispatch_text(sent),
+        "generated/emission.cl": lights.emission_text(sent),
         "generated/textures.cl": textures.dispatch_text(features.textures),
     }
     return SceneProbe(

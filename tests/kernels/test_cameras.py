@@ -9,7 +9,7 @@ import pytest
 
 from clpt import spectra, transforms
 from clpt.errors import SceneError
-from clpt.render.camera.encode import encode_camera
+from clpt.render.camera import encode_camera
 from clpt.render.flow import stages
 from clpt.render.records import CameraFeatures
 from clpt.render.records import camera as camera_records

@@ -10,7 +10,6 @@ from clpt.render.flow import choices, flags, stages
 from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.render.geometry import cases as shapes
 from clpt.render.lights import cases as lights
-from clpt.render.lights import emission_cases as emission
 from clpt.render.materials import cases as parameters
 from clpt.scene import Film, Scene, cameras, integrators
 from clpt.scene.lights import Area
@@ -71,7 +70,7 @@ def test_points_and_densities_of_lamps_that_deform() -> None:
         **parameters.virtual_files(features),
         **choices.virtual_files(features, "wide8"),
         "generated/lights.cl": stages.lights_text(features),
-        "generated/emission.cl": emission.dispatch_text(features),
+        "generated/emission.cl": lights.emission_text(features),
     }
     settings = {name: made.settings[name] for name in made.settings.dtype.names}
     probe = SceneProbe(

@@ -15,7 +15,7 @@ import pytest
 
 import clpt
 from clpt import transforms
-from clpt.render.spectra.look import Look
+from clpt.render.spectra.find import Look
 from clpt.scene import Film, Scene, lights, materials, shapes, textures
 from clpt.scene.cameras import KINDS, Perspective
 from clpt.scene.integrators import Path as PathIntegrator

@@ -10,7 +10,7 @@ from clpt.errors import SceneError
 from clpt.lenses import Prescription, Surface
 from clpt.lenses.prescription import quarter_wave
 from clpt.lenses.tracing import Rays, trace
-from clpt.render.camera.encode import encode_camera, ghost_pairs
+from clpt.render.camera import encode_camera, ghost_pairs
 from clpt.render.flow import stages
 from clpt.render.records import CameraFeatures
 from clpt.scene.cameras import Lens

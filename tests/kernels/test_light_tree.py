@@ -314,7 +314,7 @@ def test_a_light_that_shines_on_a_point_may_be_chosen():
     """Of every triangle and point, whichever way round, what faces the other has a chance."""
     p = points(400, seed=9)
     mesh = scattered(40)
-    first = scene().rows.first[0]
+    first = scene().rows.sources.first[0]
     side = sides(p)
     chances, sided = (pmfs(scene(), p, n)[first : first + 40] for n in (None, side))
     corners = mesh.vertices[mesh.faces].astype(float)

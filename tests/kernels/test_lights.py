@@ -354,9 +354,9 @@ def test_light_pdf_is_that_of_the_sample(name):
     """What a ray that meets an emissive shape is told, the chance of the choice included."""
     lamps = [Constant(), Point()]
     scene = lit(lamps, [FORMULAS[name][0], FORMULAS["rectangle"][0]])
-    row = scene.rows.first[0]
+    row = scene.rows.sources.first[0]
     pmf = scene.rows.rows["pmf"][row]
-    assert 0.0 < pmf < 1.0 and scene.rows.infinite == 1
+    assert 0.0 < pmf < 1.0 and scene.rows.sources.infinite == 1
     alone = lit(emitters=[FORMULAS[name][0]])
     r = samples(alone, (0.0, 0.0, 0.0), 500)
     kind = FORMULAS[name][0].kind
@@ -648,7 +648,7 @@ def test_uv_on_a_mesh():
     vertices = np.array([[0, 0, 2], [0, 1, 2], [1, 0, 2], [1, 1, 2]], np.float32)
     mesh = glows(Mesh, vertices=vertices, faces=np.array([[0, 1, 2], [1, 3, 2]]), uvs=uvs)
     scene = lit(emitters=[FORMULAS["triangle"][0], mesh])
-    first = scene.rows.first[1]
+    first = scene.rows.sources.first[1]
     body = """
         ShapeRow shape = shape_row_row(scene.shapes, (integer)(SHAPE_ROW_WORDS));
         vec2 b = {x[1], x[2]};
@@ -663,7 +663,7 @@ def test_uv_on_a_mesh():
 
 
 def test_brightness_of_a_texture_is_its_mean():
-    from clpt.render.spectra.look import Look
+    from clpt.render.spectra.find import Look
 
     board = Checkerboard(color0=(1.0, 1.0, 1.0), color1=(0.0, 0.5, 1.0))
     assert board.mean(Look(False, 360.0, 830.0)) == pytest.approx(0.75)

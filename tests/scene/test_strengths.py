@@ -15,7 +15,7 @@ from clpt import spectra, transforms
 from clpt.errors import SceneError
 from clpt.geometry.lamps import plainly_lit
 from clpt.render.flow.find import analyse
-from clpt.render.records.lowering_cache import LoweringCache
+from clpt.render.records.tables import LoweringCache
 from clpt.scene import Scene, cameras, lights, shapes
 from clpt.scene.textures import Checkerboard
 

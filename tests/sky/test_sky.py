@@ -9,7 +9,7 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
-from clpt.render.lights import sky as sky_light
+from clpt.render.lights import images
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Sky
@@ -28,7 +28,7 @@ HIGH = 30.0  # of the sun, as in other tests of skies
 @cache
 def image(elevation: float, **more: float) -> tuple[np.ndarray, np.ndarray]:
     """The dome and the disc, of the cache folder where they are there: they take seconds."""
-    return dome.images(sky_light.kept, *dome.numbers(Sky(sun_elevation=elevation, **more)))
+    return dome.images(images.kept_sky, *dome.numbers(Sky(sun_elevation=elevation, **more)))
 
 
 def xyz(spectra: np.ndarray) -> np.ndarray:

@@ -37,8 +37,8 @@ from scipy import stats
 import clpt
 from clpt.errors import ClptError
 from clpt.render.flow.find import analyse
-from clpt.render.records.lowering_cache import LoweringCache
-from clpt.render.transport import photons
+from clpt.render.records.tables import LoweringCache
+from clpt.render.transport import light_caches
 from clpt.scene import Film, Scene, lights
 from clpt.scene import materials as m
 from clpt.scene.integrators import Independent, ParticleTracer, Path, Sobol, Vcm
@@ -117,8 +117,8 @@ def _depth(scene: Scene) -> dict[str, Any]:
         for name in ("max_depth", "hide_lights")
         if hasattr(scene.integrator, name)
     }
-    if not 0 <= given.get("max_depth", 0) <= photons.DEEPEST:
-        given["max_depth"] = photons.DEEPEST
+    if not 0 <= given.get("max_depth", 0) <= light_caches.DEEPEST:
+        given["max_depth"] = light_caches.DEEPEST
     return given
 
 

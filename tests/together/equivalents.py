@@ -19,7 +19,7 @@ import clpt
 from clpt import device as dev
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.render.edit.rebuild import refusal
+from clpt.render.edit.plans import refusal
 from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene, integrators, materials, media, shapes, textures
 from clpt.scene.motion import Deformation, Keys, Shutter

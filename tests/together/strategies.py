@@ -21,7 +21,7 @@ from clpt.errors import SceneError
 from clpt.geometry import shapes as geometry
 from clpt.images.spectral_exr import SpectralImage
 from clpt.lenses import Prescription, Surface
-from clpt.render.camera.encode import check_camera
+from clpt.render.camera import check_camera
 from clpt.render.flow.check import check
 from clpt.render.geometry.check import check_shapes
 from clpt.render.lights.check import check_light

@@ -247,8 +247,9 @@ def film_summary(path: Path) -> dict[str, Any]:
 
 def film_contents(path: Path) -> ImageContents:
     """Return the picture of a film, and what it says of itself. Raises SceneError."""
+    from clpt.render.film.layers import channels_of
+
     from ...render.film import film_file
-    from ...render.film.layer_channels import channels_of
 
     picture, summary = film_file.read(path).developed(), film_summary(path)
     form, lambdas, quantity = picture.form, None, "value (linear)"

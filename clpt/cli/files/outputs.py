@@ -9,11 +9,11 @@ from contextlib import suppress
 from pathlib import Path
 
 from clpt.files import output_files
+from clpt.render.film import film_file, layers
+from clpt.render.film.pictures import DenoisedPicture
 
 from ...device import disk_cache
 from ...errors import ClptError, SceneError
-from ...render.film import film_file, layer_channels
-from ...render.film.denoised_picture import DenoisedPicture
 from ...render.film.film_file import SavedFilm
 from ...render.resumable import ResumableRenderer
 from ...version import VERSION
@@ -123,7 +123,7 @@ def write(
             raise SceneError("no pass has come to its end: there is no film yet", file=path)
         film_file.write(path, saved)
     else:
-        layer_channels.write_picture(
+        layers.write_picture(
             path, source, names=grading.names, metadata=stats, exposure=grading.exposure,
             tone=grading.tone, view=grading.view,
         )  # fmt: skip

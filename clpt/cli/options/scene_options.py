@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
@@ -28,9 +27,8 @@ from .records import Command, Decorator, with_options
 from .values import Choice, LightPaths, Names, SensorName, Size, White
 
 if TYPE_CHECKING:
+    from ...formats.reading import Progress
     from ...scene import Scene
-
-Progress: TypeAlias = Callable[[float, str], None]  # of `clpt.load`
 
 
 LOCAL = "local:"

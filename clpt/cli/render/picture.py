@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.render.film.layers import channels_of
+
 from ...errors import ClusterError
 from ...render.film.film_file import SavedFilm
-from ...render.film.layer_channels import channels_of
 from ...render.progress import Progress
 from ...render.resumable import ResumableRenderer
 from ...scene import Scene

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from clpt.render.lights.find import emissions_of, light_power
-from clpt.render.spectra.look import Look
+from clpt.render.spectra.find import Look
 
 from ... import images
 from ...arrays import Floats32
@@ -207,8 +207,8 @@ def refusals(renderer: ResumableRenderer) -> list[str]:
     sentences = []
     if rejected := renderer.counts.rejected:
         sentences.append(
-            f"{rejected} samples were not finite, too bright, or in a medium that is far too dense "
-            "beside empty cells, and count as black"
+            f"{rejected} samples were not finite, too bright, in a medium that is far too dense "
+            "beside empty cells, or not finished in time; they lack light"
         )
     if renderer.counts.full:
         sentences.append("pixels are too bright for the film: lower film.exposure")

@@ -17,10 +17,10 @@ from pathlib import Path, PurePosixPath
 from typing import Any, NoReturn, TypeVar
 from urllib.parse import unquote, unquote_to_bytes
 
+from clpt.arrays import is_flag, is_number, is_whole
 from clpt.choices import Missing
 from clpt.errors import SceneError
 from clpt.files import budget, input_files, text
-from clpt.scalars import is_flag, is_number, is_whole
 
 T = TypeVar("T")
 REQUIRED: Any = object()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -122,12 +122,7 @@ class Surface:
     uv_sets: tuple[int, ...]
 
 
-@dataclass
-class Posed:
-    """A mesh's primitives in a pose, and each node that shows them, with its transform."""
-
-    parts: list[Mesh]
-    copies: list[tuple[Element, Matrix]] = field(default_factory=list)
+Copies = list[tuple[Element, Matrix]]  # each node that shows a mesh, with its transform
 
 
 def shapes(graph: Graph, *, instances: bool = True) -> list[Shape]:
@@ -136,7 +131,7 @@ def shapes(graph: Graph, *, instances: bool = True) -> list[Shape]:
     With `instances`, many copies of many triangles are instances of a group. All other copies are
     meshes that share their arrays.
     """
-    posed: dict[Any, Posed] = {}
+    posed: dict[Any, tuple[list[Mesh], Copies]] = {}  # primitives of meshes in a pose
     for index in graph.shown:
         node = graph.node(index)
         mesh = node.entry("mesh", "meshes")
@@ -147,28 +142,29 @@ def shapes(graph: Graph, *, instances: bool = True) -> list[Shape]:
         key = (mesh.path, weights) if skin is None else index
         if key not in posed:
             joints = None if skin is None else geometry.joint_matrices(skin, graph.to_world)
-            posed[key] = Posed(_parts(mesh, weights, joints))
+            posed[key] = _parts(mesh, weights, joints), []
         node_to_world = np.eye(4) if skin is not None else graph.to_world[index]
-        copies = _transforms(node, node_to_world)
-        parts = len(copies) * max(len(posed[key].parts), 1)
-        budget.take_parts(parts, "copies of its meshes", graph.document.file)
-        budget.take(BYTES * parts, "copies of its meshes", graph.document.file)
-        posed[key].copies += [(node, matrix) for matrix in copies]
-    return [shape for each in posed.values() for shape in _shapes(each, instances)]
+        parts, copies = posed[key]
+        matrices = _transforms(node, node_to_world)
+        count = len(matrices) * max(len(parts), 1)
+        budget.take_parts(count, "copies of its meshes", graph.document.file)
+        budget.take(BYTES * count, "copies of its meshes", graph.document.file)
+        copies += [(node, matrix) for matrix in matrices]
+    return [shape for each in posed.values() for shape in _shapes(*each, instances)]
 
 
-def _shapes(posed: Posed, instances: bool) -> list[Shape]:
+def _shapes(parts: list[Mesh], copies: Copies, instances: bool) -> list[Shape]:
     """Return the shapes that show all copies of a mesh."""
-    triangles = sum(len(part.faces) for part in posed.parts)
-    if not instances or triangles * (len(posed.copies) - 1) < INSTANCED:
-        meshes = [_transformed(part, *copy) for copy in posed.copies for part in posed.parts]
+    triangles = sum(len(part.faces) for part in parts)
+    if not instances or triangles * (len(copies) - 1) < INSTANCED:
+        meshes = [_transformed(part, *copy) for copy in copies for part in parts]
         return [mesh for mesh in meshes if mesh is not None]
-    group = Group(tuple(posed.parts), posed.parts[0].name)
+    group = Group(tuple(parts), parts[0].name)
     result: list[Shape] = []
-    flat = transforms.are_singular(np.stack([to_world for _, to_world in posed.copies]))
-    for (node, to_world), is_flat in zip(posed.copies, flat.tolist(), strict=True):
+    flat = transforms.are_singular(np.stack([to_world for _, to_world in copies]))
+    for (node, to_world), is_flat in zip(copies, flat.tolist(), strict=True):
         if is_flat:
-            meshes = [_transformed(part, node, to_world) for part in posed.parts]
+            meshes = [_transformed(part, node, to_world) for part in parts]
             result += [mesh for mesh in meshes if mesh is not None]
         else:
             result.append(Instance(group=group, to_world=to_world))

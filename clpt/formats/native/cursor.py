@@ -9,16 +9,16 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from clpt.arrays import is_number
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.files import budget
 from clpt.files import text as text_files
 from clpt.formats.reading import Located
-from clpt.scalars import is_number
 
 LARGEST_INTEGER = 2**31 - 1
 PER_LETTER = 16  # bytes of memory for each letter of JSON, while it is read
@@ -94,7 +94,7 @@ class Cursor(Located):
         values = self.expect(list)
         if count and len(values) != count:
             raise self.error(f"must have {count} entries, not {len(values)}")
-        return [self.at(i) for i in range(len(values))]
+        return [self.at(i) for i in budget.steps(range(len(values)))]
 
     def number(self) -> float:
         """Return a finite number."""
@@ -121,6 +121,9 @@ class Cursor(Located):
         return [entry.number() for entry in self.entries(count)]
 
 
+ReadCursor = Callable[[Cursor], Any]  # reads the value at a cursor
+
+
 def parse(path: Path, confined: bool = False) -> Cursor:
     """Read a JSON file whose outermost value is an object.
 
@@ -135,6 +138,8 @@ def parse(path: Path, confined: bool = False) -> Cursor:
         raise _syntax_error(error, path) from None
     except RecursionError:
         raise SceneError("is nested too deeply", file=path) from None
+    except SceneError as error:  # the time is spent
+        raise SceneError(str(error), file=path) from None
     except ValueError as error:
         raise SceneError(f"is not JSON: {str(error)[:100]}", file=path) from None
     cursor = Cursor(value, path, text, confined=confined)
@@ -154,6 +159,7 @@ def _syntax_error(error: json.JSONDecodeError, path: Path) -> SceneError:
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any] | DuplicateKey:
+    budget.check_time()
     values = dict(pairs)
     if len(values) == len(pairs):
         return values

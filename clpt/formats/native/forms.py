@@ -16,7 +16,7 @@ from clpt import spectra
 from clpt.choices import AUTO
 from clpt.formats.native import cameras, json_schema, motion
 from clpt.formats.native import spectra as json_spectra
-from clpt.formats.native.cursor import Cursor
+from clpt.formats.native.cursor import Cursor, ReadCursor
 from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, TRIPLE, Schema, ref
 from clpt.formats.native.motion import matrix
 from clpt.formats.native.spectra import kind_name
@@ -118,9 +118,7 @@ def words(param: Param) -> str:
     return (form(param) if callable(form) else form) + (" or texture" if param.textured else "")
 
 
-def _of_cursor(
-    words: str, schema: Schema | Callable[[Param], Schema], read: Callable[[Cursor], Any]
-) -> Form:
+def _of_cursor(words: str, schema: Schema | Callable[[Param], Schema], read: ReadCursor) -> Form:
     """A form that refers to nothing else, and whose values are plain."""
     return Form(words, schema, lambda cursor, _: read(cursor))
 

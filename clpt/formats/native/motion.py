@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 from clpt import transforms
 from clpt.errors import UnknownKindError
 from clpt.files import numpy_files, output_files
-from clpt.formats.native.cursor import Cursor
+from clpt.formats.native.cursor import Cursor, ReadCursor
 from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, Schema, object_of, ref
 from clpt.formats.native.spectra import find_file
 from clpt.scene.motion import SHAPES, Deformation, Keys, Shutter
@@ -146,7 +145,7 @@ def write_shutter(value: Shutter) -> dict[str, Any]:
     return {"open": value.open, "close": value.close, "shape": shape}
 
 
-STEPS: dict[str, Callable[[Cursor], transforms.Matrix]] = {
+STEPS: dict[str, ReadCursor] = {
     "translate": lambda c: transforms.translate(c.numbers(3)),
     "scale": lambda c: transforms.scale(c.numbers(3) if isinstance(c.value, list) else c.number()),
     "rotate": lambda c: transforms.rotate(
@@ -202,7 +201,7 @@ def _regular(cursor: Cursor, product: transforms.Matrix) -> transforms.Matrix:
     return product
 
 
-def _fields(cursor: Cursor, **readers: Callable[[Cursor], Any]) -> list[Any]:
+def _fields(cursor: Cursor, **readers: ReadCursor) -> list[Any]:
     """Return the values of an object that must have exactly these keys."""
     name = str(cursor.path[-1])
     if not isinstance(cursor.value, dict):

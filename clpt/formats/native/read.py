@@ -16,7 +16,7 @@ from clpt.files import budget
 from clpt.formats import materialx, volumes
 from clpt.formats.colours import EVEN, GREY, grey_for
 from clpt.formats.native import forms, shape_files
-from clpt.formats.native.cursor import Cursor, parse
+from clpt.formats.native.cursor import Cursor, ReadCursor, parse
 from clpt.formats.native.spectra import find_file, kind_name
 from clpt.scene import Scene, checked_noise, integrators, kinds, lights, materials, media, shapes
 from clpt.scene.params import Kind, params, shorthands
@@ -83,7 +83,7 @@ class _Reader:
         root.check_keys("a scene", KEYS)
         if "camera" not in root.value:
             raise root.error("needs a 'camera'")
-        readers: dict[str, Callable[[Cursor], Any]] = {
+        readers: dict[str, ReadCursor] = {
             "camera": lambda c: self.kind(c, "camera"),
             "film": lambda c: self.object_of(c, integrators.Film),
             "integrator": lambda c: self.kind(c, "integrator"),

@@ -12,12 +12,12 @@ from collections.abc import Collection
 from typing import Any
 
 from clpt import spectra
+from clpt.arrays import is_number
 from clpt.errors import UnknownKindError
 from clpt.files import input_files
 from clpt.formats.colours import colour
 from clpt.formats.native.cursor import Cursor
 from clpt.images.transfer import from_hex
-from clpt.scalars import is_number
 from clpt.scene.integrators import NO_AOV
 from clpt.scene.roles import COEFFICIENT, EMISSION, INDEX, REFLECTANCE, Spectral
 from clpt.spectra import Constant, Donaldson, Fluorophore, Reradiation, Spectrum

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from pxr import Usd, UsdShade
 
-from clpt.formats.usd import networks, textures
+from clpt.formats import materialx
+from clpt.formats.usd import textures
 from clpt.formats.usd.document import Document
 from clpt.formats.usd.nodes import Node
 from clpt.formats.usd.textures import Uses
@@ -23,6 +24,7 @@ from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.scene.values import Texture, Textured
 
 PREVIEW = "UsdPreviewSurface"
+CONTEXT = "mtlx"  # of renderers that read MaterialX
 GREY = (0.18, 0.18, 0.18)
 COLOR, ATTRIBUTE = "displayColor", "vertex_"  # a primvar, and how names of attributes begin
 NORMALS = ((2.0, 2.0, 2.0), (-1.0, -1.0, -1.0))  # scale and bias of a map of 8 bits
@@ -99,10 +101,10 @@ def _sided(inner: Material) -> Material:
 def _bound(document: Document, material: UsdShade.Material, both: bool) -> Surface:
     """Return a material that a prim binds: that of MaterialX, else its universal surface."""
     name, path = material.GetPrim().GetName(), str(material.GetPath())
-    uses = Uses()
-    network = networks.shader(document, material)
+    uses = Uses(document)
+    network = _network(document, material)
     if network is not None:
-        read = networks.surface(document, network, uses, name)
+        read = materialx.surface(network, uses, name)
         found = Surface(read.material, read.emission, interior=read.interior)
         return _told(document, path, found, uses, both)
     shader = material.ComputeSurfaceSource("")[0]
@@ -118,6 +120,16 @@ def _bound(document: Document, material: UsdShade.Material, both: bool) -> Surfa
     if material.ComputeDisplacementSource("")[0] and node.source("displacement"):
         document.warn("displacement is left out", path)
     return _told(document, path, Surface(*_preview(node, uses, name)), uses, both)
+
+
+def _network(document: Document, material: UsdShade.Material) -> Node | None:
+    """Return the surface shader of MaterialX that a material has; None without one."""
+    for context in (CONTEXT, ""):
+        found = material.ComputeSurfaceSource(context)[0]
+        node = Node(document, found) if found else None
+        if node is not None and node.kind.startswith("ND_") and "UsdPreview" not in node.kind:
+            return node
+    return None
 
 
 def _told(document: Document, path: str, read: Surface, uses: Uses, both: bool) -> Surface:

@@ -36,14 +36,27 @@ DEEPEST = 32  # of transforms, one after the other
 class Uses:
     """The primvars that a material reads: sets of texture coordinates, and others.
 
-    fallbacks: by name, the values of vertices of a mesh without the primvar.
+    It is the host of a material's network of MaterialX. fallbacks: by name, the values of vertices
+    of a mesh without the primvar.
     """
 
+    document: Document
     uv_sets: list[str] = field(default_factory=list)
     fallbacks: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
+    def warn(self, message: str, path: str) -> None:
+        self.document.warn(message, path)
+
+    def image(self, asset: object, path: str) -> images.Stored | None:
+        return read(self.document, asset, path)
+
+    def attribute(self, name: str, count: int) -> MeshAttribute:
+        self.fallbacks.setdefault(name, (0.0,) * count)
+        return MeshAttribute(name=f"vertex_{name}")
+
     def uv_mapping(self, name: str) -> str:
         """Return how a bitmap finds a set of texture coordinates; there may be two."""
+        name = name or "st"
         if name not in self.uv_sets:
             self.uv_sets.append(name)
         return "uv1" if self.uv_sets.index(name) == 1 else "uv"

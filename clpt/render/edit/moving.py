@@ -27,7 +27,7 @@ from clpt.render.edit.moving_parts import (
     MovingInstances,
     MovingSpheres,
 )
-from clpt.render.edit.plan import Plan
+from clpt.render.edit.plans import Plan
 from clpt.render.edit.scene_edit import Replacements
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene import Scene

@@ -19,7 +19,7 @@ from clpt.arrays import Balls, Points, on_device
 from clpt.bvh import Building
 from clpt.geometry import analytic, instancing, shapes, spheres
 from clpt.records import INSTANCE, SHAPE
-from clpt.render.records.device_arrays import as_array
+from clpt.render.records.tables import as_array
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.scene.shapes import Shape, Spheres
 

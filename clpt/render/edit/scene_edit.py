@@ -11,12 +11,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import pyopencl as cl
 
-from clpt.arrays import on_device
+from clpt.arrays import is_whole, on_device
 from clpt.errors import SceneError
 from clpt.geometry import shapes
 from clpt.geometry.instancing import distinct
-from clpt.render.records.device_arrays import fresh_view, readable
-from clpt.scalars import is_whole
+from clpt.render.records.tables import fresh_view, readable
 from clpt.scene import Scene
 from clpt.scene.materials import Material, parts
 from clpt.scene.shapes import SMOOTH, Shape

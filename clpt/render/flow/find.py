@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from clpt.geometry.lamps import plainly_lit
 from clpt.geometry.motion import at_rest
 from clpt.render.flow.check import check_at_rest
-from clpt.render.geometry import open_boundaries
+from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Geometry, assembled
 from clpt.render.geometry.surroundings import (
     bodies_around,
@@ -26,28 +26,15 @@ from clpt.render.geometry.surroundings import (
 )
 from clpt.render.lights.aims import aims
 from clpt.render.lights.find import Sources, sources_of
-from clpt.render.media.bodies import matter_of
+from clpt.render.media.bodies import escape_lamps, matter_of, sealed_media
 from clpt.render.media.light_media import NOWHERE, LightMedia, light_media
-from clpt.render.media.sealed import escape_lamps, sealed_media
-from clpt.render.records.lowering_cache import LoweringCache
+from clpt.render.records.tables import LoweringCache
 from clpt.render.scene_index import SceneIndex
-from clpt.render.spectra.look import Look
+from clpt.render.spectra.find import Look
 from clpt.render.transport.hard_light import Lit, decided
 from clpt.scene import Scene
 from clpt.scene.integrators import Integrator
 from clpt.scene.media import Medium
-
-
-@dataclass(frozen=True)
-class Before:
-    """Decisions before an edit, which stay.
-
-    integrator: its film has sums for light paths, or none; lit_ghosts: whether light paths were
-    ghosts of a lens.
-    """
-
-    integrator: Integrator
-    lit_ghosts: bool
 
 
 @dataclass(frozen=True)
@@ -73,21 +60,29 @@ class Analysis:
     warnings: tuple[str, ...]
 
 
-def analyse(scene: Scene, cache: LoweringCache, before: Before | None = None) -> Analysis:
+def analyse(
+    scene: Scene,
+    cache: LoweringCache,
+    former: Integrator | None = None,
+    *,
+    lit_before: bool | None = None,
+) -> Analysis:
     """Return the facts about a scene; cache: with results of the analysis before.
+
+    former: the integrator before an edit, which stays: its film has sums for light paths, or none;
+    lit_before: whether light paths were ghosts of a lens then.
 
     Raises SceneError for an invalid scene; it names the shape, light or material.
     """
     scene = at_rest(scene)
     check_at_rest(scene, cache)
     scene = plainly_lit(scene)
-    index = replace(SceneIndex.of(scene), lit_before=before.lit_ghosts if before else None)
+    index = replace(SceneIndex.of(scene), lit_before=lit_before)
     geometry = assembled(index, cache)
     sphere = geometry.bounding_sphere()
     look = Look.of(scene.film, cache)
     sources = sources_of(index, geometry, sphere[1], look)
     index, lit = _media_at_lights(index, geometry, sources, sphere, cache)
-    former = before.integrator if before else None
     lights = Lit(index, geometry, look, sources, sphere, lit.extinction)
     index, reason = decided(lights, former)
     around, warnings = _at_the_camera(scene, index, cache)
@@ -103,7 +98,7 @@ def analyse(scene: Scene, cache: LoweringCache, before: Before | None = None) ->
         light_media=lit,
         around=around,
         aims=aimed if len(aimed) else escape_lamps(index, sealed, cache),
-        warnings=(*warnings, *open_boundaries.warnings_of(index, cache)),
+        warnings=(*warnings, *surroundings.warnings_of_holes(index, cache)),
     )
 
 
@@ -142,15 +137,15 @@ def _passed_through(index: SceneIndex, cache: LoweringCache) -> list[str]:
     bounding = boundaries(index.listed, matter_of if index.nested else None)
     if index.motions.camera is None and stands_still(bounding):
         return []
-    surroundings: list[tuple[Any, ...]] = []
+    entered: list[tuple[Any, ...]] = []
     for time in index.motions.looks():
         origin = camera_origin(index.camera, index.film, time)
-        surroundings.append(
+        entered.append(
             bodies_at(bounding, matter_of, origin, time, cache)
             if index.nested
             else media_at(bounding, origin, time, cache)
         )
-    if all(media == surroundings[0] for media in surroundings):
+    if all(media == entered[0] for media in entered):
         return []
     return [
         "camera: it comes into another medium while the shutter is open; all its paths begin in "

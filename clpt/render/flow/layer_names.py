@@ -18,8 +18,7 @@ from clpt.render.lights.encode import LightRows
 from clpt.render.lights.find import row_order
 from clpt.render.records import LayerFeatures
 from clpt.render.records.film import LayerNames
-from clpt.render.records.lowering_cache import LoweringCache
-from clpt.render.records.tables import TableStore
+from clpt.render.records.tables import LoweringCache, TableStore
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import materials as mt
 from clpt.scene.layers import MOST_NAMED
@@ -102,11 +101,11 @@ def _materials(shapes: Iterable[Shape]) -> tuple[dict[int, int], list[mt.Materia
 
 def _groups(index: SceneIndex, geometry: Geometry, lights: LightRows) -> list[str]:
     """The group of each row of `lights`."""
-    lamps = index.lights
+    lamps, starts = index.lights, lights.sources.first
     groups = [lamps[i].group or REST for i in row_order(lamps)]
-    groups += [REST] * (next(iter(lights.first), len(lights.rows)) - len(groups))  # of media
-    ends = (*lights.first, len(lights.rows))[1:]
-    for emitter, first, end in zip(geometry.emitters, lights.first, ends, strict=True):
+    groups += [REST] * (next(iter(starts), len(lights.rows)) - len(groups))  # of media
+    ends = (*starts, len(lights.rows))[1:]
+    for emitter, first, end in zip(geometry.emitters, starts, ends, strict=True):
         emission = emitter.shape.emission
         groups += [(emission.group if emission else "") or REST] * (end - first)
     return groups

@@ -2,32 +2,29 @@
 
 A stage's text holds only code that the scene uses; each material kind has a program that shades
 it, so that a new material in a scene rebuilds nothing else.
+
+`library` is the text that an application puts in front of its own OpenCL program.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+import re
 
 from clpt import bvh, device
+from clpt.errors import SceneError, UnknownKindError
 from clpt.layout import SLAB_BLOCK
-from clpt.render.flow import (
-    blocks,
-    bounce,
-    choices,
-    common,
-    flags,
-    signatures,
-    stages,
-    vertices,
-)
+from clpt.render.flow import blocks, bounce, choices, flags, signatures, stages, vertices
+from clpt.render.flow.stages import functions_text
 from clpt.render.geometry import cases as shapes
 from clpt.render.lights import cases as lights
-from clpt.render.lights import emission_cases as emission
 from clpt.render.materials import cases as parameters
 from clpt.render.materials import rough_coat_table
-from clpt.render.records import Features, custom_materials
+from clpt.render.records import Features, materials
 from clpt.render.textures import cases as textures
+from clpt.scene.integrators import PIXELWISE
+from clpt.scene.materials import LEAVES, Material
 from clpt.scene.scatterer import Scatterer
 
 BOTH = ("integrator/particle_tracer.cl", "integrator/path.cl#both")
@@ -142,7 +139,7 @@ def _shading(
             virtual |= vertices.virtual_files(features, vertex)
             texts |= _materials(features, vertex, files, lanes, part)
         if part is not None:
-            virtual["generated/common.cl"] = common.calls_text(common.shared(features, lanes))
+            virtual["generated/common.cl"] = vertices.calls_text(vertices.shared(features, lanes))
         if cls.is_phase:
             virtual["generated/shading_frame.cl"] = ("media/phase.cl#frame",)
         kind = {**vertices.defines(features, vertex), "QUEUED": int(queued)}
@@ -163,7 +160,7 @@ def _material(features: Features, cls: type[Scatterer]) -> Files:
     """The files of a kind's own functions."""
     files: Files = {"generated/bsdf.cl": stages.bsdf_text(features, cls)}
     if cls.source is not None:
-        files[f"{cls.folder}/{cls.kind}.cl"] = custom_materials.text(cls)
+        files[f"{cls.folder}/{cls.kind}.cl"] = materials.text(cls)
     return files
 
 
@@ -238,8 +235,8 @@ def _shared_parts(
 ) -> dict[str, device.Source]:
     """The parts of a loop that other parts call: common functions and textures."""
     parts: dict[str, Files] = {}
-    if functions := common.shared(features, lanes):
-        parts["common"] = {"generated/common_part.cl": common.part_text(functions), **part}
+    if functions := vertices.shared(features, lanes):
+        parts["common"] = {"generated/common_part.cl": vertices.common_part_text(functions), **part}
     if part:
         parts["textures"] = _textures(features, "part")
     files, defines = _shared(features, layout), _defines(features, lanes)
@@ -318,14 +315,14 @@ def _generated(features: Features, layout: str) -> Files:
         **signatures.virtual_files(features, layout),
         **parameters.virtual_files(features),
         **choices.virtual_files(features, layout),
-        "generated/common.cl": common.calls_text(),
+        "generated/common.cl": vertices.calls_text(),
         "generated/camera.cl": stages.camera_text(features.camera, moves=features.motion.camera),
         "generated/connect.cl": stages.connect_text(features),
         "generated/grid_words.cl": stages.grid_words_text(features.media.grids),
         "generated/screen.cl": stages.screen_text(features),
         "generated/photon.cl": stages.photon_text(features) if features.transport.merged else "",
         "generated/phases.cl": stages.phases_text(features),
-        "generated/emission.cl": emission.dispatch_text(features),
+        "generated/emission.cl": lights.emission_text(features),
         **_textures(features, "own"),
         "generated/lights.cl": stages.lights_text(features),
         "generated/smooth_boundary.cl": stages.smooth_boundary_text(features),
@@ -334,3 +331,95 @@ def _generated(features: Features, layout: str) -> Files:
         "generated/shape_tree.cl": shapes.hit_text(features),
         "generated/layout.cl": bvh.traversal_text(layout),
     }
+
+
+LANES = (1, 8, 16)
+_MATH = ("core/lanes.cl", "core/math.cl")
+_SPECTRUM = (*_MATH, "generated/spectrum.cl", "core/spectrum.cl")
+PARTS: dict[str, tuple[str, ...]] = {
+    "lanes": ("core/lanes.cl",),
+    "math": _MATH,
+    "frame": (*_MATH, "core/frame.cl"),
+    "warp": (*_MATH, "core/warp.cl"),
+    "mis": ("core/lanes.cl", "core/mis.cl"),
+    "random": ("core/lanes.cl", "core/random.cl", "generated/sampler.cl"),
+    "spectrum": _SPECTRUM,
+    "fresnel": (*_SPECTRUM, "materials/fresnel.cl"),
+    "microfacet": (*_MATH, "materials/microfacet.cl"),
+    "bvh": ("bvh/library.cl",),
+}
+_INLINE = """\
+#ifdef NOT_INLINED
+#define CLPT_INLINE inline
+#else
+#define CLPT_INLINE __attribute__((always_inline)) inline
+#endif
+"""
+BSDF = (*_SPECTRUM, "core/frame.cl", "core/warp.cl", "materials/bsdf.cl")
+
+
+def kernel_source(
+    *parts: str | type[Material],
+    mode: str = "rgb",
+    lanes: int = 1,
+    layout: str = "wide8",
+    sampler: str = "independent",
+    lines: bool = True,
+) -> str:
+    """Return OpenCL C 1.2 to stand in front of an application's own kernels.
+
+    parts: "bvh", "random", "math", "warp" and the others of docs/kernel_library.md, "bsdf/" and the
+    name of a material, or a material's class; what they share is put in once. mode: "rgb" or
+    "spectral", what a Spectrum is; lanes: 1, 8 or 16, how many values a `real` is; layout: of the
+    tree that "bvh" traces, that of the `Accel`; sampler: what "random" is, "independent" or
+    "sobol"; lines: whether a compiler is told which of clpt's files a line is from, the lines
+    behind the text are then those of "program".
+
+    Raises SceneError for an option that is not there, UnknownKindError for such a part.
+    """
+    if not parts:
+        raise SceneError(f"name a part, such as {', '.join(map(repr, PARTS))}", where="parts")
+    options = {"mode": (mode, ("rgb", "spectral")), "lanes": (lanes, LANES)}
+    options |= {"layout": (layout, bvh.TREES)}
+    options |= {"sampler": (sampler, tuple(cls.kind for cls in PIXELWISE))}
+    for name, (value, known) in options.items():
+        if value not in known:
+            raise SceneError(f"{value!r} is none of {', '.join(map(str, known))}", where=name)
+    virtual: dict[str, str | device.Part | tuple[str, ...]] = {
+        "generated/spectrum.cl": (f"spectra/{mode}.cl",),
+        "generated/sampler.cl": (f"samplers/kinds/{sampler}.cl",),
+        "generated/layout.cl": bvh.traversal_text(layout),
+        **rough_coat_table.virtual_files(),
+    }
+    files: list[str] = []
+    for part in parts:
+        files += PARTS[part] if part in PARTS else _bsdf(part, mode, virtual)
+    virtual["library"] = tuple(files)
+    source = device.assemble("library", virtual, {"LANES": lanes}, library=True)
+    text = _own_inline(source.text)
+    if lines:
+        return text + '#line 1 "program"\n'
+    return re.sub(r"^#line .*\n", "", text, flags=re.MULTILINE)
+
+
+def _own_inline(text: str) -> str:
+    """Return the text with a macro of clpt's name where it redefines `inline` for itself.
+
+    The application's own `inline` then stays what its compiler takes it for.
+    """
+    text = re.sub(r"^#define inline .*", "", text, flags=re.MULTILINE)
+    return _INLINE + re.sub(r"^inline\b", "CLPT_INLINE", text, flags=re.MULTILINE)
+
+
+def _bsdf(part: str | type[Material], mode: str, virtual: dict) -> tuple[str, ...]:
+    """The files of a material kind; those that are not on disk are put into `virtual`."""
+    if isinstance(part, str):
+        known = {f"bsdf/{cls.kind}": cls for cls in LEAVES}
+        if part not in known:
+            raise UnknownKindError("part of the kernels", part, (*PARTS, *known))
+        part = known[part]
+    if part not in LEAVES:
+        materials.check(part)
+        virtual[f"materials/kinds/{part.kind}.cl"] = materials.text(part)
+    virtual[f"generated/{part.kind}.cl"] = functions_text(part, mode)
+    return (*BSDF, f"generated/{part.kind}.cl")

@@ -17,12 +17,12 @@ from clpt.geometry import shape_records, shapes
 from clpt.geometry.instancing import Instances
 from clpt.geometry.refining import is_refined
 from clpt.records import SHAPE_BITS
-from clpt.render.camera.encode import encode_camera
+from clpt.render.camera import encode_camera
 from clpt.render.film import filters
 from clpt.render.film.colour import sensor
-from clpt.render.flow.find import Analysis, Before, analyse
+from clpt.render.flow.check import warnings_of
+from clpt.render.flow.find import Analysis, analyse
 from clpt.render.flow.layer_names import lower_names
-from clpt.render.flow.remarks import warnings_of
 from clpt.render.flow.settings import settings_of
 from clpt.render.geometry.encode import (
     encode_attributes,
@@ -33,13 +33,14 @@ from clpt.render.geometry.encode import (
 )
 from clpt.render.geometry.find import Geometry, Owner, spheres_move
 from clpt.render.lights.encode import LightRows, has_tree, light_rows
+from clpt.render.lights.find import is_whole
 from clpt.render.materials.encode import MaterialWords, gloss_word
 from clpt.render.materials.encoder import Encoder
 from clpt.render.media.bodies import BodyWords
 from clpt.render.media.encode import MediumWords, media_features, medium_aims
 from clpt.render.media.grids import DeviceGrid
 from clpt.render.media.light_media import light_media_words
-from clpt.render.motion.encode import lower_motion
+from clpt.render.motion import lower_motion
 from clpt.render.records import (
     CameraFeatures,
     Features,
@@ -49,10 +50,9 @@ from clpt.render.records import (
     SpectraFeatures,
     TransportFeatures,
 )
-from clpt.render.records.device_arrays import is_table
 from clpt.render.records.film import LayerNames
-from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.records.materials import row_words
+from clpt.render.records.tables import LoweringCache, is_table
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.find import Density, density, emissions
 from clpt.render.textures.image_files import ImageFiles
@@ -140,12 +140,13 @@ def lower(
     has left.
     """
     cache = LoweringCache(former.cache if former else None)
-    before = None
+    integrator = lit_ghosts = None
     if former is not None and not anew:
-        before = Before(former.integrator, former.features.transport.lit_ghosts)
+        integrator, lit_ghosts = former.integrator, former.features.transport.lit_ghosts
     with budget.resumed(scene.account):
         files = ImageFiles.of(named_files(scene), former.files if former else ImageFiles())
-        lowered = encode(analyse(scene, cache, before), cache, texture_budget)
+        analysis = analyse(scene, cache, integrator, lit_before=lit_ghosts)
+        lowered = encode(analysis, cache, texture_budget)
         files.check()
     return replace(lowered, files=files)
 
@@ -292,11 +293,11 @@ class _Tables:
 
     def append_motion(self) -> int:
         """Append the table of motions; return its index in `distributions`, 0 without motion."""
-        index, lights = self.index, self.lights
+        index, sources = self.index, self.analysis.sources
         if not index.motions:
             return 0
-        rows = list(self.analysis.sources.order)
-        rows += [-1] * ((*lights.first, len(lights.rows))[0] - len(rows))  # bricks of media
+        rows = list(sources.order)
+        rows += [-1] * ((*sources.first, len(sources.power))[0] - len(rows))  # bricks of media
         return lower_motion(index.motions, len(index.listed), rows, self.store)
 
     def _begin_materials(self) -> MaterialWords:
@@ -318,26 +319,28 @@ class _Tables:
 
     def _append_lights(self, media: MediumWords) -> LightRows:
         """Append the rows of `lights`, and note in the rows of shapes which lights they are."""
-        index, emitters = self.index, self.geometry.emitters
+        index, emitters, sources = self.index, self.geometry.emitters, self.analysis.sources
         tree_from = None if index.light_paths else TREE_FROM
         for medium in index.emitting:
             media.word(medium)
-        lights = light_rows(
-            index.lights, emitters, self.encoder, self.analysis.sources, tree_from, media.lights
-        )
+        lights = light_rows(index.lights, emitters, self.encoder, sources, tree_from, media.lights)
         self.store.append("lights", lights.rows.view(np.uint32))
         if lights.tree is not None:
             self.store.append("lights", lights.tree)
-        for emitter, first, whole in zip(emitters, lights.first, lights.whole, strict=True):
+        for emitter, first in zip(emitters, sources.first, strict=True):
             row = self.geometry.rows[emitter.shape_row]
             row["light"] = first
-            row["flags"] |= SHAPE_BITS["one_light"] if whole else 0
+            row["flags"] |= SHAPE_BITS["one_light"] if is_whole(emitter.shape) else 0
         return lights
 
     def _append_medium_aims(self) -> int:
         """Append the lamps that flights through media aim at; return how many."""
         homogeneous = (medium for medium in self.index.media if medium.lattice is None)
-        near = medium_aims(self.lights) if any(medium.scatters for medium in homogeneous) else ()
+        near = (
+            medium_aims(self.analysis.sources)
+            if any(medium.scatters for medium in homogeneous)
+            else ()
+        )
         self.store.append("media", np.array(near, np.float32).view(np.uint32))
         return len(near)
 

@@ -14,7 +14,7 @@ from clpt.render.lights.encode import LightRows, light_level
 from clpt.render.records import LayerFeatures
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.find import Density
-from clpt.render.transport import guides, photons
+from clpt.render.transport import light_caches
 from clpt.scene.integrators import DEEPEST, Vcm
 from clpt.spectra.cie import tanh_ends
 
@@ -44,12 +44,12 @@ def settings_of(
     if index.merged:
         _set_photons(settings, index, geometry, sphere[1], disperses)
     if index.guided:
-        paths = settings["guide_paths"] = index.integrator.guide_paths or guides.PATHS
-        settings["photon_cells"], side = guides.cells_for(paths)
+        paths = settings["guide_paths"] = index.integrator.guide_paths or light_caches.GUIDE_PATHS
+        settings["photon_cells"], side = light_caches.guide_cells_for(paths)
         settings["guide_side"] = side * sphere[1]
     settings["mis_area_unit"] = mis_area_unit(sphere[1])
     settings["light_count"] = len(lights.rows)
-    settings["infinite_count"] = lights.infinite
+    settings["infinite_count"] = lights.sources.infinite
     settings["first_analytic"] = geometry.first_analytic
     settings["analytic_count"] = len(geometry.boxes)
     settings["single_count"] = geometry.single_count
@@ -57,7 +57,7 @@ def settings_of(
     settings["tanh_min"], settings["tanh_max"] = tanh_ends(density.lo, density.hi)
     film = index.film
     matrix = output_matrix(film, index.mode)
-    scale = settings["film_scale"] = film_scale(film, light_level(index, lights, sphere))
+    scale = settings["film_scale"] = film_scale(film, light_level(index, lights.sources, sphere))
     settings["to_first"], settings["to_second"], settings["to_third"] = matrix / scale
     settings["center"], settings["scene_radius"] = sphere
     _set_layers(settings, layers)
@@ -124,15 +124,15 @@ def _set_photons(
     """Write the settings of photons; the wavefront adds the number of their light paths."""
     integrator, film = index.integrator, index.film
     assert isinstance(integrator, Vcm)
-    settings["max_depth"] = min(int(settings["max_depth"]), photons.DEEPEST)
-    settings["radius"] = integrator.radius or photons.first_radius(
+    settings["max_depth"] = min(int(settings["max_depth"]), light_caches.DEEPEST)
+    settings["radius"] = integrator.radius or light_caches.first_radius(
         index.camera, geometry, (film.width, film.height), scene_radius
     )
-    settings["photon_places"] = photons.places(integrator)
-    held = photons.pixels(integrator, int(settings["padded_pixels"]))
+    settings["photon_places"] = light_caches.photon_places(integrator)
+    held = light_caches.photon_pixels(integrator, int(settings["padded_pixels"]))
     settings["photon_pixels"] = held
-    cells = max(held * integrator.light_paths, photons.FEWEST_CELLS)
+    cells = max(held * integrator.light_paths, light_caches.FEWEST_CELLS)
     settings["photon_cells"] = 1 << (cells - 1).bit_length()
-    suited = photons.GROUPS if disperses else photons.FEW_GROUPS
+    suited = light_caches.GROUPS if disperses else light_caches.FEW_GROUPS
     groups = integrator.wavelength_groups or suited
     settings["wavelength_groups"] = groups if index.spectral else 1

@@ -192,7 +192,7 @@ def loop_args(features: Features, layout: str) -> dict[str, str]:
 def loop_arguments(features: Features, layout: str) -> tuple[device.Argument, ...]:
     """Return the arguments of stage/loop.cl: a linked kernel has no argument names."""
     args = {**SLAB_ARGS, **SCENE_ARGS, **loop_args(features, layout), "queue": "global uint *"}
-    args |= dict.fromkeys(("share", "bounces", "restart", "which"), "uint ")
+    args |= dict.fromkeys(("share", "begin", "bounces", "restart", "which"), "uint ")
     args["leave"] = "global const volatile uint *"
     return tuple(
         device.Argument(

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from clpt.records import PHOTON
 from clpt.render.flow import flags
 from clpt.render.lights import cases as lights
-from clpt.render.lights import emission_cases as emission
 from clpt.render.materials import cases as parameters
 from clpt.render.materials import thin_films
 from clpt.render.records import CameraFeatures, Features, GridFeatures, MaterialFeatures
@@ -146,7 +145,7 @@ def lights_text(features: Features) -> str:
     """Return the loader of emissions, for all their sources in this scene, and the dispatch."""
     emissions = lights.emission_sources(features)
     factors = features.materials.sources_of("factor").get("value", frozenset())
-    densities = emission.densities_text(features) if features.transport.balanced else ""
+    densities = lights.densities_text(features) if features.transport.balanced else ""
     return (
         ('#include "generated/textures.cl"\n' if "texture" in emissions | factors else "")
         + parameters.emission_text(emissions)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from clpt import spectra
 from clpt.arrays import Floats32
+from clpt.files import budget
 from clpt.geometry import analytic, shape_records, shapes, strands, triangles
 from clpt.geometry.triangles import per_face
 from clpt.records import SHAPE, SHAPE_BITS
@@ -24,8 +25,7 @@ from clpt.render.geometry.find import Geometry, Owner, Stored, spheres_move
 from clpt.render.materials.encode import MaterialWords
 from clpt.render.materials.encoder import Encoder
 from clpt.render.records import GeometryFeatures, MotionFeatures
-from clpt.render.records.lowering_cache import LoweringCache
-from clpt.render.records.tables import TableStore
+from clpt.render.records.tables import LoweringCache, TableStore
 from clpt.render.records.textures import TextureFeatures
 from clpt.render.scene_index import SceneIndex
 from clpt.render.textures.encode import TextureTable
@@ -48,7 +48,9 @@ def encode_geometry(
     """
     store, rows = encoder.store, []
     curves: list[tuple[NDArray[Any], Shape, Floats32]] = []
-    for (unfinished, shape, _, _), stored in zip(geometry.owners, geometry.stored, strict=True):
+    for (unfinished, shape, _, _), stored in zip(
+        budget.steps(geometry.owners), geometry.stored, strict=True
+    ):
         row = unfinished.copy()
         front, back, two_sided = materials.sides(shape)
         row["front"], row["back"] = np.array([front, back], np.uint32).view(np.int32)
@@ -101,7 +103,10 @@ def _store_pieces(
 
 def shape_words(rows: Sequence[NDArray[Any]]) -> NDArray[np.uint32]:
     """Return rows of `shapes` as words."""
-    return np.concatenate([np.zeros(0, SHAPE.dtype), *map(np.atleast_1d, rows)]).view(np.uint32)
+    table = np.zeros(len(rows), SHAPE.dtype)
+    for i, row in enumerate(budget.steps(rows)):
+        table[i] = row
+    return table.view(np.uint32)
 
 
 def encode_attributes(

@@ -27,7 +27,7 @@ from clpt.geometry import (
 from clpt.geometry.instancing import Instances, Placed, Prototype
 from clpt.geometry.motion import Motions
 from clpt.records import SHAPE, SHAPE_BITS
-from clpt.render.records.lowering_cache import LoweringCache
+from clpt.render.records.tables import LoweringCache
 from clpt.render.scene_index import SceneIndex
 from clpt.scene.shapes import Shape
 

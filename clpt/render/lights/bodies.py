@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats, on_device, on_host
+from clpt.files import budget
 from clpt.geometry import analytic, shapes
 from clpt.geometry.analytic import keeps_its_kind
 from clpt.geometry.winding import box
 from clpt.records import BRICK_CELLS
-from clpt.render.geometry.open_boundaries import HOLE, hole_around
-from clpt.render.geometry.surroundings import every
+from clpt.render.geometry.surroundings import HOLE, every, hole_around
 from clpt.render.lights.bounds import Bounds, all_around
 from clpt.render.materials.encoder import Encoder
 from clpt.render.records.lights import BODY, BRICK, RECORDS
-from clpt.render.records.lowering_cache import LoweringCache
+from clpt.render.records.tables import LoweringCache
 from clpt.render.scene_index import SceneIndex, leaves_of
-from clpt.render.spectra.look import Look
+from clpt.render.spectra.find import Look
 from clpt.scene.media import Grid, Lattice, Medium
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, SdfGrid, Shape, Sphere
 from clpt.scene.volumes import check_density
@@ -208,8 +208,10 @@ def brick_counts(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def parts_of(count: int) -> Iterator[slice]:
-    """Return slices of batches."""
-    return (slice(first, first + AT_ONCE) for first in range(0, count, AT_ONCE))
+    """Yield slices of batches. Raises SceneError if the time of the load is spent."""
+    for first in range(0, count, AT_ONCE):
+        budget.check_time()
+        yield slice(first, first + AT_ONCE)
 
 
 class Windows:

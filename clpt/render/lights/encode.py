@@ -1,18 +1,20 @@
-"""Lights on their way to the device: their rows, the alias table and the light tree.
+"""Lights on their way to the device: their records, their rows, the alias table and the light tree.
 
 A row of `lights` is a lamp, a shape that is sampled as a whole, a triangle of an emissive mesh or
-cube, or a part of a medium. Infinite lights come first, for the rays that leave the scene.
+cube, or a part of a medium. Infinite lights come first, for the rays that leave the scene. The
+record of a lamp stands in `light_params`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clpt.arrays import Faces, Points
+from clpt.arrays import Faces, Points, fits_single
 from clpt.errors import SceneError
 from clpt.geometry import analytic, shape_records, shapes, spheres, triangles
 from clpt.records import LIGHT
@@ -20,16 +22,116 @@ from clpt.render.geometry.find import Emitter
 from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights import tree as light_tree
 from clpt.render.lights.bodies import BodyLight, BrickLights
-from clpt.render.lights.encode_lamps import blank_row, lower_lamp
-from clpt.render.lights.find import Source, Sources, is_whole
+from clpt.render.lights.check import placement, three, unit, unsheared
+from clpt.render.lights.find import Source, Sources, emissions_of, environment_of, is_whole
 from clpt.render.materials.encoder import Encoder
-from clpt.render.records.lights import ALONG, BOTH, FRONT, KINDS, UNSEEN, LightFeatures
-from clpt.render.records.lowering_cache import content
+from clpt.render.records import lights as light_records
+from clpt.render.records.lights import ALONG, BOTH, FRONT, KINDS, RECORDS, UNSEEN, LightFeatures
+from clpt.render.records.tables import content
 from clpt.render.scene_index import SceneIndex
-from clpt.render.spectra.look import Look
+from clpt.render.spectra.find import Look
+from clpt.scene import roles
 from clpt.scene.lights import Light
-from clpt.scene.params import fields_of
+from clpt.scene.params import fields_of, params
+from clpt.scene.roles import Param, Role
 from clpt.scene.values import mean
+
+
+def blank_row() -> NDArray[np.uint32]:
+    """Return the words at the start of `light_params`: valid as a dark light of any kind.
+
+    Idle lanes read them; an image light's smallest size keeps these inside its tables.
+    """
+    words = np.zeros(1, RECORDS["spectral_envmap"].dtype)
+    words["width"], words["height"] = 1, 2
+    words["block_rows"] = words["block_columns"] = 1
+    longest = max(record.words for record in RECORDS.values())
+    return np.pad(words.view(np.uint32), (0, longest - RECORDS["spectral_envmap"].words))
+
+
+class Lowered(NamedTuple):
+    """A light in the tables: its record's name, its row and its emission in `light_params`."""
+
+    kind: str
+    row: int
+    radiance: int
+
+
+def lower_lamp(lamp: Light, encoder: Encoder) -> Lowered:
+    """Put a light into the tables. Raises SceneError for a light without position or direction."""
+    kind, radiance = lamp.record, 0
+    environment = environment_of(lamp, encoder.look)
+    if environment is not None:
+        kind, members = environment.record(lamp, encoder)
+    else:
+        rows = {
+            name: encoder.store.append("light_params", encoder.emission_words(value))
+            for name, value in emissions_of(lamp).items()
+        }
+        radiance = next(iter(rows.values()))
+        if kind in light_records.DECLARED:
+            members = {**_declared_members(lamp), **rows}
+        else:
+            members = {**_computed_members(kind, lamp, encoder), "radiance": radiance}
+    words = np.zeros(1, RECORDS[kind].dtype)
+    for name, value in members.items():
+        if not fits_single(value):
+            raise SceneError("is beyond float32, 3.4e38", where=f"{lamp.kind}.{name}")
+        words[name] = value
+    at = encoder.store.append("light_params", words.view(np.uint32))
+    return Lowered(kind, at, radiance)
+
+
+def _declared_members(lamp: Light) -> dict[str, ArrayLike]:
+    """Return the members of a declared light's record but for emissions, see `declared_record`."""
+    members: dict[str, ArrayLike] = {}
+    values = fields_of(lamp)
+    for name, param in params(type(lamp)).items():
+        value, where = values[name], f"{lamp.kind}.{name}"
+        members |= MEMBERS[param.role](name, value, param, where)
+    return members
+
+
+def _number(name: str, value: Any, param: Param, where: str) -> dict[str, ArrayLike]:
+    return {name: np.radians(value) if param.unit == "degrees" else value}
+
+
+# the members of a parameter, by its role
+MEMBERS: dict[Role, Callable[[str, Any, Param, str], dict[str, ArrayLike]]] = {
+    roles.EMISSION: lambda *_: {},
+    roles.REAL: _number,
+    roles.FLAG: _number,
+    roles.CHOICE: lambda name, value, param, _: {name: param.choices.index(value)},
+    roles.host("vector"): lambda name, value, _, where: {name: three(value, where)},
+    roles.host("direction"): lambda name, value, _, where: {name: unit(value, where)},
+    roles.host("matrix4"): lambda _, value, __, where: placement(value, where),
+    **{roles.host(form): lambda *_: {} for form in light_records.OF_HOST},
+}
+
+
+def _computed_members(kind: str, lamp: Light, encoder: Encoder) -> dict[str, ArrayLike]:
+    """Return the members of another light's record but for its radiance.
+
+    Raises SceneError for a transform that shears below an image, or an unreadable image.
+    """
+    to_world, where = fields_of(lamp)["to_world"], f"{lamp.kind}.to_world"
+    if kind in light_records.PROJECTED_RECORDS:
+        placed = _place(to_world, where, *lamp.image_half_size)
+        members = lamp.record_members()
+        words = encoder.factor_words(members["factor"])
+        return {**members, **placed, "factor": encoder.store.append("light_params", words)}
+    axes = placement(to_world, where)
+    return {**lamp.record_members(), "position": axes["position"], "axis": axes["z"]}
+
+
+def _place(
+    to_world: ArrayLike, where: str, half_x: float, half_y: float
+) -> dict[str, NDArray[np.float64]]:
+    """Return position and axes; x and y are divided by half the image's size at a distance of 1."""
+    position, axes = unsheared(to_world, where)
+    x, y, z = axes.T
+    return {"position": position, "x": x / half_x, "y": y / half_y, "z": z}
+
 
 PLACED_LIGHT_WEIGHT = 6  # rows of a light at a separate place, to decide on a light tree
 INFINITE_SHARE = 0.5  # of the choices, beside other lights
@@ -39,38 +141,32 @@ FEW_LIGHTS = 256  # up to this number a single random number chooses a light and
 
 @dataclass(frozen=True)
 class LightRows:
-    """The table `lights`, and what features and settings need to know of it.
+    """The table `lights`.
 
-    rows: structured (n,) of LIGHT.dtype; power: (n,) float64 [W/nm]; radiance: the largest mean
-    radiance of a shape [W m^-2 sr^-1 nm^-1]; infinite: the number of infinite rows, the first of
-    all; kinds: present kinds, for `dispatch_text`; first: per emitter, its first row; whole: per
-    emitter, whether a single row stands for it; visible: whether rays see any; two_sided: whether
-    any shines from the back of its shape too; unseen: whether any shines from a shape, but no ray
-    sees it; bounds: of the rows of each source; tree: words of the light tree behind the rows, None
-    where the alias table chooses.
+    rows: structured (n,) of LIGHT.dtype, those of `sources` in their order; tree: words of the
+    light tree behind the rows, None where the alias table chooses.
     """
 
+    sources: Sources
     rows: np.ndarray
-    power: NDArray[np.float64]
-    radiance: float
-    infinite: int
-    kinds: tuple[str, ...]
-    first: tuple[int, ...]
-    whole: tuple[bool, ...]
-    visible: bool
-    two_sided: bool
-    unseen: bool
-    bounds: tuple[light_bounds.Bounds, ...]
     tree: NDArray[np.uint32] | None
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds that occur, in their order."""
+        return tuple(KINDS[i] for i in sorted({*self.rows["kind"].tolist()}))
 
     def features(self, gloss: int = 0) -> LightFeatures:
         """Return the features of these rows; gloss: see `LightFeatures`."""
+        modes = self.rows["emission_mode"]
+        shine = (self.rows["shape"] >= 0) & (modes & (ALONG | UNSEEN) == 0)
+        infinite = self.sources.infinite > 0
         return LightFeatures(
             kinds=self.kinds,
-            infinite=self.infinite > 0,
-            visible=self.visible,
-            two_sided=self.two_sided,
-            unseen=self.unseen,
+            infinite=infinite,
+            visible=infinite or bool(shine.any()),
+            two_sided=bool((modes & BOTH).any()),
+            unseen=bool((modes & UNSEEN).any()),
             tree=self.tree is not None,
             few=len(self.rows) <= FEW_LIGHTS,
             gloss=gloss,
@@ -96,30 +192,15 @@ def light_rows(
     blocks = [_lamp_rows(lamps[i], encoder) for i in sources.order]
     blocks += [_volume_rows(word, part, encoder) for word, part in volumes]
     blocks += [_emitter_rows(emitter, encoder) for emitter in emitters]
-    every, infinite, power = sources.every, sources.infinite, sources.power
     rows = np.concatenate([np.zeros(0, LIGHT.dtype), *blocks])
     tree = None
     if len(rows):
-        weights = _shared(power, infinite)
+        weights = _shared(sources.power, sources.infinite)
         by = content(weights)
         rows["pmf"], rows["keep"], rows["alias"] = encoder.cache(alias_table, weights, by=(by,))
-        if tree_from is not None and has_tree(every, tree_from):
-            tree = _tree(every, encoder)
-    shine = (rows["shape"] >= 0) & (rows["emission_mode"] & (ALONG | UNSEEN) == 0)
-    return LightRows(
-        rows=rows,
-        power=power,
-        radiance=max((source.radiance for source in every), default=0.0),
-        infinite=infinite,
-        kinds=tuple(KINDS[i] for i in sorted({*rows["kind"].tolist()})),
-        first=sources.first,
-        whole=tuple(is_whole(emitter.shape) for emitter in emitters),
-        visible=infinite > 0 or bool(shine.any()),
-        two_sided=bool((rows["emission_mode"] & BOTH).any()),
-        unseen=bool((rows["emission_mode"] & UNSEEN).any()),
-        bounds=tuple(source.bounds for source in every),
-        tree=tree,
-    )
+        if tree_from is not None and has_tree(sources.every, tree_from):
+            tree = _tree(sources.every, encoder)
+    return LightRows(sources, rows, tree)
 
 
 def has_tree(every: Sequence[Source], tree_from: int) -> bool:
@@ -224,7 +305,7 @@ def alias_table(
 
 
 def light_level(
-    index: SceneIndex, lights: LightRows, sphere: tuple[NDArray[np.float64], float]
+    index: SceneIndex, sources: Sources, sphere: tuple[NDArray[np.float64], float]
 ) -> float:
     """Estimate the largest radiance that the camera may see [W m^-2 sr^-1 nm^-1].
 
@@ -234,14 +315,15 @@ def light_level(
     """
     centre, radius = sphere
     arrives = 0.0
-    if lights.bounds:
-        bounds = light_bounds.concatenated(list(lights.bounds))
+    every = sources.every
+    if every:
+        bounds = light_bounds.concatenated([source.bounds for source in every])
         away = np.square((bounds.low + bounds.high) / 2.0 - centre).sum(axis=1)
         square = np.where(bounds.placed, np.maximum(away, radius**2), radius**2)
-        arrives = float((lights.power / (4.0 * np.pi * square)).sum())
+        arrives = float((sources.power / (4.0 * np.pi * square)).sum())
     look = Look.of(index.film)
     media = [medium.light for medium in index.emitting if medium.light is not None]
     glow = [look.brightness(light) * radius for light in media]
     ambient = index.integrator.ambient
     around = 0.0 if ambient is None else mean(ambient, look)
-    return max(lights.radiance, arrives, around, *glow)
+    return max(*(source.radiance for source in every), arrives, around, *glow)

@@ -18,12 +18,11 @@ from clpt.geometry.motion import corners, swept
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights import images as image_lights
-from clpt.render.lights import sky as sky_light
 from clpt.render.lights.bodies import BodyLight, BrickLights, volume_lights
 from clpt.render.lights.bounds import Bounds
 from clpt.render.records.lights import INFINITE
 from clpt.render.scene_index import SceneIndex
-from clpt.render.spectra.look import Look
+from clpt.render.spectra.find import Look
 from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.media import Medium
@@ -153,15 +152,17 @@ def emissions_of(lamp: Light) -> dict[str, Any]:
 ENVIRONMENTS: dict[type[Light], Any] = {  # functions of a light and a look
     lights.Envmap: image_lights.envmap_content,
     lights.CubeMap: image_lights.cube_content,
-    lights.Sky: sky_light.content,
+    lights.Sky: image_lights.sky_content,
 }
 
 
-def environment_of(lamp: Light, look: Look) -> image_lights.Content | sky_light.Content | None:
+def environment_of(
+    lamp: Light, look: Look
+) -> image_lights.Content | image_lights.SkyContent | None:
     """Return the content of a light that is an image around the scene; None for another light."""
     if type(lamp) not in ENVIRONMENTS:
         return None
-    content: image_lights.Content | sky_light.Content = ENVIRONMENTS[type(lamp)](lamp, look)
+    content: image_lights.Content | image_lights.SkyContent = ENVIRONMENTS[type(lamp)](lamp, look)
     return content
 
 

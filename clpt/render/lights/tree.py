@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats
+from clpt.files import budget
 from clpt.render.lights.bounds import Bounds
 from clpt.render.records.lights import LINE, NODE, WIDTH
 
@@ -148,6 +149,7 @@ class _Builder:
         at = depth + np.arange(len(starts))
         free = int(at[-1]) + 1
         while len(order):
+            budget.check_time()
             level, counts = self.summed(order, starts), _counts(starts, len(order))
             inner = counts > 1
             child = np.where(inner, free + 2 * (np.cumsum(inner) - 1), -1 - order[starts])

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import Concatenate, NoReturn, ParamSpec, TypeVar
+from typing import NoReturn, TypeVar, cast
 
 from clpt.device import Device, forking
 from clpt.errors import DeviceError
@@ -26,9 +26,7 @@ from clpt.render.film.film_file import Session
 from clpt.render.film.state import Ranges
 from clpt.render.wavefront.adaptive import Adaptive
 
-_P = ParamSpec("_P")
-_R = TypeVar("_R")
-_S = TypeVar("_S", bound="FilmOwner")
+_Method = TypeVar("_Method", bound=Callable[..., object])
 
 log = logging.getLogger(__name__)
 
@@ -219,25 +217,23 @@ class FilmOwner:
             raise self._contents.failure()
 
 
-def synchronized(
-    method: Callable[Concatenate[_S, _P], _R], *, heals: bool = False
-) -> Callable[Concatenate[_S, _P], _R]:
+def synchronized(method: _Method, *, heals: bool = False) -> _Method:
     """Return a method that excludes other threads.
 
     It raises DeviceError after `close`, and for a broken object unless `heals`.
     """
 
-    def locked(self: _S, /, *args: _P.args, **named: _P.kwargs) -> _R:
+    def locked(self: FilmOwner, /, *args: object, **named: object) -> object:
         inside = self._inside
         with self._lock:
             (self._check_healing if heals else self._check)(inside)
             return method(self, *args, **named)
 
     functools.update_wrapper(locked, method)
-    return locked
+    return cast(_Method, locked)
 
 
-def healing(method: Callable[Concatenate[_S, _P], _R]) -> Callable[Concatenate[_S, _P], _R]:
+def healing(method: _Method) -> _Method:
     """Return a synchronized method that repairs a broken object."""
     return synchronized(method, heals=True)
 

@@ -27,10 +27,10 @@ from clpt.render.film.pictures import PictureForm
 from clpt.render.film.state import DIMENSIONS, FilmState, Ranges
 from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.render.options import RenderOptions
-from clpt.render.records import custom_materials
+from clpt.render.records import materials
 from clpt.render.textures.image_files import ImageFiles
-from clpt.render.trials.trial import Ground, decided
-from clpt.render.wavefront.denoised_noise import DenoisedNoise
+from clpt.render.trials import Ground, decided
+from clpt.render.wavefront.noise import DenoisedNoise
 from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.tracer import use_all_pixels
 from clpt.render.wavefront.wavefront import Wavefront
@@ -245,7 +245,7 @@ class DeviceFilm:
         if type(self.scene.sampler) not in PIXELWISE:  # their points depend on its size
             settings["sampler.points"] = 1 << int(lowered.settings["sample_bits"])
         outside = [cls for cls in features.materials.leaves if cls.source is not None]
-        texts = [custom_materials.text(cls).text for cls in outside]
+        texts = [materials.text(cls).text for cls in outside]
         digest = hashlib.sha256("\0".join([kernels_digest(), *texts]).encode()).hexdigest()
         return Origin(read[2], settings, digest, VERSION)
 

@@ -1,7 +1,8 @@
 """Makers take the samples of a film: a device, several devices, or the workers of a cluster.
 
 A renderer asks its maker for samples, for their sums, and for another scene. The renderer develops,
-saves and continues the film, in the same way for all makers.
+saves and continues the film, in the same way for all makers. The maker of a device stands here too:
+its film is in the memory of the device.
 """
 
 from __future__ import annotations
@@ -9,13 +10,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from numpy.typing import NDArray
 
 from clpt import device as dev
-from clpt.errors import SceneError
-from clpt.render.edit.plan import Plan
+from clpt.errors import DeviceError, MemoryBudgetError, SceneError
+from clpt.render.edit.plans import Plan
 from clpt.render.film.state import FilmState, Ranges
 from clpt.render.makers import planning
 from clpt.render.makers.contents import Contents, Settle
@@ -191,3 +193,93 @@ class Maker(ABC):
     def close(self) -> None:
         """Release the devices' memory."""
         self.home.close()
+
+
+class DeviceMaker(Maker):
+    """Takes samples on a device; home: their film."""
+
+    shows_meanwhile = True
+
+    def __init__(self, home: DeviceFilm):
+        self._home, self.start = home, home.start
+        self._discards = False
+
+    @property
+    def home(self) -> DeviceFilm:
+        """The film on the device."""
+        return self._home
+
+    # ---- samples
+
+    def begin(self, call: Call, now: Contents, more: Contents) -> Settle:
+        """Return the function that ends a call; see `Maker`.
+
+        After an error at any line the film has the contents `more`, although some pixels may lack
+        some of the samples, or `now` if no sample has begun. After an error of the device the
+        function raises that error if samples have begun.
+        """
+        wavefront = self._home.wavefront
+        wavefront.begun = False
+
+        def settle(error: BaseException | None) -> Contents:
+            begun = wavefront.begun
+            if error is None:
+                return more
+            if isinstance(error, DeviceError) and not isinstance(error, MemoryBudgetError):
+                if begun:
+                    raise error
+                return now
+            wavefront.finish()
+            if more.adaptive is not None:
+                more.adaptive.finish()
+                if call.noise is None and begun and call.end > call.first:
+                    more.adaptive.skip(call.end)
+            wavefront.refresh()
+            return more if begun else now
+
+        return settle
+
+    def run(self, call: Call, adaptive: Adaptive | None, tick: Tick) -> bool:
+        """Add samples to the film; return whether all were added. Raises Discarded."""
+
+        def on_batch(_: object) -> bool:
+            goes_on = tick()
+            if not goes_on and self._discards:
+                raise Discarded
+            return goes_on
+
+        wavefront = self._home.wavefront
+        wavefront.leave.lower()  # a late `leave` for a former call may have raised it
+        if call.noise is not None and adaptive is not None:
+            return adaptive.run(call.end, call.noise, on_batch)
+        finished = wavefront.render_samples(call.first, call.end, on_batch)
+        if adaptive is not None:
+            adaptive.skip(call.end)  # also after a stop: numbers of samples are used once
+        return finished
+
+    def enqueue(self, call: Call, adaptive: Adaptive | None) -> None:
+        """Enqueue samples of all pixels; wait for nothing."""
+        wavefront = self._home.wavefront
+        wavefront.enqueue(call.first, call.end)
+        wavefront.stream.flush()
+        if adaptive is not None:
+            adaptive.skip(call.end)
+
+    def leave(self, film: bool) -> None:
+        """Set whether a call that stops may abandon paths in flight."""
+        if film and self._home.is_open:  # `run` sees the reason soon after the flag
+            self._home.wavefront.leave.raise_()
+        self._discards = film
+
+    # ---- the film
+
+    def put(self, state: FilmState, counts: Counts | None = None) -> None:
+        """Enqueue the words of another film."""
+        if counts is not None:
+            self._home.wavefront.counts = counts
+        self._home.put(state)
+
+    def hold(self, taken: Ranges) -> Held:
+        """Copy the film on the device, over a former copy. Raises MemoryBudgetError."""
+        self._home.wavefront.film.hold()
+        return Held(partial(self._home.words, held=True, taken=taken), self.counts, taken)

@@ -14,11 +14,16 @@ from typing import Any
 
 from clpt import device as dev
 from clpt.geometry import shapes
-from clpt.render.edit import parameter_patch, rebuild
 from clpt.render.edit.blurring import between
 from clpt.render.edit.moving import Move, Moving
-from clpt.render.edit.parameter_patch import Patch
-from clpt.render.edit.plan import Plan
+from clpt.render.edit.plans import (
+    Patch,
+    Plan,
+    has_other_paths,
+    prepare_patch,
+    prepare_rebuild,
+    refusal,
+)
 from clpt.render.edit.scene_edit import (
     MaterialKey,
     Replacements,
@@ -159,10 +164,10 @@ def _quick_plans(
             return None
         plans.append(move)
     if not moves or changes.materials is not None or changes.camera is not None:
-        patch = _patch(film, scene)
-        if patch is None:
+        words = _patch(film, scene)
+        if words is None:
             return None
-        plans.append(patch)
+        plans.append(words)
     return plans
 
 
@@ -184,11 +189,11 @@ def _patch(film: DeviceFilm, scene: Scene) -> Patch | None:
     """Return the plan that writes differing words of parameters; None if more differs."""
     if _enters_a_medium(film, scene):
         return None
-    patch = parameter_patch.patch(film.wavefront.scene, film.scene, scene)
-    if isinstance(patch, str):
-        log.debug("words alone do not change the scene: %s", patch)
+    words = prepare_patch(film.wavefront.scene, film.scene, scene)
+    if isinstance(words, str):
+        log.debug("words alone do not change the scene: %s", words)
         return None
-    return patch
+    return words
 
 
 def _enters_a_medium(film: DeviceFilm, scene: Scene) -> bool:
@@ -218,9 +223,9 @@ def _rebuilt(
     former = film.wavefront.scene.lowered
     lowered = film.lower(shown, share, former, anew=whole)
     warnings = [*lowered.warnings, *remarks]
-    if rebuild.has_other_paths(former, lowered):
+    if has_other_paths(former, lowered):
         return _exchange(film, lowered), warnings
-    return rebuild.prepare(film.wavefront, lowered, refit=not whole), warnings
+    return prepare_rebuild(film.wavefront, lowered, refit=not whole), warnings
 
 
 def _another_integrator(
@@ -229,12 +234,12 @@ def _another_integrator(
     """Return the plan of another integrator; None if the form of the film stays."""
     former = film.wavefront.scene.lowered
     lowered = film.lower(film.scene, share, replace(former, integrator=integrator))
-    return _exchange(film, lowered) if rebuild.has_other_paths(former, lowered) else None
+    return _exchange(film, lowered) if has_other_paths(former, lowered) else None
 
 
 def _exchange(film: DeviceFilm, lowered: Lowered) -> Exchange:
-    """Return the plan of a new wavefront. Raises as `Wavefront.create` and `rebuild.refusal`."""
-    refused = rebuild.refusal(film.wavefront.scene.lowered, lowered)
+    """Return the plan of a new wavefront. Raises as `Wavefront.create`, or `refusal`."""
+    refused = refusal(film.wavefront.scene.lowered, lowered)
     if refused is not None:
         raise refused
     wavefront = film.create(lowered)

@@ -45,48 +45,6 @@ DIRECTIONS = 11  # first of the words with the directions of u and v, four for e
 Map: TypeAlias = NormalMap | BumpMap
 
 
-@dataclass(frozen=True)
-class NormalPerturbation:
-    """The maps around a leaf; inside: whether the maps are inside of a two-sided material."""
-
-    normal: NormalMap | None = None
-    bump: BumpMap | None = None
-    inside: bool = False
-
-    def within(self, outer: Any, inside: bool) -> NormalPerturbation:
-        """Return this with another map, of the kind that is missing."""
-        return dataclasses.replace(self, inside=inside, **{outer.slot: outer})
-
-    @property
-    def key(self) -> tuple[int, int, bool]:
-        """A key that is equal for perturbations by the same maps."""
-        return id(self.normal), id(self.bump), self.inside
-
-    def words(self, encoder: Encoder, leaf: Scatterer) -> Words:
-        """Append the textures, and return the NORMAL_MAP_WORDS words."""
-        words = np.zeros(NORMAL_MAP_WORDS, np.uint32)
-        flags = INSIDE if self.inside else 0
-        if self.normal is not None and self.normal.map is not None:
-            flags |= NORMAL | _flags(self.normal) | (ALONG_V if self.normal.along_v else 0)
-            words[1] = np.float32(self.normal.scale).view(np.uint32)
-            for i, channel in enumerate("rgb"):
-                image = _channel(self.normal.map, channel)
-                words[3 + 2 * i : 5 + 2 * i] = _real(image, encoder)
-        if self.bump is not None:
-            flags |= HEIGHT | _flags(self.bump)
-            words[2] = np.float32(self.bump.scale).view(np.uint32)
-            words[9:11] = _real(self.bump.height, encoder)
-        along = None if self.normal is None else self.normal.map
-        for i, value in enumerate((along, *(leaf.directing or (None, None)))):
-            placed = placed_in(value)
-            whole = i > 0 or flags & ALONG_V
-            words[DIRECTIONS + 4 * i : DIRECTIONS + 4 * i + 4] = _to_uv(placed if whole else None)
-            if placed is not None and placed.mapping == "uv1":
-                flags |= SECOND << i
-        words[0] = flags
-        return words
-
-
 def _to_uv(placed: Placed | None) -> Words:
     """Return the directions of a texture's u and v in its set of uv: 2 x 2 words, unit rows."""
     matrix = np.eye(2) if placed is None else placed.to_uv[:2, :2] / placed.to_uv[2, 2]
@@ -114,27 +72,54 @@ def _channel(texture: Bitmap, channel: str) -> Bitmap:
 class _Side:
     """A side of a surface, and the composites around the material in hand.
 
-    two_sided: the back of the surface is shaded like a front; inside: below a TwoSided;
-    perturbation: the maps around the material.
+    two_sided: the back of the surface is shaded like a front; inside: below a TwoSided; normal,
+    bump: the maps around the material; maps_inside: whether they are below a TwoSided.
     """
 
     front: bool
     two_sided: bool
     inside: bool = False
-    perturbation: NormalPerturbation = NormalPerturbation()
+    normal: NormalMap | None = None
+    bump: BumpMap | None = None
+    maps_inside: bool = False
 
     @property
     def key(self) -> tuple[Any, ...]:
         """A key that is equal for sides with the same shading."""
-        return self.front, self.two_sided, self.inside, self.perturbation.key
+        sides = self.front, self.two_sided, self.inside
+        return *sides, id(self.normal), id(self.bump), self.maps_inside
 
-    def within(self, outer: Scatterer) -> _Side:
+    def within(self, outer: Any) -> _Side:
         """Return the side for the material inside a two-sided material, or inside a map."""
-        perturbation = self.perturbation
-        if outer.perturbs_normals:
-            perturbation = perturbation.within(outer, self.inside)
         inside = self.inside or outer.two_sided
-        return dataclasses.replace(self, inside=inside, perturbation=perturbation)
+        if not outer.perturbs_normals:
+            return dataclasses.replace(self, inside=inside)
+        maps = {outer.slot: outer, "maps_inside": self.inside}
+        return dataclasses.replace(self, inside=inside, **maps)
+
+    def map_words(self, encoder: Encoder, leaf: Scatterer) -> Words:
+        """Append the textures of the maps, and return their NORMAL_MAP_WORDS words."""
+        words = np.zeros(NORMAL_MAP_WORDS, np.uint32)
+        flags = INSIDE if self.maps_inside else 0
+        if self.normal is not None and self.normal.map is not None:
+            flags |= NORMAL | _flags(self.normal) | (ALONG_V if self.normal.along_v else 0)
+            words[1] = np.float32(self.normal.scale).view(np.uint32)
+            for i, channel in enumerate("rgb"):
+                image = _channel(self.normal.map, channel)
+                words[3 + 2 * i : 5 + 2 * i] = _real(image, encoder)
+        if self.bump is not None:
+            flags |= HEIGHT | _flags(self.bump)
+            words[2] = np.float32(self.bump.scale).view(np.uint32)
+            words[9:11] = _real(self.bump.height, encoder)
+        along = None if self.normal is None else self.normal.map
+        for i, value in enumerate((along, *(leaf.directing or (None, None)))):
+            placed = placed_in(value)
+            whole = i > 0 or flags & ALONG_V
+            words[DIRECTIONS + 4 * i : DIRECTIONS + 4 * i + 4] = _to_uv(placed if whole else None)
+            if placed is not None and placed.mapping == "uv1":
+                flags |= SECOND << i
+        words[0] = flags
+        return words
 
 
 class MaterialWords:
@@ -213,7 +198,7 @@ class MaterialWords:
         return self._leaf(scatterer, side)
 
     def _leaf(self, material: Scatterer, side: _Side) -> int:
-        before = side.perturbation.words(self._encoder, material) if self._normal_mapped else None
+        before = side.map_words(self._encoder, material) if self._normal_mapped else None
         if self.gloss_before:
             maps = () if before is None else before
             before = np.array([gloss_word(material), *maps], np.uint32)

@@ -10,12 +10,10 @@ import numpy as np
 
 from clpt.arrays import Words
 from clpt.render.materials import thin_films
-from clpt.render.records.lowering_cache import LoweringCache
 from clpt.render.records.materials import LAYERS_WORDS, ORDERS_WORDS, Sources, words
-from clpt.render.records.tables import TableStore, as_words
+from clpt.render.records.tables import LoweringCache, TableStore, as_words
 from clpt.render.spectra.encode import SpectraTable
-from clpt.render.spectra.find import Density
-from clpt.render.spectra.look import Look
+from clpt.render.spectra.find import Density, Look
 from clpt.render.textures.bitmaps import Images
 from clpt.render.textures.encode import TextureTable
 from clpt.scene import roles

@@ -13,7 +13,7 @@ from clpt.arrays import Words
 from clpt.records import MEDIUM_BITS
 from clpt.render.lights.bodies import BodyLight, BrickLights, black_bodies, brick_counts
 from clpt.render.lights.bounds import Bounds
-from clpt.render.lights.encode import LightRows
+from clpt.render.lights.find import Sources
 from clpt.render.materials.encode import MaterialWords
 from clpt.render.materials.encoder import Encoder
 from clpt.render.media import grids
@@ -33,7 +33,7 @@ SODIUM = 589.3  # [nm] handbooks give indices for this wavelength
 WIDEST_CONE = 1.4  # [rad] a lamp of a larger half angle counts as having no cone
 
 
-def medium_aims(lights: LightRows) -> NDArray[np.float32]:
+def medium_aims(sources: Sources) -> NDArray[np.float32]:
     """Return the points of lamps near which flights through media may end (equiangular sampling).
 
     (n, 4) float32: x, y, z [m], and the cumulative share of the power. n is 0, 1 or MOST_AIMS, so
@@ -41,10 +41,9 @@ def medium_aims(lights: LightRows) -> NDArray[np.float32]:
     its middle. Where some of them shine into a cone, as many rows follow: the cone's axis and the
     cosine of its half angle, -1 without a cone.
     """
-    points, powers, cones, row = [], [], [], 0
-    for bounds in lights.bounds:
-        power = lights.power[row : row + len(bounds)]
-        row += len(bounds)
+    points, powers, cones = [], [], []
+    for source in sources.every:
+        bounds, power = source.bounds, source.power
         if bounds.placed.all() and power.sum() > 0.0:
             points.append(np.average((bounds.low + bounds.high) / 2.0, axis=0, weights=power))
             powers.append(power.sum())

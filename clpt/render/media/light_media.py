@@ -21,7 +21,7 @@ from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights.find import Sources, row_order
 from clpt.render.media.bodies import BodyWords, matter_of
 from clpt.render.media.encode import MediumWords
-from clpt.render.records.lowering_cache import LoweringCache
+from clpt.render.records.tables import LoweringCache
 from clpt.render.scene_index import SceneIndex
 from clpt.scene.media import Medium
 from clpt.scene.motion import Deformation, Keys

@@ -21,7 +21,7 @@ _PINHOLE = {
     "far": _FAR,
 }
 
-WEIGHTED = ("lens", "rays")  # cameras whose rays have weights
+WEIGHTED = ("lens", "rays", "calibrated")  # cameras whose rays have weights
 GHOST_CELLS = 1024  # of equal probability; a cell gives a pair of reflecting surfaces
 
 RECORDS: dict[str, Record] = {
@@ -81,6 +81,14 @@ RECORDS: dict[str, Record] = {
         rows=("integer", "of the film"),
         count=("integer", "of rays"),
         list=("integer", "the list's first word, from columns on"),
+    ),
+    "calibrated": Record(
+        "CalibratedCamera",
+        "Directions of the pixels' corners, which follow.",
+        to_world=_TO_WORLD,
+        columns=("integer", "of the film"),
+        rows=("integer", "of the film"),
+        directions=("integer", "the first word of the corners, row by row, from to_world on"),
     ),
 }
 

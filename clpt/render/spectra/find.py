@@ -1,14 +1,16 @@
-"""The density of sampled wavelengths, over the range of the film's response.
+"""The density of sampled wavelengths over the range of the film's response, and looks of lights.
 
 Visible importance, in closed form, suits smooth lights and the sensor of an eye. For line spectra,
 sensors beyond the visible range and films with bands a density is tabulated from the sensor and the
 scene's lights. All densities are unbiased; they differ in noise.
+
+A look is the importance of lights to a film, from their spectra or their colours.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,14 +18,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt import spectra
 from clpt.arrays import Floats
+from clpt.files import budget
 from clpt.images import spectral_exr
 from clpt.records import DENSITY_SIZES
 from clpt.render.film.colour import sensor
+from clpt.render.records.tables import LoweringCache
 from clpt.render.scene_index import SceneIndex
-from clpt.scene.integrators import Film
+from clpt.scene import Film
 from clpt.scene.materials import Material, parts
 from clpt.scene.params import fields_of, params
 from clpt.scene.roles import EMISSION
+from clpt.scene.textures import Bitmap
 from clpt.scene.values import is_texture
 from clpt.spectra import RGB, RGBIlluminant, Spectrum
 from clpt.spectra.reradiation import Reradiation
@@ -128,6 +133,7 @@ def _second_moment(density: Density, nodes: Floats, light: Floats) -> float:
 
 def _integral(values: Floats, nodes: Floats) -> float:
     """Return the integral of a function that is linear between nodes."""
+    budget.check_time()
     return float(((values[1:] + values[:-1]) / 2.0) @ np.diff(nodes))
 
 
@@ -191,3 +197,56 @@ def _mean(image: object, where: str) -> Spectrum:
     if spectra_of is None:
         return d65()
     return spectra_of.spectrum(np.nan_to_num(spectra_of.values.mean(axis=(0, 1), dtype=np.float64)))
+
+
+UNSEEN = 0.1  # factor of mean power in the film's range, beside the mean of the colour
+LOOK_STEP = 1.0  # approximate distance of the wavelengths of that mean [nm]
+
+
+@dataclass(frozen=True)
+class Look:
+    """The weights of lights for a film.
+
+    spectral: by spectra from lo to hi [nm], or else by colours; cache: of costly results; unseen:
+    factor of the mean power in that range, which also counts light without a visible colour.
+    """
+
+    spectral: bool
+    lo: float
+    hi: float
+    cache: LoweringCache = field(default_factory=LoweringCache)
+    unseen: float = UNSEEN
+
+    @classmethod
+    def of(cls, film: Film, cache: LoweringCache | None = None) -> Look:
+        """Return the look of a film; with bands or a sensor, all wavelengths count equally."""
+        unseen = 1.0 if film.bands or film.sensor != "cie1931" else UNSEEN
+        range_ = film.lambda_min, film.lambda_max
+        return cls(film.mode == "spectral", *range_, cache or LoweringCache(), unseen)
+
+    @property
+    def grid(self) -> Floats:
+        """The wavelengths (n,) of the mean power, evenly spaced from lo to hi [nm]."""
+        return np.linspace(self.lo, self.hi, max(round((self.hi - self.lo) / LOOK_STEP), 1) + 1)
+
+    def brightness(self, light: Spectrum) -> float:
+        """Return the weight of an emission: the mean of its colour plus its mean in the range.
+
+        The second term samples invisible light that a sensor or a dye may absorb: paint that glows
+        under an ultraviolet lamp, a film with bands in the infrared.
+        """
+        seen = float(np.mean(light.to_rgb("emission")))
+        if not self.spectral:
+            return seen
+        return seen + self.unseen * max(float(gridded(light, self.grid).mean()), 0.0)
+
+    def levels(self, image: Bitmap) -> Floats:
+        """Return the weights of the texels of an emission (h, w), top row first."""
+        seen = np.maximum(image.pixels(EMISSION), 0.0).mean(axis=2, dtype=np.float64)
+        spectra = image.spectral(EMISSION) if self.spectral else None
+        if spectra is None:
+            return seen * (1.0 + self.unseen * self.spectral)
+        within = (spectra.lambdas >= self.lo) & (spectra.lambdas <= self.hi)
+        power = np.maximum(spectra.values[..., within], 0.0)
+        beyond = power.mean(axis=2, dtype=np.float64) if within.any() else 0.0
+        return np.asarray(seen + self.unseen * beyond)

@@ -26,8 +26,7 @@ from clpt.errors import SceneError
 from clpt.files import budget
 from clpt.images import Stored
 from clpt.images.stored import checked
-from clpt.render.records.lowering_cache import LoweringCache, version
-from clpt.render.records.tables import TableStore
+from clpt.render.records.tables import LoweringCache, TableStore, version
 from clpt.render.records.textures import KINDS, MIPS
 from clpt.render.textures.texels import texels
 from clpt.scene.pixels import channel, image_file
@@ -246,6 +245,7 @@ class Images:
 
         curved: the bytes are encoded; packs: they stay bytes.
         """
+        budget.check_time()
         texture, role, size = image.texture, image.role, values.shape[:2]
         if role is REAL and packs:
             number = "rgba".find(texture.channel) if values.shape[2] > 1 else 0
@@ -358,6 +358,7 @@ def _halved(values: NDArray[Any], curved: bool, times: int) -> NDArray[Any]:
     """Return means of 2x2 texels of linear light, `times` over; bytes become bytes again."""
     linear = Stored(values, curved).decoded()
     for _ in range(times):
+        budget.check_time()
         odd = [(0, n % 2 if n > 1 else 0) for n in linear.shape[:2]]
         linear = np.pad(linear, (*odd, (0, 0)), "edge")
         linear = linear if linear.shape[0] == 1 else 0.5 * (linear[0::2] + linear[1::2])
@@ -390,7 +391,12 @@ def _means(values: NDArray[Any], count: int) -> NDArray[Any]:
     if n == count:
         return values
     if n == 2 * count:
-        return 0.5 * (values[0::2] + values[1::2])
+        means = np.empty((count, *values.shape[1:]), values.dtype)
+        rows = max(CHUNK // max(values[0].size, 1), 1)
+        for first in budget.steps(range(0, count, rows)):
+            part = slice(first, first + rows)
+            means[part] = 0.5 * (values[0::2][part] + values[1::2][part])
+        return means
     edges = np.arange(count + 1) * (n / count)
     sums = np.concatenate([np.zeros_like(values[:1], np.float64), values.cumsum(0, np.float64)])
     below = np.minimum(edges.astype(int), n - 1)
@@ -432,19 +438,24 @@ class _Spectra:
         """Return two words for each colour of `_codes`, (2 n,)."""
         parts = np.split(codes, range(CHUNK, len(codes), CHUNK))
         self._add_rows(parts)
-        for part in parts:
+        for part in budget.steps(parts):
             at = self._at(part)
             self.states[at[self.states[at] == UNKNOWN]] = NEW
-        new = np.flatnonzero(self.states == NEW)
-        colours = self.runs[new // RUN] * np.uint32(RUN) + (new % RUN).astype(np.uint32)
-        channels = np.stack([colours & 255, colours >> 8 & 255, colours >> 16], axis=1)
-        packed = pack(spectra.uplift(_meaning(curved)[channels]))
-        self.words[new] = packed.view(np.uint64).reshape(-1)
-        self.states[new] = PACKED
+        self._pack(np.flatnonzero(self.states == NEW), curved)
         words = np.empty(len(codes), np.uint64)
-        for first, part in zip(range(0, len(codes), CHUNK), parts, strict=True):
+        for first, part in zip(range(0, len(codes), CHUNK), budget.steps(parts), strict=True):
             words[first : first + CHUNK] = self.words[self._at(part)]
         return words.view(np.uint32)
+
+    def _pack(self, new: NDArray[np.intp], curved: bool) -> None:
+        """Pack the spectra of new colours (n), by their indices in `states`."""
+        meaning = _meaning(curved)
+        for first in range(0, len(new), CHUNK):
+            at = new[first : first + CHUNK]
+            colours = self.runs[at // RUN] * np.uint32(RUN) + (at % RUN).astype(np.uint32)
+            channels = np.stack([colours & 255, colours >> 8 & 255, colours >> 16], axis=1)
+            self.words[at] = pack(spectra.uplift(meaning[channels])).view(np.uint64).reshape(-1)
+            self.states[at] = PACKED
 
     def _at(self, codes: Words) -> Words:
         """Return the indices of colours in `states` and `words`; their runs must have rows."""

@@ -37,16 +37,12 @@ from clpt.scene.params import params
 from clpt.scene.roles import EMISSION, FACTOR, INDEX, REAL, REFLECTANCE, Role, Spectral
 from clpt.scene.textures import (
     MAPPINGS,
-    PATTERNS,
     SECOND_UV,
     WRAPS,
     Bitmap,
     Checkerboard,
-    Checkers,
-    Dots,
     Marble,
     MeshAttribute,
-    Noise,
     Placed,
     Solid,
 )
@@ -167,7 +163,8 @@ class TextureTable:
             words, depth = program(texture, role, self)
             self.depth = max(self.depth, depth)
             return self.store.append("textures", [PROGRAM, *words])
-        return APPENDERS[type(texture)](texture, role, self)
+        append = APPENDERS.get(type(texture), _plain)
+        return append(texture, role, self)
 
     def append_leaf(self, texture: Texture, role: Role, **members: Any) -> int:
         """Append the row of a texture other than an image; return its first word."""
@@ -179,6 +176,13 @@ class TextureTable:
         self.store.append("images", np.zeros(4, np.uint32))
         self.append_row("spectral_bitmap", {"kind": 0, "width": 1, "height": 1})
         self.store.append("textures", PERMUTATION)
+
+
+def _place(texture: Any, table: TextureTable) -> dict[str, Any]:
+    """Return the members of a row about where the texture's pattern lies."""
+    if texture.fills == "space":
+        return {"transform": _transform(texture, table)}
+    return _uv(texture, table) if texture.fills == "uv" else {}
 
 
 def _uv(texture: Placed, table: TextureTable, down: bool = False) -> dict[str, Any]:
@@ -207,7 +211,7 @@ def _transform(texture: Placed | Solid, table: TextureTable) -> int:
 
 
 def _checkerboard(texture: Checkerboard, role: Role, table: TextureTable) -> int:
-    members = _uv(texture, table)
+    members = _place(texture, table)
     colours: dict[str, Any] = {"color0": texture.color0, "color1": texture.color1}
     for name, value in colours.items():
         if role is REAL:
@@ -257,25 +261,6 @@ def _mesh_attribute(texture: MeshAttribute, role: Role, table: TextureTable) -> 
     return table.append_leaf(texture, role, number=number, per_face=per_face(texture.name))
 
 
-def _dots(texture: Dots, role: Role, table: TextureTable) -> int:
-    return table.append_leaf(texture, role, **_uv(texture, table))
-
-
-def _checkers(texture: Checkers, role: Role, table: TextureTable) -> int:
-    return table.append_leaf(texture, role, transform=_transform(texture, table))
-
-
-def _noise(texture: Noise, role: Role, table: TextureTable) -> int:
-    return table.append_leaf(
-        texture,
-        role,
-        transform=_transform(texture, table),
-        pattern=PATTERNS.index(texture.pattern),
-        octaves=texture.octaves,
-        roughness=texture.roughness,
-    )
-
-
 def _marble(texture: Marble, role: Role, table: TextureTable) -> int:
     if role is REAL:
         words = np.zeros((len(MARBLE), SPECTRUM_WORDS), np.float32)
@@ -283,26 +268,21 @@ def _marble(texture: Marble, role: Role, table: TextureTable) -> int:
     else:
         colours = [table.spectra.words(RGB(*rgb), REFLECTANCE)[0] for rgb in MARBLE]
         words = np.array(colours).view(np.float32)
-    return table.append_leaf(
-        texture,
-        role,
-        transform=_transform(texture, table),
-        colours=table.store.append("textures", words.view(np.uint32)),
-        octaves=texture.octaves,
-        roughness=texture.roughness,
-        scale=texture.scale,
-        variation=texture.variation,
-    )
+    members = {**_place(texture, table), **texture.record_members()}
+    first = table.store.append("textures", words.view(np.uint32))
+    return table.append_leaf(texture, role, colours=first, **members)
 
 
-# functions that append the row of a kind that combines no others
+def _plain(texture: Texture, role: Role, table: TextureTable) -> int:
+    """Append the row of a texture whose members are numbers."""
+    return table.append_leaf(texture, role, **_place(texture, table), **texture.record_members())
+
+
+# functions that append the row of a kind with images, attributes or colours
 APPENDERS: dict[type[Texture], Callable[..., int]] = {
     Bitmap: _bitmap,
     Checkerboard: _checkerboard,
     MeshAttribute: _mesh_attribute,
-    Dots: _dots,
-    Checkers: _checkers,
-    Noise: _noise,
     Marble: _marble,
 }
 

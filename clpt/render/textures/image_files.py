@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from clpt.errors import SceneError
-from clpt.render.records.lowering_cache import version
+from clpt.render.records.tables import version
 from clpt.scene.fingerprint import file_digest
 
 

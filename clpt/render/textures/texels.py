@@ -9,6 +9,7 @@ import numpy as np
 from clpt import spectra
 from clpt.arrays import Floats32
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.images.spectral_exr import SpectralImage
 from clpt.scene.roles import REAL, REFLECTANCE, Role
 from clpt.spectra import Tabulated
@@ -21,6 +22,7 @@ def texels(image: Floats32, role: Role, spectral: bool) -> Floats32:
 
     (h * w, 4): rgb, or sigmoid coefficients and a factor where `spectral`; (h * w,) for REAL.
     """
+    budget.check_time()
     if role is REAL:
         return image.reshape(-1)
     colours = np.broadcast_to(image, (*image.shape[:2], 3)).reshape(-1, 3)

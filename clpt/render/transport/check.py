@@ -8,7 +8,7 @@ from clpt.errors import SceneError
 from clpt.geometry import shapes
 from clpt.render.geometry.find import assembled
 from clpt.render.media import light_media
-from clpt.render.records.lowering_cache import LoweringCache
+from clpt.render.records.tables import LoweringCache
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import Scene
 from clpt.scene.cameras import CONNECTED

@@ -21,10 +21,10 @@ from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
 from clpt.render.lights.aims import is_sharp, sharp_pieces
 from clpt.render.lights.find import Sources, environment_of
-from clpt.render.records.lowering_cache import LoweringCache
+from clpt.render.records.tables import LoweringCache
 from clpt.render.scene_index import SceneIndex
-from clpt.render.spectra.look import Look
-from clpt.render.transport import guides
+from clpt.render.spectra.find import Look
+from clpt.render.transport import light_caches
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Integrator, Path, Vcm, shared
 from clpt.scene.shapes import Shape
@@ -117,7 +117,7 @@ def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]
     plain = [path] if finds and chosen.light_paths else []
     several = chosen.max_depth < 0 or chosen.max_depth > 2
     can_guide = several and index.lights_reach
-    guide = replace(path, guiding=True, guide_paths=guides.paths_for(samples))
+    guide = replace(path, guiding=True, guide_paths=light_caches.guide_paths_for(samples))
     guided = [guide] if can_guide else []
     return (chosen, *plain, *guided) if plain or guided else ()
 

@@ -8,36 +8,32 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-import pyopencl as cl
-from numpy.typing import NDArray
 
 from clpt import device
 from clpt.device.stream import Timings
 from clpt.render.flow import bounce, programs, signatures
 from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.records import Features
-from clpt.render.wavefront import strategy
+from clpt.render.wavefront import launches, strategy
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.path_buffers import GROUP, PathBuffers, queue_steps
 from clpt.render.wavefront.strategy import Strategy
 
 BATCH = 8  # bounces that are enqueued between two reads of the counters
 CORE_BOUNCES = 1 << 16  # bounces of all slots in a launch of the loop, for each core
-LEAST_LAUNCH = 1 / 2  # of the usual launch: shorter launches cost too much
-LAUNCHES = 3  # launches that a run waits for, about, before it ends
-LOOP_SECONDS = 0.5  # of a launch of the loop at most, unless a single bounce takes longer
 LAUNCH_SECONDS = 0.05  # of a stage at most: drivers of GPUs that draw a screen end long kernels
+FINISH_SECONDS = 1.0  # from a request to stop until paths in flight are abandoned
 FIRST_PARTS = 8  # launches of a stage before the time of a launch is known
 LEAST_ITEMS = 1 << 12  # of a part
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
-IDLE = {"samples": (0, 0), "bounces": 0, "restart": 0, "leave": None}  # has nothing to do
+IDLE = {"samples": (0, 0), "begin": 0, "bounces": 0, "restart": 0, "leave": None}  # nothing to do
 
-OnCounters = Callable[[NDArray[np.uint64]], bool]  # returns whether a run goes on
+OnBatch = Callable[[Any], bool]  # called with counters; returns whether a run goes on
 
 
 @dataclass(frozen=True)
@@ -58,30 +54,29 @@ class Step:
             yield first, min(most, items - first)
 
 
-def next_bounces(bounces: int, took: float, most: int, cancel_seconds: float | None) -> int:
-    """Return the bounces of the next launch of a loop, after a launch of `bounces`.
+class HasArguments(Protocol):
+    """An owner of buffers."""
 
-    took: the time of that launch [s]; most: for the device; cancel_seconds: the longest time from a
-    request to stop to the end of the run [s], or None. A launch takes LOOP_SECONDS at most, unless
-    a single bounce of all slots takes longer: the host looks at limits and signals between.
-    """
-    rate, wanted = bounces / max(took, 1e-6), most
-    if cancel_seconds is not None:
-        fitting = max(int(rate * cancel_seconds / LAUNCHES), bounces // 2)  # others take time too
-        wanted = max(min(fitting, most), math.ceil(most * LEAST_LAUNCH))
-    return max(1, min(wanted, 2 * bounces, int(rate * LOOP_SECONDS)))
+    @property
+    def arguments(self) -> Mapping[str, Any]:
+        """The arguments of kernels by name."""
 
 
 class Kernels:
     """Programs of a device by name, and their kernels with the arguments that they all share.
 
-    arguments: returns the arguments by name. seconds: of building.
+    owners: of buffers, each with `arguments` by name. seconds: of building.
     """
 
-    def __init__(self, on: device.Device, arguments: Callable[[], dict[str, Any]]):
-        self.device, self.arguments = on, arguments
+    def __init__(self, on: device.Device, owners: Sequence[HasArguments]):
+        self.device, self._owners = on, owners
         self.programs: dict[str, device.Program] = {}
         self.seconds = 0.0
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The present arguments of all owners by name."""
+        return {name: value for owner in self._owners for name, value in owner.arguments.items()}
 
     def build(self, texts: dict[str, device.Source]) -> None:
         """Build those programs that are not built yet."""
@@ -100,7 +95,7 @@ class Kernels:
     def bind(self, program: str, name: str, **more: object) -> device.BoundKernel:
         """Return a kernel of a program with its arguments, by the names in its signature."""
         kernel = self.programs[program].kernel(name)
-        arguments = {**self.arguments(), **more}
+        arguments = {**self.arguments, **more}
         return kernel.bind(**{a.name: arguments[a.name] for a in kernel.arguments})
 
 
@@ -109,10 +104,12 @@ class Ending:
     """The end of a stopped run of a bounce loop.
 
     leave: a flag; if it is raised the run may abandon paths in flight, where the device runs the
-    loop, and on_batch must raise; None: the run completes its paths. seconds: the longest time to
-    the end [s]; None: the default of the device.
+    loop, and on_batch must raise; None: the run completes its paths. pause: a flag of the loop,
+    which ends launches that take too long. seconds: the longest time to the end [s]; None: the
+    default of the device.
     """
 
+    pause: device.Flag
     leave: device.Flag | None = None
     seconds: float | None = None
 
@@ -136,7 +133,7 @@ class BounceLoop:
         self.kernels, self.scene, self.paths, self.timings = kernels, scene, paths, timings
         self.device, self.stream, self.looped = scene.device, scene.stream, looped
         self.lanes = self.device.lanes
-        self._which, self._leave = which, ending.leave
+        self._which, self._ending = which, ending
         self._first = 0  # the first path of the last run
         self.is_last = which == len(scene.lowered.features.passes) - 1
         self.per_sample = 1 if self.is_last else float(scene.lowered.settings["light_paths"]) or 1
@@ -144,9 +141,9 @@ class BounceLoop:
         self._share = strategy.loop_share(self.device)
         self._stages: list[Step] | None = None
         self._loop: device.BoundKernel | None = None
-        self._cancel_seconds = ending.seconds
-        self._bounces = 1  # of a launch of the loop; `_adjust` doubles it while launches are short
-        self._parts = FIRST_PARTS
+        self._size = launches.first_size(self._share, self.lanes)  # of the next launch of the loop
+        self._begin = 0  # the first slot of that launch
+        self._parts, self._batch_bounces = FIRST_PARTS, BATCH
 
     @property
     def features(self) -> Features:
@@ -197,11 +194,12 @@ class BounceLoop:
     def enqueue(self, first: int, end: int) -> None:
         """Enqueue the paths of samples first to end - 1 of every pixel; wait for nothing."""
         samples = np.array(self.numbers(first, end), np.int32)
-        self.loop.set_args(samples=samples, bounces=ENDLESS, restart=1, leave=None)
-        event = self.stream.run(self.loop, *self._loop_sizes())
+        whole = {"share": self._share, "begin": 0, "bounces": ENDLESS}
+        self.loop.set_args(samples=samples, restart=1, leave=None, **whole)
+        event = self.stream.run(self.loop, (self._items,), self._group)
         self.timings.add(f"{self._label}loop", event)
 
-    def run(self, first: int, end: int, on_batch: OnCounters) -> bool:
+    def run(self, first: int, end: int, on_batch: OnBatch) -> bool:
         """Trace the paths of samples first to end - 1 of every pixel, and wait.
 
         on_batch is called every few iterations with the counters; if it returns False, every path
@@ -212,59 +210,79 @@ class BounceLoop:
         numbers = self.numbers(first, end)
         self._first = numbers[0]
         self.paths.restart()
-        leave = None if self._leave is None or first == end else self._leave.argument
-        return self._go_on(numbers, leave, on_batch)
+        if first < end:
+            return self._go_on(numbers, self._ending.leave or self._ending.pause, on_batch)
+        size = self._size  # launches with nothing to do are no measure of others
+        self._size, self._begin = launches.Size(self._share, 1), 0
+        finished = self._go_on(numbers, self._ending.pause, on_batch)
+        self._size, self._begin = size, 0
+        return finished
 
     def finish(self) -> None:
         """Bring every path in flight to its end, wherever `run` was interrupted; wait for it."""
-        self._go_on((self._first, self._first), None, lambda _: True)
+        self._ending.pause.lower()
+        self._go_on((self._first, self._first), self._ending.pause, lambda _: False)
 
-    def _go_on(
-        self,
-        numbers: tuple[int, int],
-        leave: object,
-        on_batch: OnCounters,
-    ) -> bool:
-        """Trace paths of these numbers until none is in flight; see `run`."""
-        steps = self._batch()
-        begin = steps[0].bound
+    def _go_on(self, numbers: tuple[int, int], leave: device.Flag, on_batch: OnBatch) -> bool:
+        """Trace paths of these numbers until none is in flight; see `run`.
+
+        leave: is raised for a moment if a launch takes too long.
+        """
+        begin = self.loop if self.looped else self.stages[0].bound
         begin.set_args(samples=numbers)
         if self.looped:
-            begin.set_args(bounces=self._bounces, restart=0, leave=leave)
-        finished = True
-        reads: deque[tuple[NDArray[np.uint64], cl.Event]] = deque()
+            begin.set_args(restart=0, leave=leave.argument)
+        stopped = math.inf  # when the run was told to stop [s]
+        reads: launches.Reads = deque()
         before = time.perf_counter()
         while True:
-            for step in steps:
-                self._launch(step)
+            self._enqueue_batch()
             reads.append(self.paths.read_counters())
             self.stream.flush()
             if len(reads) < 2:
                 continue
-            counters, event = reads.popleft()
-            device.wait(event)
+            counters, was_cut = launches.wait(reads, leave)
             try:
                 goes_on = on_batch(counters)
             except BaseException:
                 for _, later in reads:
                     device.wait(later)
                 raise
-            if not goes_on and finished:
+            if not goes_on and stopped == math.inf:
                 begin.set_args(samples=(numbers[0], numbers[0]))
-                finished = False
+                stopped = time.perf_counter()
             if counters[0] >= self.paths.slots:
                 break
             before, took = time.perf_counter(), time.perf_counter() - before
-            self._adjust(begin, took)
+            if before - stopped > FINISH_SECONDS:
+                self.paths.abandon()
+                stopped = before
+            self._adjust(took, was_cut)
         for _, event in reads:
             device.wait(event)
-        return finished
+        return stopped == math.inf
 
-    def _launch(self, step: Step) -> None:
-        """Enqueue a step; a stage in several launches if a single launch would take too long."""
-        for first, items in step.parts(1 if self.looped else self._parts):
-            event = self.stream.run(step.bound, (items,), step.group, (first,) if first else None)
-            self.timings.add(step.name, event)
+    def _enqueue_batch(self) -> None:
+        """Enqueue the launches between two reads of the counters."""
+        if self.looped:
+            self._launch_loop()
+            return
+        for step in self.stages * self._batch_bounces:
+            for first, items in step.parts(self._parts):
+                offset = (first,) if first else None
+                event = self.stream.run(step.bound, (items,), step.group, offset)
+                self.timings.add(step.name, event)
+
+    def _launch_loop(self) -> None:
+        """Enqueue a launch of the loop over the next part of the slots."""
+        size, begin = self._size, self._begin
+        self.loop.set_args(share=size.share, begin=begin, bounces=size.bounces)
+        items = min(self._items, -(-(self.paths.slots - begin) // size.share))
+        event = self.stream.run(self.loop, (items,), self._group)
+        self.timings.add(f"{self._label}loop", event)
+        self._begin = begin + items * size.share
+        if self._begin >= self.paths.slots:
+            self._begin = 0
 
     def _own(self, lowered: Lowered) -> Features:
         return lowered.features.passes[self._which]
@@ -304,34 +322,37 @@ class BounceLoop:
         known = {"loop": signatures.loop_arguments(features, layout)}
         return device.link(self.device, texts, "loop", known)
 
-    def _batch(self) -> list[Step]:
-        """Return the steps that `run` enqueues between two reads of the counters."""
-        if self.looped:
-            return [Step(f"{self._label}loop", self.loop, *self._loop_sizes())]
-        return self.stages * BATCH
+    def _adjust(self, took: float, was_cut: bool) -> None:
+        """Adjust the length of launches.
 
-    def _adjust(self, loop: device.BoundKernel, took: float) -> None:
-        """Adjust the length of launches; took: the time between two reads of counters [s].
-
-        A launch of the loop must let a run end in time, and look at its limits. A launch of a stage
-        must be too short for a driver to end it.
+        took: the time between two reads of counters [s]; was_cut: see `launches.wait`. A launch of
+        the loop must let a run end in time, and look at its limits. A launch of a stage must be too
+        short for a driver to end it.
         """
         if not self.looped:  # a single stage may take all of a bounce
-            self._parts = max(1, math.ceil(took / BATCH / LAUNCH_SECONDS))
+            bounce = took / self._batch_bounces
+            self._parts = max(1, math.ceil(bounce / LAUNCH_SECONDS))
+            self._batch_bounces = max(1, min(BATCH, int(launches.LOOP_SECONDS / bounce)))
             return
-        most = self._most_bounces()
-        self._bounces = next_bounces(self._bounces, took, most, self._cancel_seconds)
-        loop.set_args(bounces=self._bounces)
+        limits = launches.Limits(
+            self._share, self.lanes, self._most_bounces(), self._ending.seconds
+        )
+        self._size = launches.next_size(self._size, took, limits, self._begin == 0, was_cut)
 
     def _most_bounces(self) -> int:
         """Bounces of a loop between two reads of the counters: some hundredths of a second."""
         info, slots = self.device.info, self.paths.slots
         return max(BATCH, CORE_BOUNCES * info.compute_units // slots) if info.is_cpu else BATCH
 
-    def _loop_sizes(self) -> tuple[tuple[int], tuple[int]]:
-        """Return the numbers of work-items of the loop that serve all slots, and of a group."""
-        items = -(-self.paths.slots // self._share)
-        return (items,), (1 if self._share > self.lanes else GROUP,)
+    @property
+    def _items(self) -> int:
+        """The number of work-items of the loop that serve all slots."""
+        return -(-self.paths.slots // self._share)
+
+    @property
+    def _group(self) -> tuple[int]:
+        """The number of work-items of a group of the loop."""
+        return (1 if self._share > self.lanes else GROUP,)
 
     def _sizes(self, lanes: int) -> tuple[tuple[int], tuple[int]]:
         """Return the numbers of work-items that serve all slots, `lanes` each, and of a group."""

@@ -35,6 +35,11 @@ WORDS = sum(record.step for record in SLABS) + 2  # of a slot, with the words of
 LARGEST = max(record.step for record in SLABS)
 
 
+def path_word(name: str) -> int:
+    """Return the first word of a member of `PATH`."""
+    return next(m.word for m in PATH.members if m.name == name)
+
+
 def queue_sizes(slots: int, kinds: int, queued: bool) -> dict[str, int]:
     """Return the words of each buffer: a queue for every kind, or a single queue for the loop.
 
@@ -201,9 +206,29 @@ class PathBuffers:
 
     def restart(self) -> None:
         """Enqueue that every slot begins its list of pixels again."""
-        word = next(m.word for m in PATH.members if m.name == "state")
-        self.stream.fill_rows(self._fixed["path_words"], FRESH, self.rows(PATH, word))
+        self.stream.fill_rows(self._fixed["path_words"], FRESH, self.rows(PATH, path_word("state")))
         self.stream.fill(self._fixed["counters"], 0, 0, 8)
+
+    def abandon(self) -> None:
+        """Let every path in flight end where it is, with the light that it has; wait.
+
+        Its sample counts as rejected. The film itself counts light that is not finite.
+        """
+        states, light = self._read_words("state"), self._read_words("radiance").view(np.float32)
+        ends = states & PATH_BITS["alive"] != 0
+        states &= ~np.uint32(PATH_BITS["alive"])
+        rows = self.rows(PATH, path_word("state"))
+        self.stream.write_rows(self._fixed["path_words"], states, rows)
+        counters, event = self.read_counters()
+        device.wait(event)
+        counters[COUNTERS.index("rejected")] += np.count_nonzero(ends & np.isfinite(light))
+        self.stream.write(self._fixed["counters"], counters)
+
+    def _read_words(self, name: str) -> NDArray[np.uint32]:
+        """Wait and return the first word of a member of `PATH` of each slot, (slots,)."""
+        rows = self.rows(PATH, path_word(name))
+        words = np.zeros(self.slots, np.uint32)
+        return self.stream.read_rows(self._fixed["path_words"], words, rows)
 
     def rows(self, record: Record, word: int) -> device.Rows:
         """Where a slab has a word of all slots that hold paths."""

@@ -11,7 +11,8 @@ from typing import Literal
 import pyopencl as cl
 
 from clpt.arrays import Integers
-from clpt.render.wavefront.wavefront import OnBatch, Wavefront
+from clpt.render.wavefront.bounce_loop import OnBatch
+from clpt.render.wavefront.wavefront import Wavefront
 
 # Paths of all kinds and pixels, paths from the camera, light paths, or light paths that leave the
 # picture unchanged.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,12 +24,11 @@ from clpt.render.flow import programs
 from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.records import Features
 from clpt.render.wavefront import strategy
-from clpt.render.wavefront.bounce_loop import BounceLoop, Ending, Kernels, OnCounters, Step
+from clpt.render.wavefront.bounce_loop import BounceLoop, Ending, Kernels, OnBatch, Step
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.film import Film
-from clpt.render.wavefront.guide import Guide
+from clpt.render.wavefront.light_caches import Guide, Photons
 from clpt.render.wavefront.path_buffers import COUNTERS, PathBuffers, divide_film
-from clpt.render.wavefront.photons import Photons
 from clpt.render.wavefront.strategy import UNTUNED, Strategy, Tuning
 
 log = logging.getLogger(__name__)
@@ -61,9 +60,6 @@ class Counts:
         return Counts(**{name: value + vars(other)[name] for name, value in vars(self).items()})
 
 
-OnBatch = Callable[[Any], bool]  # returns whether a run goes on
-
-
 class Wavefront:
     """A film of a scene on a device, and `render_samples`, which runs the bounce loop.
 
@@ -88,22 +84,16 @@ class Wavefront:
         photons = Photons(self.stream, self.buffers, paths.settings) if merged else None
         guide = Guide(self.stream, paths) if guided else None
         self.photons, self.guide = photons, guide
-        learned = (photons.arguments if photons else {}) | (guide.arguments if guide else {})
-        # The function has no reference to this wavefront: memory is freed without a collector.
-        self.kernels = Kernels(
-            self.device,
-            lambda: {
-                **scene.arguments, **paths.arguments, **film.arguments, **learned
-            },
-        )  # fmt: skip
-        self.leave = device.Flag(self.device)
+        stores = [store for store in (photons, guide) if store is not None]
+        self.kernels = Kernels(self.device, (scene, paths, film, *stores))
+        self.leave, pause = device.Flag(self.device), device.Flag(self.device)
         self.begun = False
         self._in_flight: BounceLoop | None = None  # whose paths may not have ended
         self._counted = np.zeros(len(COUNTERS), np.uint64), Counts()  # read last, and what it gives
         self.loops = [
             BounceLoop(
                 self.kernels, scene, paths, self.timings, looped, which,
-                Ending(None if guide and which == 0 else self.leave, tuning.cancel_seconds),
+                Ending(pause, None if guide and which == 0 else self.leave, tuning.cancel_seconds),
             )
             for which in range(len(features.passes))
         ]  # fmt: skip
@@ -183,7 +173,7 @@ class Wavefront:
     @property
     def arguments(self) -> dict[str, Any]:
         """The arguments of all kernels by name: of the scene, the paths and the film."""
-        return self.kernels.arguments()
+        return self.kernels.arguments
 
     def choose_strategy(self, lowered: Lowered) -> Strategy:
         """Return how another lowering would be rendered. Raises SceneError as `create` does."""
@@ -360,7 +350,7 @@ class Wavefront:
             self.learn(looped=self.looped)
         return self._trace(loop, first, end, count)
 
-    def _trace(self, loop: BounceLoop, first: int, end: int, count: OnCounters) -> bool:
+    def _trace(self, loop: BounceLoop, first: int, end: int, count: OnBatch) -> bool:
         """Run a loop; `finish` does what is left where an interrupt ends it."""
         self._in_flight = loop
         finished = loop.run(first, end, count)

@@ -16,7 +16,7 @@ import clpt
 from clpt import device
 from clpt import transforms as tf
 from clpt.errors import MemoryBudgetError, SceneError
-from clpt.render.edit.rebuild import has_other_paths
+from clpt.render.edit.plans import has_other_paths
 from clpt.render.flow.scene_to_tables import lower
 from clpt.render.makers import planning
 from clpt.scene import Scene
@@ -247,7 +247,7 @@ def test_trees_are_fitted_or_built(caplog: pytest.LogCaptureFixture) -> None:
     assert own._wavefront.scene.trees.triangles is tree
     fresh = picture(clpt.Renderer(own.scene, own.device, layout="wide8"))
     np.testing.assert_allclose(picture(own), fresh, atol=1e-5)
-    with caplog.at_level(logging.INFO, "clpt.render.edit.rebuild"):
+    with caplog.at_level(logging.INFO, "clpt.render.edit.plans"):
         own.update(scene=own.scene)
     assert own._wavefront.scene.trees.triangles is not tree
     assert [r.message for r in caplog.records] == ["trees are built over triangles and boxes"]

@@ -12,7 +12,7 @@ import pytest
 
 import clpt
 from clpt import transforms as tf
-from clpt.render.film.cryptomatte import murmur3_32, name_bits
+from clpt.render.film.layers import murmur3_32, name_bits
 from clpt.render.film.state import add_mattes
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic

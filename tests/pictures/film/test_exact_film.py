@@ -287,7 +287,7 @@ def test_sums_near_their_end_are_counted():
         renderer.run(2)
         assert renderer._wavefront.counts.rejected == 12 and not renderer.image().any()
         assert refusals(renderer)[0].startswith(
-            "12 samples were not finite, too bright, or in a medium"
+            "12 samples were not finite, too bright, in a medium"
         )
 
 

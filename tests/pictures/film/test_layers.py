@@ -14,7 +14,7 @@ from clpt import images
 from clpt import transforms as tf
 from clpt.__main__ import run
 from clpt.errors import SceneError, UnknownKindError
-from clpt.render.film.layer_channels import channels_of
+from clpt.render.film.layers import channels_of
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic, Perspective
 from clpt.scene.integrators import (

@@ -15,7 +15,7 @@ import clpt
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.render.flow.scene_to_tables import lower
-from clpt.render.transport import guides
+from clpt.render.transport import light_caches
 from clpt.scene import Film, Scene, media, phases
 from clpt.scene import materials as m
 from clpt.scene.cameras import Orthographic, Perspective
@@ -50,7 +50,7 @@ MATERIALS = (
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """It learns from few light paths: no mean depends on them."""
-    monkeypatch.setattr(guides, "PATHS", 1 << 12)
+    monkeypatch.setattr(light_caches, "GUIDE_PATHS", 1 << 12)
 
 
 def guided(scene: Scene, **changes: Any) -> Scene:
@@ -163,7 +163,7 @@ def test_noise_falls_where_light_comes_through_a_slit(
 ) -> None:
     """Seventeen exposures of each: that their variances differ by chance as much has a probability
     below 1e-6, by the F distribution of a few hundred pixels' means."""
-    monkeypatch.setattr(guides, "PATHS", 1 << 18)
+    monkeypatch.setattr(light_caches, "GUIDE_PATHS", 1 << 18)
     noise = []
     for integrator in (Path(light_paths=0), Path(light_paths=0, guiding=True)):
         scene = dataclasses.replace(slit(fog), integrator=integrator)

@@ -13,9 +13,7 @@ from clpt import images
 from clpt.__main__ import run
 from clpt.images import spectral_exr
 from clpt.render.film.colour import sensor
-from clpt.render.film.cryptomatte import RANKS
-from clpt.render.film.layer_channels import SETS, channels_of
-from clpt.render.film.layers import white_paper
+from clpt.render.film.layers import RANKS, SETS, channels_of, white_paper
 from clpt.render.film.pictures import PictureForm, Still
 from clpt.render.records.film import LayerNames
 from clpt.scene import Film

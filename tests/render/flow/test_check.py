@@ -14,7 +14,7 @@ import pytest
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.images.spectral_exr import SpectralImage
-from clpt.render.edit.parameter_patch import patch
+from clpt.render.edit.plans import prepare_patch
 from clpt.render.flow.check import check
 from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Film, Scene
@@ -214,7 +214,7 @@ def test_a_quick_update_keeps_the_rules() -> None:
     metal = layered(1.0, eta=grey())
     edited = dataclasses.replace(former, shapes=[Sphere(material=metal)])
     with pytest.raises(SceneError, match="layers in RGB mode"):
-        patch(cast(Any, SimpleNamespace(lowered=lower(former))), former, edited)
+        prepare_patch(cast(Any, SimpleNamespace(lowered=lower(former))), former, edited)
 
 
 def test_a_quick_update_tells_gloss() -> None:
@@ -225,7 +225,7 @@ def test_a_quick_update_tells_gloss() -> None:
     former, edited = (Scene(shapes=[ball], **given) for ball in balls)
     device = SimpleNamespace(lowered=lower(former), tables={"materials": None})
     device.stream = SimpleNamespace(write=lambda *_: None)
-    plan = patch(cast(Any, device), former, edited)
+    plan = prepare_patch(cast(Any, device), former, edited)
     assert not isinstance(plan, str)
     plan.write()
     expected = lower(edited).tables["materials"]

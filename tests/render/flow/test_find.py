@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from clpt import transforms as tf
-from clpt.render.flow.find import Before, analyse
+from clpt.render.flow.find import analyse
 from clpt.render.flow.scene_to_tables import lower
-from clpt.render.records.lowering_cache import LoweringCache
+from clpt.render.records.tables import LoweringCache
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Auto, Path, Vcm
@@ -44,10 +44,10 @@ def test_the_integrator_is_decided_without_words() -> None:
 
 
 def test_what_was_decided_before_stays() -> None:
-    found = analyse(scene(), LoweringCache(), Before(Path(light_paths=0), lit_ghosts=False))
+    found = analyse(scene(), LoweringCache(), Path(light_paths=0), lit_before=False)
     assert found.index.integrator.light_paths == 0
     assert found.reason == "as before the scene was edited"
-    kept = analyse(scene(), LoweringCache(), Before(Vcm(), lit_ghosts=False))
+    kept = analyse(scene(), LoweringCache(), Vcm(), lit_before=False)
     assert isinstance(kept.index.integrator, Vcm)
 
 

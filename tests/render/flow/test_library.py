@@ -12,7 +12,7 @@ import pytest
 
 import clpt
 from clpt import bvh, device
-from clpt.render.flow.library import BSDF, PARTS
+from clpt.render.flow.programs import BSDF, PARTS
 from clpt.scene.materials import LEAVES, Material
 
 KERNELS = """

@@ -15,7 +15,7 @@ import pytest
 
 import clpt
 from clpt.device import Source
-from clpt.render.flow import common, flags, programs, vertices
+from clpt.render.flow import flags, programs, vertices
 from clpt.render.flow.scene_to_tables import lower
 from clpt.render.records import Features
 from clpt.scene.cameras import Perspective
@@ -97,7 +97,7 @@ def test_only_stages_are_seen_outside(name: str) -> None:
         assert ("textures" in made) == any(f"{own}(" in others for own in look_ups)
         stages = made.keys() - {"loop", "common", "textures"}
         wanted = {"loop", *(f"loop_{name}" for name in stages)}
-        wanted |= {f"loop_{one.name}" for one in common.shared(features, lanes)}
+        wanted |= {f"loop_{one.name}" for one in vertices.shared(features, lanes)}
         assert sorted(outside) == sorted(wanted)
 
 
@@ -168,7 +168,7 @@ def test_kinds_of_materials_share_what_is_long() -> None:
     }.items():
         features = features_of(name)
         made = programs.loop_sources(features, "wide8", 8)
-        assert [one.name for one in common.shared(features, 8)] == names
+        assert [one.name for one in vertices.shared(features, 8)] == names
         assert ("common" in made) == bool(names)
         for one in names:
             inline = re.compile(rf"^#define {one} in_", re.MULTILINE)

@@ -12,7 +12,7 @@ import trimesh
 import clpt.transforms as tf
 from clpt.geometry.winding import largest_hole
 from clpt.render.flow.scene_to_tables import lower
-from clpt.render.geometry.open_boundaries import HOLE
+from clpt.render.geometry.surroundings import HOLE
 from clpt.scene import Film, Scene, materials, media
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Constant

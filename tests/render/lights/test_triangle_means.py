@@ -9,7 +9,7 @@ from clpt.render.lights import encode as lights
 from clpt.render.lights import find as sources
 from clpt.render.lights.find import LEAST, triangle_means
 from clpt.render.materials.encoder import Encoder
-from clpt.render.spectra.look import Look
+from clpt.render.spectra.find import Look
 from clpt.scene.lights import Area
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import Bitmap, Checkerboard, Mix, Product

@@ -19,7 +19,7 @@ from clpt import device, transforms
 from clpt.formats import native
 from clpt.render.flow import programs
 from clpt.render.flow.scene_to_tables import lower
-from clpt.render.records import custom_materials
+from clpt.render.records import materials
 from clpt.scene import Film, Scene, cameras, lights, shapes, textures
 from clpt.scene import materials as m
 from clpt.scene.params import reflectance
@@ -149,9 +149,7 @@ def test_its_functions_and_constants_are_its_own() -> None:
             return x * table[0];
         }
     """
-    text = device.Source(
-        "own", custom_materials.text(type("Own", (Paint,), {"source": helped})).text, ()
-    )
+    text = device.Source("own", materials.text(type("Own", (Paint,), {"source": helped})).text, ())
     private = text.with_private("own").text
     assert "\nstatic constant float table[2]" in private
     assert "\nstatic real helper(real x)" in private and "static return" not in private
@@ -160,14 +158,14 @@ def test_its_functions_and_constants_are_its_own() -> None:
 def test_a_file_is_found_beside_the_class(tmp_path: Path) -> None:
     """And text that stands nowhere is told by the name of its class."""
     kind = type("Filed", (m.Material,), {"source": Path("test_custom_materials.py")})
-    assert custom_materials.text(kind).text == inspect.getsource(inspect.getmodule(Paint))
-    assert Path(custom_materials.text(kind).file).samefile(__file__)
-    assert custom_materials.text(Paint).file == "test_custom_materials.py:source"
+    assert materials.text(kind).text == inspect.getsource(inspect.getmodule(Paint))
+    assert Path(materials.text(kind).file).samefile(__file__)
+    assert materials.text(Paint).file == "test_custom_materials.py:source"
     nowhere = type("Nowhere", (Paint,), {"source": "int x() {}", "__module__": "nowhere"})
-    assert custom_materials.text(nowhere).file == "Nowhere.source"
+    assert materials.text(nowhere).file == "Nowhere.source"
     for source in (tmp_path / "none.cl", "velvet.cl"):
         with pytest.raises(clpt.SceneError, match=r"cannot be read|pathlib"):
-            custom_materials.text(type("Gone", (m.Material,), {"source": source}))
+            materials.text(type("Gone", (m.Material,), {"source": source}))
 
 
 @pytest.mark.parametrize(
@@ -197,7 +195,7 @@ def test_names_that_cannot_be(name: str, source: str | None, fault: str) -> None
 def test_materials_are_told_apart_by_identity() -> None:
     equal = dataclass(frozen=True, kw_only=True)(type("Equal", (Paint,), {}))
     with pytest.raises(clpt.SceneError, match="eq=False"):
-        custom_materials.check(equal)
+        materials.check(equal)
 
 
 def test_two_of_one_name_are_refused_in_one_scene() -> None:

@@ -12,10 +12,10 @@ import pytest
 
 import clpt
 from clpt.errors import SceneError
+from clpt.render import trials
 from clpt.render.flow.scene_to_tables import Lowered, lower
-from clpt.render.transport import guides, hard_light
+from clpt.render.transport import hard_light, light_caches
 from clpt.render.transport.hard_light import TRIAL_SAMPLES
-from clpt.render.trials import cost, trial
 from clpt.scene import Scene
 from clpt.scene.integrators import Auto, Integrator, Path
 from clpt.scene.lights import Point
@@ -33,7 +33,7 @@ WAYS: list[tuple[Any, bool]] = [(0.25, False), (0, False), (0, True)]
 def long(scene: Scene, integrator: Integrator = AUTO, **changes: Any) -> Scene:
     """A scene of which so many samples are wanted that a trial is worth it."""
     pixels = scene.film.width * scene.film.height
-    changes = {"spp": -(-cost.PLAIN_RAYS // pixels), "integrator": integrator, **changes}
+    changes = {"spp": -(-trials.PLAIN_RAYS // pixels), "integrator": integrator, **changes}
     return dataclasses.replace(scene, **changes)
 
 
@@ -96,16 +96,16 @@ def test_an_edit_has_no_trial() -> None:
 
 def test_a_guide_learns_the_longer_the_more_samples_there_are() -> None:
     """Unless somebody says from how many light paths."""
-    learned = {1 << 20: 20, TRIAL_SAMPLES: 20, cost.GUIDE_RAYS: 22}
+    learned = {1 << 20: 20, TRIAL_SAMPLES: 20, trials.GUIDE_RAYS: 22}
     learned |= {1 << 28: 22, 1 << 29: 23, 1 << 30: 24, 1 << 40: 24}
     for samples, power in learned.items():
-        assert guides.paths_for(samples) == 1 << power
-    assert guides.paths_for(3 << 23) == 1 << 21
+        assert light_caches.guide_paths_for(samples) == 1 << power
+    assert light_caches.guide_paths_for(3 << 23) == 1 << 21
     scene = long(caustic())
     *_, guided = lower(scene).candidates
     former = dataclasses.replace(lower(scene), integrator=guided)
     assert lower(scene, former=former).settings["guide_paths"] == 1 << 24
-    for said, taken, cells in ((0, guides.PATHS, 1 << 15), (1000, 1000, 1 << 15)):
+    for said, taken, cells in ((0, light_caches.GUIDE_PATHS, 1 << 15), (1000, 1000, 1 << 15)):
         asked = Path(light_paths=0, guiding=True, guide_paths=said)
         found = lower(long(caustic(), asked)).settings
         assert (found["guide_paths"], found["photon_cells"]) == (taken, cells)
@@ -115,12 +115,12 @@ def test_a_guide_that_learns_much_has_smaller_cells() -> None:
     """Of which as many more are told apart; that of the trial is like that of the film."""
     made = [
         lower(guided_by(paths)).settings
-        for paths in (1 << 20, guides.FINE_PATHS - 1, guides.FINE_PATHS)
+        for paths in (1 << 20, light_caches.FINE_GUIDE_PATHS - 1, light_caches.FINE_GUIDE_PATHS)
     ]
     assert [int(each["photon_cells"]) for each in made] == [1 << 15, 1 << 15, 1 << 16]
     sides = [float(each["guide_side"] / each["scene_radius"]) for each in made]
     assert sides == pytest.approx([0.14, 0.14, 0.1])
-    small = cost.settings(made[-1])
+    small = trials.small_settings(made[-1])
     assert small["guide_side"] == made[-1]["guide_side"]
     assert small["photon_cells"] == made[-1]["photon_cells"]
 
@@ -140,12 +140,12 @@ def test_a_guide_learns_from_a_whole_number_of_light_paths(wrong: Any) -> None:
 
 def test_a_trial_takes_a_share_of_the_film() -> None:
     """Where it is long enough for more pixels than the fewest that tell something."""
-    trial_samples = cost.ROUNDS * cost.SAMPLES
+    trial_samples = trials.ROUNDS * trials.SAMPLES
     for samples in (TRIAL_SAMPLES, 1 << 24, 1 << 27):
-        share = cost.pixels_for(samples) * trial_samples / samples
-        assert share <= 1.0 / cost.SHARE
-    assert cost.pixels_for(1) == cost.FEWEST
-    assert cost.pixels_for(1 << 40) == cost.PIXELS
+        share = trials.pixels_for(samples) * trial_samples / samples
+        assert share <= 1.0 / trials.SHARE
+    assert trials.pixels_for(1) == trials.FEWEST
+    assert trials.pixels_for(1 << 40) == trials.PIXELS
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_a_trial_takes_a_share_of_the_film() -> None:
 def test_a_trials_guide_comes_near_that_of_a_long_film(
     power: int, paths: int, learned: int
 ) -> None:
-    assert trial.lessons(1 << paths, 1 << power) == 1 << learned
+    assert trials.lessons(1 << paths, 1 << power) == 1 << learned
 
 
 def made_up(
@@ -164,13 +164,13 @@ def made_up(
     """Let trials find these variances at equal rays; return what is tried, as it is."""
     asked: list[Any] = []
 
-    def tried(_: trial.Ground, lowered: Lowered, *__: Any) -> tuple[cost.Trial, None]:
+    def tried(_: trials.Ground, lowered: Lowered, *__: Any) -> tuple[trials.Trial, None]:
         way = lowered.integrator.light_paths, lowered.integrator.guiding
         asked.append(way)
         drawn = np.random.default_rng(len(asked)).normal(1.0, noise[way] ** 0.5, (8, 32, 64, 3))
-        return cost.Trial(drawn, rays), None
+        return trials.Trial(drawn, rays), None
 
-    monkeypatch.setattr(trial, "tried", tried)
+    monkeypatch.setattr(trials, "tried", tried)
     return asked
 
 
@@ -179,7 +179,7 @@ def test_the_cheapest_way_is_taken(monkeypatch: pytest.MonkeyPatch, best: tuple[
     scene = long(caustic())
     asked = made_up(monkeypatch, {way: 0.5 if way == best else 1.0 for way in WAYS})
     ground: Any = None
-    found = trial.decided(ground, lower(scene), partial(lower_way, scene))
+    found = trials.decided(ground, lower(scene), partial(lower_way, scene))
     assert asked == WAYS
     assert (found.integrator.light_paths, found.integrator.guiding) == best
     assert found.features.transport.guided == best[1]
@@ -188,25 +188,25 @@ def test_the_cheapest_way_is_taken(monkeypatch: pytest.MonkeyPatch, best: tuple[
 
 
 def test_no_guide_is_compiled_where_there_is_little_noise(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = made_up(monkeypatch, dict.fromkeys(WAYS, 0.9 * trial.QUIET))
+    asked = made_up(monkeypatch, dict.fromkeys(WAYS, 0.9 * trials.QUIET))
     ground: Any = None
     scene = long(caustic())
-    trial.decided(ground, lower(scene), partial(lower_way, scene))
+    trials.decided(ground, lower(scene), partial(lower_way, scene))
     assert asked == WAYS[:2]
     asked.clear()
-    asked = made_up(monkeypatch, dict.fromkeys([(0, False), (0, True)], 0.9 * trial.QUIET))
+    asked = made_up(monkeypatch, dict.fromkeys([(0, False), (0, True)], 0.9 * trials.QUIET))
     alone = lower(long(slit()))
-    found = trial.decided(ground, alone, lambda way: alone)
+    found = trials.decided(ground, alone, lambda way: alone)
     assert asked == [(0, False)] and found.reason == alone.reason
 
 
 def test_no_guide_is_compiled_for_few_rays(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = long(caustic(), spp=-(-TRIAL_SAMPLES // (16 * 12)))
     ground: Any = None
-    pictures = cost.ROUNDS * cost.SAMPLES * 32 * 64
+    pictures = trials.ROUNDS * trials.SAMPLES * 32 * 64
     for each, guides_too in ((15, False), (17, True)):  # rays of a sample
         asked = made_up(monkeypatch, dict.fromkeys(WAYS, 1.0), each * pictures)
-        trial.decided(ground, lower(scene), partial(lower_way, scene))
+        trials.decided(ground, lower(scene), partial(lower_way, scene))
         assert asked == ([WAYS[0], WAYS[2]] if guides_too else WAYS[:1])
 
 
@@ -217,7 +217,7 @@ def test_path_without_light_paths_is_compiled_for_very_many_rays(
     for power, without in ((27, False), (29, True)):  # of four rays each
         scene = long(caustic(), spp=-(-(1 << power) // (16 * 12)))
         asked = made_up(monkeypatch, {way: 0.1 if way == (0, False) else 0.3 for way in WAYS})
-        found = trial.decided(ground, lower(scene), partial(lower_way, scene))
+        found = trials.decided(ground, lower(scene), partial(lower_way, scene))
         assert asked == (WAYS[:2] if without else WAYS[:1])
         assert (found.integrator.light_paths == 0) == without
 
@@ -225,21 +225,21 @@ def test_path_without_light_paths_is_compiled_for_very_many_rays(
 @pytest.fixture
 def little(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trials of few samples, in which guides learn from few light paths."""
-    monkeypatch.setattr(guides, "PATHS", 1 << 12)
-    monkeypatch.setattr(guides, "LONG_PATHS", 1 << 12)
+    monkeypatch.setattr(light_caches, "GUIDE_PATHS", 1 << 12)
+    monkeypatch.setattr(light_caches, "LONG_GUIDE_PATHS", 1 << 12)
     monkeypatch.setattr(hard_light, "TRIAL_SAMPLES", 1)
-    monkeypatch.setattr(trial, "GUIDE_RAYS", 1)
-    monkeypatch.setattr(trial, "ROUNDS", 2)
-    monkeypatch.setattr(trial, "SAMPLES", 4)
-    monkeypatch.setattr(trial, "QUIET", 0.0)
-    monkeypatch.setattr(cost, "FEWEST", 256)
+    monkeypatch.setattr(trials, "GUIDE_RAYS", 1)
+    monkeypatch.setattr(trials, "ROUNDS", 2)
+    monkeypatch.setattr(trials, "SAMPLES", 4)
+    monkeypatch.setattr(trials, "QUIET", 0.0)
+    monkeypatch.setattr(trials, "FEWEST", 256)
 
 
 @pytest.mark.usefixtures("little")
 @pytest.mark.parametrize("guiding", [False, True])
 def test_a_film_is_that_of_the_way(monkeypatch: pytest.MonkeyPatch, guiding: bool) -> None:
     """It is that of a renderer that was told the way, to the bit, whoever takes which samples."""
-    monkeypatch.setattr(trial, "GUIDED_RAY", 0.0 if guiding else 1e9)
+    monkeypatch.setattr(trials, "GUIDED_RAY", 0.0 if guiding else 1e9)
     scene = dataclasses.replace(slit(), integrator=Auto())
     told = dataclasses.replace(scene, integrator=Path(light_paths=0, guiding=guiding))
     whole = clpt.Renderer(told, narrow())
@@ -252,7 +252,7 @@ def test_a_film_is_that_of_the_way(monkeypatch: pytest.MonkeyPatch, guiding: boo
     parts[0].merge(parts[1].film_state())
     assert np.array_equal(parts[0].image(), whole.image())
     origin = parts[0]._origin().settings
-    assert origin["chosen.guide_paths"] == (guides.PATHS if guiding else 0)
+    assert origin["chosen.guide_paths"] == (light_caches.GUIDE_PATHS if guiding else 0)
     crop = clpt.Renderer(with_film(scene, crop=(3, 2, 7, 5)), narrow())
     assert crop._wavefront.features.transport.guided == guiding
 
@@ -263,7 +263,7 @@ def test_a_film_is_gone_on_with_in_its_way(
     monkeypatch: pytest.MonkeyPatch, tmp_path: files.Path, several: bool
 ) -> None:
     """More samples are wanted than at first, so that there is a trial; and the other way round."""
-    monkeypatch.setattr(trial, "GUIDED_RAY", 0.0)
+    monkeypatch.setattr(trials, "GUIDED_RAY", 0.0)
     scene, file = dataclasses.replace(slit(), integrator=Auto()), tmp_path / "a.film"
 
     def made(samples: int) -> clpt.Renderer | clpt.MultiRenderer:
@@ -289,10 +289,10 @@ def test_a_guide_stays_as_it_is_if_more_samples_are_wanted(
 ) -> None:
     """A longer film learns from more light paths, in smaller cells, but not one that has begun with
     fewer."""
-    monkeypatch.setattr(trial, "GUIDED_RAY", 0.0)
-    monkeypatch.setattr(guides, "FINE_PATHS", 1 << 13)
-    monkeypatch.setattr(guides, "LONG_PATHS", 1 << 13)
-    monkeypatch.setattr(guides, "LESSON", 1)
+    monkeypatch.setattr(trials, "GUIDED_RAY", 0.0)
+    monkeypatch.setattr(light_caches, "FINE_GUIDE_PATHS", 1 << 13)
+    monkeypatch.setattr(light_caches, "LONG_GUIDE_PATHS", 1 << 13)
+    monkeypatch.setattr(light_caches, "LESSON", 1)
     file, made = tmp_path / "a.film", []
     for spp, learned in ((16, 1 << 12), (32, 1 << 13)):
         scene = dataclasses.replace(slit(), integrator=Auto(), spp=spp)
@@ -310,7 +310,7 @@ def test_a_guide_stays_as_it_is_if_more_samples_are_wanted(
 
 @pytest.mark.usefixtures("little")
 def test_pictures_that_people_steer_have_no_trial(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(trial, "GUIDED_RAY", 0.0)
+    monkeypatch.setattr(trials, "GUIDED_RAY", 0.0)
     scene = dataclasses.replace(slit(), integrator=Auto())
     steered = clpt.Renderer(scene, narrow(), cancel_seconds=0.1)
     assert not steered._wavefront.features.transport.guided

@@ -19,8 +19,7 @@ from clpt.device import Device, choose
 from clpt.errors import SceneError
 from clpt.render.flow.scene_to_tables import lower
 from clpt.render.records import Features, TransportFeatures
-from clpt.render.wavefront.adaptive import LEAST, _partners, checked
-from clpt.render.wavefront.light_rounds import LightRounds
+from clpt.render.wavefront.adaptive import LEAST, LightRounds, _partners, checked
 from clpt.render.wavefront.work_list import FOREVER, SIDE, inside, pixels, table
 from clpt.scene import Film, Scene, materials
 from clpt.scene.cameras import Perspective

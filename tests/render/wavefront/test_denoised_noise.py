@@ -11,7 +11,7 @@ import pytest
 import clpt
 from clpt.device import choose
 from clpt.errors import SceneError
-from clpt.render.wavefront.denoised_noise import DenoisedNoise, _pixels
+from clpt.render.wavefront.noise import DenoisedNoise, _pixels
 from clpt.scene.integrators import Film, Path
 
 LIMIT, MOST = 0.1, 256

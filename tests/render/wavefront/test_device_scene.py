@@ -10,8 +10,8 @@ import pytest
 
 import clpt
 from clpt import device
-from clpt.render.edit import parameter_patch, rebuild
-from clpt.render.edit.plan import Plan
+from clpt.render.edit import plans
+from clpt.render.edit.plans import Plan
 from clpt.render.flow.scene_to_tables import lower
 from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.wavefront import Wavefront
@@ -65,21 +65,21 @@ def test_two_wavefronts_share_a_lowered_scene(cornell: Scene) -> None:
     np.testing.assert_array_equal(picture(one), first)
 
     edited = coloured(cornell, (0.1, 0.2, 0.9))
-    patch = parameter_patch.patch(one.scene, cornell, edited)
+    patch = plans.prepare_patch(one.scene, cornell, edited)
     assert not isinstance(patch, str)
     patch.write()
     patched = picture(one)
     assert not np.array_equal(patched, first)
     again = lower(coloured(cornell, (0.1, 0.2, 0.9)), former=one.scene.lowered)
-    rebuild.prepare(one, again).write()
+    plans.prepare_rebuild(one, again).write()
     np.testing.assert_array_equal(picture(one), patched)
 
     assert other.scene.lowered is lowered
     np.testing.assert_array_equal(picture(other), second)
     # What one has edited the other edits by itself, if need be by lowering again.
-    plan: Plan | str = parameter_patch.patch(other.scene, cornell, edited)
+    plan: Plan | str = plans.prepare_patch(other.scene, cornell, edited)
     if isinstance(plan, str):
-        plan = rebuild.prepare(other, lower(edited, former=other.scene.lowered))
+        plan = plans.prepare_rebuild(other, lower(edited, former=other.scene.lowered))
     plan.write()
     new = Wavefront.create(on, lower(edited), Tuning(layout="binary"), slots=64, looped=False)
     np.testing.assert_array_equal(picture(other), picture(new))

@@ -3,30 +3,25 @@
 A trial is a function of the scene and its seed, so all devices and workers choose the same
 integrator. Its samples are few, have other seeds, and are no part of the picture: otherwise the
 mean of the picture would depend on their values.
+
+The cost of an integrator is variance times counted rays. Clocks play no part. The variance is that
+of the mean of some samples, since samples are spread evenly over their domain, and integrators
+differ in how much they gain from that.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clpt import device
+from clpt.arrays import Floats
 from clpt.render.flow.scene_to_tables import Lowered
-from clpt.render.trials import cost
-from clpt.render.trials.cost import (
-    GUIDE_RAYS,
-    GUIDED_RAY,
-    LIGHT_RAY,
-    PHOTON_RAY,
-    PLAIN_RAYS,
-    ROUNDS,
-    SAMPLES,
-    SHARE,
-    Trial,
-)
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.wavefront import Wavefront
@@ -67,7 +62,7 @@ class Tries:
     @property
     def costs(self) -> list[float]:
         """The cost of each integrator over the cost of the first."""
-        return cost.costs(self._trials)
+        return costs(self._trials)
 
     @property
     def best(self) -> int:
@@ -77,7 +72,7 @@ class Tries:
     @property
     def noise(self) -> float:
         """The variance of ordinary pixels in pictures of the best integrator."""
-        return cost.variances(self._trials, cost.ODD)[self.best]
+        return variances(self._trials, ODD)[self.best]
 
     @property
     def rays(self) -> float:
@@ -129,7 +124,7 @@ def tried(
 
     samples: of the whole film; like: the scene of an earlier trial, whose trees are shared.
     """
-    settings = cost.settings(lowered.settings, cost.pixels_for(samples))
+    settings = small_settings(lowered.settings, pixels_for(samples))
     settings["guide_paths"] = lessons(int(settings["guide_paths"]), samples)
     small = replace(lowered, settings=settings)
     wavefront = Wavefront.create(
@@ -163,3 +158,104 @@ def _ray(lowered: Lowered) -> float:
     if lowered.features.transport.merged:
         return PHOTON_RAY
     return LIGHT_RAY if lowered.features.transport.weighed else 1.0
+
+
+FEWEST, PIXELS = 512, 2048  # of the small film, about
+ROUNDS = 8  # pictures of each integrator, with different seeds
+SAMPLES = 16  # of a pixel of each picture
+BLOCK = 8  # side of a block of pixels
+TRIM = 0.001  # share of the pixels that is left out: the noisiest
+ODD = 0.01  # the same for the noise of ordinary pixels
+SURE = 3.0  # standard deviations
+LIGHT_RAY, GUIDED_RAY = 1.15, 1.3  # time of a ray, relative to `path`: bench/notes/guiding.md
+PHOTON_RAY = 1.5  # the same of `vcm`
+# For these sizes of films, and larger sizes, a trial costs less than it can save.
+GUIDE_RAYS = 1 << 27  # rays, some 20 s of a core: longer than the compilation of a guide
+PLAIN_RAYS = 1 << 30  # the same for the compilation of kernels without light paths
+SHARE = 1 << 7  # samples of a film for each sample of an integrator in a trial
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Pictures of a few samples each.
+
+    pictures: (rounds, height, width, 3); rays: the number of rays of all pictures; ray: the time of
+    a ray, relative to the integrator `path`.
+    """
+
+    pictures: Floats
+    rays: int
+    ray: float = 1.0
+
+
+def pixels_for(samples: int) -> int:
+    """Return the number of pixels, about, of a small film; samples: of the whole film."""
+    wanted = samples // (SHARE * ROUNDS * SAMPLES)
+    return min(max(wanted, FEWEST), PIXELS)
+
+
+def small_settings(of: NDArray[np.void], pixels: int = PIXELS) -> NDArray[np.void]:
+    """Return the settings of a small film of the whole picture; of: settings of the picture.
+
+    A small film has fewer photons, so the disks that gather them are larger.
+    """
+    small = of.copy()
+    width, height = int(of["film_width"]), int(of["film_height"])
+    scale = math.sqrt(pixels / (width * height))
+    width, height = (max(round(size * scale), BLOCK) for size in (width, height))
+    margin = int(of["margin"])
+    small["width"], small["height"] = small["film_width"], small["film_height"] = width, height
+    small["crop_x"] = small["crop_y"] = 0
+    small["tiles_x"] = -(-(width + 2 * margin) // 4)
+    small["padded_pixels"] = 16 * small["tiles_x"] * -(-(height + 2 * margin) // 4)
+    small["photon_pixels"] = min(int(of["photon_pixels"]), int(small["padded_pixels"]))
+    small["radius"] = of["radius"] / scale
+    return small
+
+
+def variances(trials: Sequence[Trial], trim: float = TRIM) -> list[float]:
+    """Return the variance of a picture of each trial; all have the same scene and rounds.
+
+    It is relative to the mean of a block of pixels, as the mean of a pixel is too noisy; trim: the
+    share of the worst pixels, which are left out. The variance of a trial misses light that it has
+    hardly ever found. So where another trial has surely found more light in a block, the variance
+    is at least the variance of finding that light once in all samples.
+    """
+    spread = [_in_blocks(trial.pictures.var(axis=0, ddof=1)) for trial in trials]
+    means = [_in_blocks(trial.pictures.mean(axis=0)) for trial in trials]
+    around = np.mean([_of_blocks(mean) for mean in means], axis=0)
+    scale = np.maximum(around**2 + 1e-2 * around.mean() ** 2, 1e-300)
+    count = BLOCK**2 * len(trials[0].pictures)
+    variances_ = []
+    for spread_here, mean in zip(spread, means, strict=True):
+        least = np.zeros_like(around)
+        for other, more in zip(spread, means, strict=True):
+            missed = np.maximum(_of_blocks(more - mean), 0.0) ** 2
+            least = np.maximum(least, count * missed - SURE**2 * _of_blocks(spread_here + other))
+        error = np.sort((np.maximum(spread_here, least) / scale).mean(axis=-1), axis=None)
+        variances_.append(float(error[: math.ceil(error.size * (1.0 - trim))].mean()))
+    return variances_
+
+
+def _in_blocks(picture: Floats) -> Floats:
+    """Return whole blocks of a picture, (rows, BLOCK, columns, BLOCK, 3)."""
+    height, width = (size - size % BLOCK for size in picture.shape[:2])
+    return picture[:height, :width].reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3)
+
+
+def _of_blocks(values: Floats) -> Floats:
+    """Return the means of blocks, (rows, 1, columns, 1, 3)."""
+    means: Floats = values.mean(axis=(1, 3), keepdims=True)
+    return means
+
+
+def costs(trials: Sequence[Trial]) -> list[float]:
+    """Return the variance times the time of the rays of each trial, over the first trial's.
+
+    All costs are 1 if the first trial has no noise.
+    """
+    products = [
+        variance * trial.rays * trial.ray
+        for variance, trial in zip(variances(trials), trials, strict=True)
+    ]
+    return [cost / products[0] if products[0] > 0.0 else 1.0 for cost in products]

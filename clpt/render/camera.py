@@ -50,7 +50,7 @@ def encode_camera(
     for name, value in camera.checked_members(width, height).items():
         record[name] = value
     rows = dict(zip(camera.dispersive_glasses, glass_rows, strict=False))
-    for name, table in camera.record_tables().items():
+    for name, table in camera.record_tables(width, height).items():
         record[name] = tables.append(table)
     if camera.traced_lens is not None:
         _encode_lens(camera.traced_lens, height / width, rows, record, tables)

@@ -1,4 +1,8 @@
-"""Photons: their number in a pass, and the radius of the disks that gather them."""
+"""Photons and a guide of directions: light paths leave them for paths from the camera.
+
+Here stand the number of photons in a pass, the radius of the disks that gather them, the cells of
+the guide (transport/guiding/guide.cl), and the number of light paths that train it.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +14,11 @@ from numpy.typing import NDArray
 from clpt.records import PHOTON
 from clpt.render.geometry.find import Geometry
 from clpt.scene.cameras import Camera
-from clpt.scene.integrators import Vcm
+from clpt.scene.integrators import MOST_GUIDE_PATHS, Vcm
 
 # of a path with photon merging, whose vertices have places in memory; many files ask for 65
 DEEPEST = 65
-FIRST = 2  # the surface of a light path that may store its first photon
+FIRST_STORED = 2  # the surface of a light path that may store its first photon
 MIB = 1 << 20
 FEWEST_CELLS = 1 << 10
 GROUPS = 8  # of wavelengths, where light disperses
@@ -29,22 +33,22 @@ BOX = np.array(  # numbers of the corners of a box's sides: bit k is the end alo
         (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 3, 7), (1, 7, 5),
     ]
 )  # fmt: skip
-WORDS = PHOTON.words + 2  # with the number of its cell, and its place in the order
-BYTES = 4 * WORDS
+PHOTON_WORDS = PHOTON.words + 2  # with the number of its cell, and its place in the order
+PHOTON_BYTES = 4 * PHOTON_WORDS
 
 
-def places(integrator: Vcm) -> int:
+def photon_places(integrator: Vcm) -> int:
     """Return the most photons of a light path: all its surfaces but the first and last."""
     depth = integrator.max_depth
-    return (DEEPEST if depth < 0 else min(depth, DEEPEST)) - FIRST
+    return (DEEPEST if depth < 0 else min(depth, DEEPEST)) - FIRST_STORED
 
 
-def pixels(integrator: Vcm, number: int) -> int:
+def photon_pixels(integrator: Vcm, number: int) -> int:
     """Return the number of pixels whose light paths store photons, at most `number`.
 
     It is at least 1: the least memory, 1 MiB, holds all photons of a pixel.
     """
-    each = BYTES * places(integrator) * integrator.light_paths
+    each = PHOTON_BYTES * photon_places(integrator) * integrator.light_paths
     return min(number, integrator.photon_memory * MIB // each)
 
 
@@ -118,3 +122,38 @@ def _triangles(geometry: Geometry) -> NDArray[np.float64]:
     units = np.array([[i >> axis & 1 for axis in range(3)] for i in range(8)])
     points = boxes[:, None, 0] + (boxes[:, None, 1] - boxes[:, None, 0]) * units
     return np.concatenate([corners, points[:, BOX].reshape(-1, 3, 3)])
+
+
+GUIDE_CELLS = 1 << 15  # rows, a power of two
+GUIDE_SIDE = 0.14  # of a cell, over the scene's radius
+FINE_GUIDE_PATHS = MOST_GUIDE_PATHS  # with so many light paths cells are smaller
+FINE_GUIDE_CELLS, FINE_GUIDE_SIDE = 1 << 16, 0.1
+GUIDE_BINS = 256  # of a row
+GUIDE_PATHS = 1 << 20  # light paths that train a guide
+LONG_GUIDE_PATHS = 1 << 22  # the most light paths of a guide that a trial has chosen
+LESSON = 8  # samples of the film for each light path of such a guide
+LONG_LESSON = 64  # the same beyond LONG_PATHS
+
+
+def guide_paths_for(samples: int) -> int:
+    """Return the number of light paths that train a guide; samples: of the whole film.
+
+    A light path takes about as long as a sample; four times as many light paths leave .7 to .9 of
+    the variance.
+    """
+    some = min(max(_power_below(samples // LESSON), GUIDE_PATHS), LONG_GUIDE_PATHS)
+    return max(some, min(_power_below(samples // LONG_LESSON), MOST_GUIDE_PATHS))
+
+
+def guide_cells_for(paths: int) -> tuple[int, float]:
+    """Return the rows of a guide, and the side of its cells over the scene's radius.
+
+    paths: light paths that train it.
+    """
+    fine = paths >= FINE_GUIDE_PATHS
+    return (FINE_GUIDE_CELLS, FINE_GUIDE_SIDE) if fine else (GUIDE_CELLS, GUIDE_SIDE)
+
+
+def _power_below(number: int) -> int:
+    """The largest power of two up to a number."""
+    return 1 << max(number.bit_length() - 1, 0)

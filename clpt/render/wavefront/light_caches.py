@@ -1,4 +1,4 @@
-"""Photons of a pass: their memory, and the kernels that sort them by cells."""
+"""Photons, sorted by cells, and the guide of directions: light paths leave them on the device."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 from clpt import device
 from clpt.device.buffers import Buffers
 from clpt.records import PHOTON, PHOTON_NUMBERS
+from clpt.render.transport import light_caches
 from clpt.render.wavefront.bounce_loop import Kernels, Step
+from clpt.render.wavefront.path_buffers import PathBuffers
 
 NONE, RUN = (PHOTON_NUMBERS[name] for name in ("none", "run"))
 GROUP = 8  # work-items of a group
 ADVICE = "lower photon_memory"
-PROGRAM, ROOT = "photons", "transport/photons/sort.cl"
+PHOTON_SORT, PHOTON_ROOT = "photons", "transport/photons/sort.cl"
+GUIDE_SUM, GUIDE_ROOT = "guide", "transport/guiding/sum.cl"
 
 
 class Photons:
@@ -61,8 +64,8 @@ class Photons:
         """Build the program of `sort`. Raises KernelBuildError."""
         if self._sorting:
             return
-        kernels.build({PROGRAM: device.assemble(ROOT)})
-        program, order = kernels.programs[PROGRAM], self.arguments["photon_order"]
+        kernels.build({PHOTON_SORT: device.assemble(PHOTON_ROOT)})
+        program, order = kernels.programs[PHOTON_SORT], self.arguments["photon_order"]
         place = {"numbers": self._numbers, "count": self.places, "cells": self._cells}
         cell = {"count": self.cells, "cells": self._cells}
         steps: list[tuple[str, int, dict[str, Any]]] = [
@@ -84,3 +87,39 @@ class Photons:
         self.stream.fill(self._cells, 0, 0, 4 * (self.cells + 1))
         for step in self._sorting:
             self.stream.run(step.bound, step.size, step.group)
+
+
+class Guide:
+    """The sums of a guide, and whether it is `trained` on the present scene.
+
+    paths: whose directions are guided. arguments: of kernels, by name.
+    """
+
+    def __init__(self, stream: device.Stream, paths: PathBuffers):
+        self.stream, self._paths, self.trained = stream, paths, False
+        settings = paths.settings
+        self._learns_from = int(settings["guide_paths"])
+        self._rows = int(settings["photon_cells"])
+        self._bytes = 4 * self._rows * (light_caches.GUIDE_BINS + 1)
+        guide = paths.buffers.allocate("the guide", self._bytes)
+        self.arguments: dict[str, Any] = {"guide": guide}
+
+    @property
+    def samples(self) -> int:
+        """The light paths for each pixel that train it."""
+        return -(-self._learns_from // self._paths.pixels)
+
+    def clear(self) -> None:
+        """Enqueue that all sums are zero."""
+        self.stream.fill(self.arguments["guide"], 0, 0, self._bytes)
+
+    def prepare(self, kernels: Kernels) -> None:
+        """Build the program of `sum`. Raises KernelBuildError."""
+        kernels.build({GUIDE_SUM: device.assemble(GUIDE_ROOT)})
+
+    def sum(self, kernels: Kernels) -> None:
+        """Enqueue the sums over the records of light paths; the guide is then trained."""
+        self.prepare(kernels)
+        bound = kernels.programs[GUIDE_SUM].kernel("guide_sum").bind(**self.arguments)
+        self.stream.run(bound, (self._rows,), (GROUP,))
+        self.trained = True
