@@ -19,10 +19,10 @@ from clpt.formats.as_openpbr import Surface, dispersion, rgb
 from clpt.scene import materials
 from clpt.scene.lights import Area
 from clpt.scene.media import Homogeneous
-from clpt.scene.params import Param, params
+from clpt.scene.params import params
 from clpt.scene.phases import HenyeyGreenstein
 from clpt.scene.pixels import image_file
-from clpt.scene.roles import REAL, REFLECTANCE, Spectral
+from clpt.scene.roles import REAL, REFLECTANCE, Param, Spectral
 from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product
 from clpt.scene.values import is_texture
 
@@ -92,9 +92,12 @@ class MaterialWriter:
             shader.CreateInput("transmission_dispersion_abbe_number", TYPES.Float).Set(abbe)
         if base.transmission_weight != 0.0:
             _absorb(self, network, shader, base)
-        if base.anisotropy_rotation != 0.0 and not is_texture(base.anisotropy_rotation):
+        rotation: Any = base.anisotropy_rotation
+        if is_texture(rotation):
+            self.warn("rotations of anisotropy by a texture")
+        elif rotation != 0.0:
             turn = network.shader("tangent", "rotate3d_vector3", "vector3")
-            turn.CreateInput("amount", TYPES.Float).Set(float(base.anisotropy_rotation))
+            turn.CreateInput("amount", TYPES.Float).Set(float(rotation))
             along = network.shader("tangent_of_mesh", "tangent_vector3", "vector3")
             turn.CreateInput("in", TYPES.Vector3f).ConnectToSource(along.GetOutput("out"))
             _connect(shader, "geometry_tangent", TYPES.Vector3f, turn)
@@ -131,7 +134,7 @@ class MaterialWriter:
         base = surface.base
         shader = UsdShade.Shader.Define(self.stage, f"{path}/preview")
         shader.CreateIdAttr("UsdPreviewSurface")
-        shown = {
+        shown: dict[str, tuple[Any, Any]] = {
             "diffuseColor": (base.base_color, TYPES.Color3f),
             "metallic": (base.base_metalness, TYPES.Float),
             "roughness": (base.specular_roughness, TYPES.Float),
@@ -142,14 +145,13 @@ class MaterialWriter:
             source = value if isinstance(value, Bitmap) else None
             if source is not None and source.mapping == "uv":
                 _connect_preview(self, path, shader, name, source, kind)
+            elif kind == TYPES.Color3f and not is_texture(value):
+                _color(shader, name, rgb(value, "reflectance"))
             elif not is_texture(value):
-                number = rgb(value, "reflectance").tolist() if kind == TYPES.Color3f else value
-                shader.CreateInput(name, kind).Set(
-                    Gf.Vec3f(*number) if kind == TYPES.Color3f else float(number)
-                )
+                shader.CreateInput(name, kind).Set(value)
         shader.CreateInput("ior", TYPES.Float).Set(dispersion(base.specular_ior)[0])
         if not is_texture(surface.opacity):
-            clear = 0.0 if is_texture(base.transmission_weight) else base.transmission_weight
+            clear: Any = 0.0 if is_texture(base.transmission_weight) else base.transmission_weight
             shader.CreateInput("opacity", TYPES.Float).Set(float(surface.opacity * (1.0 - clear)))
         shader.CreateOutput("surface", TYPES.Token)
         prim.CreateSurfaceOutput().ConnectToSource(shader.GetOutput("surface"))
