@@ -46,6 +46,7 @@ MAY_IMPORT = {
     "mie": BASE | {"scene"},
     "testing": BASE | {"scene", "device", "render"},
     "instruments": RENDERS,
+    "dataset": RENDERS,
     "view": RENDERS,
     "cluster": RENDERS,
     "bench": BASE | {"scene", "device", "bvh", "rays", "render", "formats"},

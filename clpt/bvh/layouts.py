@@ -12,7 +12,7 @@ import pyopencl as cl
 from ..choices import Quality
 from ..records import TREE_BITS, TREE_SIZES
 from . import tree
-from .building import Building
+from .tree import Building
 
 REINSERT_LIMIT = 10_000  # triangles; below, the program takes longer to load than it saves
 
