@@ -6,14 +6,14 @@ import math
 import os
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdRender, UsdShade, UsdUtils, Vt
 
 from clpt import images, transforms
-from clpt.arrays import on_host
+from clpt.arrays import Floats, Floats32, on_host
 from clpt.errors import SceneError
 from clpt.formats.as_openpbr import rgb
 from clpt.formats.gltf.cameras_lights import FROM_GLTF
@@ -35,6 +35,7 @@ BALL = 0.01  # radius of what stands for a point that shines [m]
 CURVES = {"bspline": "bspline", "bezier": "bezier", "catmull_rom": "catmullRom"}
 STEPS = 16  # samples from a key of motion to the next: OpenUSD does not turn between them
 TYPES = Sdf.ValueTypeNames
+_Array = TypeVar("_Array", Vt.Vec2fArray, Vt.Vec3fArray)
 
 
 def save(scene: Scene, path: Path) -> list[str]:
@@ -284,7 +285,7 @@ class _Writer:
             self.warn(f"the light {light.kind}")
 
     def ball(
-        self, path: str, intensity: Any, place: NDArray[Any], motion: Keys | None
+        self, path: str, intensity: Floats, place: NDArray[Any], motion: Keys | None
     ) -> UsdLux.SphereLight:
         """Write a point that shines as a small ball of the same intensity."""
         prim = UsdLux.SphereLight.Define(self.stage, path)
@@ -347,11 +348,11 @@ def _matrix(matrix: NDArray[Any]) -> Gf.Matrix4d:
     return Gf.Matrix4d(np.asarray(matrix, float).T.tolist())
 
 
-def _rows(rows: Any, kind: Any) -> Any:
+def _rows(rows: ArrayLike, kind: type[_Array]) -> _Array:
     return kind.FromNumpy(np.ascontiguousarray(rows, np.float32))
 
 
-def _shine(prim: Any, color: Any) -> None:
+def _shine(prim: UsdLux.BoundableLightBase | UsdLux.NonboundableLightBase, color: Floats) -> None:
     """Set the intensity of a light, and its color with a greatest part of 1."""
     strength = float(np.max(color))
     prim.CreateIntensityAttr(strength)
@@ -369,7 +370,7 @@ def _facing(direction: NDArray[Any]) -> NDArray[Any]:
     return turn
 
 
-def _disk() -> tuple[Any, Any, None, Any]:
+def _disk() -> tuple[Floats32, NDArray[np.uint32], None, Floats32]:
     """Return the unit disk as triangles, whose area is that of the disk."""
     angle = 2.0 * np.pi * np.arange(CORNERS) / CORNERS
     radius = math.sqrt(np.pi / (0.5 * CORNERS * math.sin(2.0 * np.pi / CORNERS)))
@@ -383,4 +384,4 @@ def _disk() -> tuple[Any, Any, None, Any]:
             np.stack([np.zeros(CORNERS), (i + 0.5) / CORNERS], 1),
         ]
     )
-    return vertices, faces, None, uvs
+    return vertices.astype(np.float32), faces.astype(np.uint32), None, uvs.astype(np.float32)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pxr import Gf, Sdf, Usd, UsdShade
 
 from clpt import images
@@ -18,13 +19,13 @@ from clpt.formats import as_openpbr
 from clpt.formats.as_openpbr import Surface, dispersion, rgb
 from clpt.scene import materials
 from clpt.scene.lights import Area
-from clpt.scene.media import Homogeneous
+from clpt.scene.media import Homogeneous, Medium
 from clpt.scene.params import params
 from clpt.scene.phases import HenyeyGreenstein
 from clpt.scene.pixels import image_file
 from clpt.scene.roles import REAL, REFLECTANCE, Param, Spectral
 from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product
-from clpt.scene.values import is_texture
+from clpt.scene.values import Texture, Textured
 
 TYPES = Sdf.ValueTypeNames
 ADDRESSES = {"repeat": "periodic", "clamp": "clamp", "mirror": "mirror", "zero": "constant"}
@@ -50,7 +51,7 @@ class MaterialWriter:
         self.lost.setdefault(message)
 
     def material(
-        self, material: materials.Material, emission: Area | None, interior: Any
+        self, material: materials.Material, emission: Area | None, interior: Medium | None
     ) -> UsdShade.Material:
         """Return the material of a shape: its surface, light and inside."""
         key = id(material), id(emission), id(interior)
@@ -59,7 +60,7 @@ class MaterialWriter:
         return self.paths[key]
 
     def _material(
-        self, material: materials.Material, emission: Area | None, interior: Any
+        self, material: materials.Material, emission: Area | None, interior: Medium | None
     ) -> UsdShade.Material:
         path = unused(self.stage, "/Materials", material.name or material.kind)
         prim = UsdShade.Material.Define(self.stage, path)
@@ -79,7 +80,9 @@ class MaterialWriter:
         base, usual = surface.base, materials.Openpbr()
         for name, param in params(materials.Openpbr).items():
             value = getattr(base, name)
-            if name not in NOT_INPUTS and (is_texture(value) or value != getattr(usual, name)):
+            if name not in NOT_INPUTS and (
+                isinstance(value, Texture) or value != getattr(usual, name)
+            ):
                 network.set(shader, name, value, param)
         network.set(
             shader, "base_weight", base.base_weight, params(materials.Openpbr)["base_weight"]
@@ -92,8 +95,8 @@ class MaterialWriter:
             shader.CreateInput("transmission_dispersion_abbe_number", TYPES.Float).Set(abbe)
         if base.transmission_weight != 0.0:
             _absorb(self, network, shader, base)
-        rotation: Any = base.anisotropy_rotation
-        if is_texture(rotation):
+        rotation = base.anisotropy_rotation
+        if isinstance(rotation, Texture):
             self.warn("rotations of anisotropy by a texture")
         elif rotation != 0.0:
             turn = network.shader("tangent", "rotate3d_vector3", "vector3")
@@ -105,7 +108,7 @@ class MaterialWriter:
             network.set(shader, "geometry_opacity", surface.opacity, None)
         _bend(network, shader, surface)
 
-    def _inside(self, shader: UsdShade.Shader, surface: Surface, interior: Any) -> None:
+    def _inside(self, shader: UsdShade.Shader, surface: Surface, interior: Medium) -> None:
         """Say what is inside of a body that lets light through."""
         base = surface.base
         if (
@@ -134,7 +137,7 @@ class MaterialWriter:
         base = surface.base
         shader = UsdShade.Shader.Define(self.stage, f"{path}/preview")
         shader.CreateIdAttr("UsdPreviewSurface")
-        shown: dict[str, tuple[Any, Any]] = {
+        shown: dict[str, tuple[Textured, Sdf.ValueTypeName]] = {
             "diffuseColor": (base.base_color, TYPES.Color3f),
             "metallic": (base.base_metalness, TYPES.Float),
             "roughness": (base.specular_roughness, TYPES.Float),
@@ -145,14 +148,15 @@ class MaterialWriter:
             source = value if isinstance(value, Bitmap) else None
             if source is not None and source.mapping == "uv":
                 _connect_preview(self, path, shader, name, source, kind)
-            elif kind == TYPES.Color3f and not is_texture(value):
+            elif kind == TYPES.Color3f and not isinstance(value, Texture):
                 _color(shader, name, rgb(value, "reflectance"))
-            elif not is_texture(value):
+            elif not isinstance(value, Texture):
                 shader.CreateInput(name, kind).Set(value)
         shader.CreateInput("ior", TYPES.Float).Set(dispersion(base.specular_ior)[0])
-        if not is_texture(surface.opacity):
-            clear: Any = 0.0 if is_texture(base.transmission_weight) else base.transmission_weight
-            shader.CreateInput("opacity", TYPES.Float).Set(float(surface.opacity * (1.0 - clear)))
+        if not isinstance(surface.opacity, Texture):
+            clear = base.transmission_weight
+            share = 1.0 if isinstance(clear, Texture) else 1.0 - clear
+            shader.CreateInput("opacity", TYPES.Float).Set(surface.opacity * share)
         shader.CreateOutput("surface", TYPES.Token)
         prim.CreateSurfaceOutput().ConnectToSource(shader.GetOutput("surface"))
 
@@ -203,27 +207,27 @@ class Network:
         shader.CreateOutput("out", _type(output))
         return shader
 
-    def set(self, shader: UsdShade.Shader, name: str, value: Any, param: Param | None) -> None:
+    def set(self, shader: UsdShade.Shader, name: str, value: Textured, param: Param | None) -> None:
         """Set an input to a value, or connect it to the nodes of a texture."""
         role = param.role if param is not None else REAL
         wide = isinstance(role, Spectral)
         kind = TYPES.Color3f if wide else TYPES.Float
-        if is_texture(value):
+        if isinstance(value, Texture):
             _connect(shader, name, kind, self.texture(value, wide=wide))
         elif wide:
             assert isinstance(role, Spectral)
             _color(shader, name, rgb(value, role.meaning))
         else:
-            shader.CreateInput(name, kind).Set(float(value))
+            shader.CreateInput(name, kind).Set(np.asarray(value, np.float64).item())
 
-    def texture(self, texture: Any, *, wide: bool) -> UsdShade.Shader:
+    def texture(self, texture: Texture, *, wide: bool) -> UsdShade.Shader:
         """Return the last node of a texture. wide: a color is asked for, else a number."""
         key = id(texture), wide
         if key not in self.known:
             self.known[key] = self._texture(texture, wide)
         return self.known[key]
 
-    def _texture(self, texture: Any, wide: bool) -> UsdShade.Shader:
+    def _texture(self, texture: Texture, wide: bool) -> UsdShade.Shader:
         form = "color3" if wide else "float"
         if isinstance(texture, Checkerboard):
             texture = _two_by_two(texture)
@@ -251,9 +255,9 @@ class Network:
             self._operand(node, name, value, wide=wide)
         return node
 
-    def _operand(self, node: UsdShade.Shader, name: str, value: Any, *, wide: bool) -> None:
+    def _operand(self, node: UsdShade.Shader, name: str, value: Textured, *, wide: bool) -> None:
         kind = TYPES.Color3f if wide else TYPES.Float
-        if is_texture(value):
+        if isinstance(value, Texture):
             _connect(node, name, kind, self.texture(value, wide=wide))
         elif wide:
             _color(node, name, rgb(value, "unbounded"))
@@ -319,18 +323,20 @@ def _type(name: str) -> Any:
     }[name]  # fmt: skip
 
 
-def _connect(shader: UsdShade.Shader, name: str, kind: Any, source: UsdShade.Shader) -> None:
+def _connect(
+    shader: UsdShade.Shader, name: str, kind: Sdf.ValueTypeName, source: UsdShade.Shader
+) -> None:
     shader.CreateInput(name, kind).ConnectToSource(source.GetOutput("out"))
 
 
-def _color(shader: UsdShade.Shader, name: str, color: Any) -> None:
+def _color(shader: UsdShade.Shader, name: str, color: ArrayLike) -> None:
     shader.CreateInput(name, TYPES.Color3f).Set(Gf.Vec3f(*np.asarray(color, float).tolist()))
 
 
 def _two_by_two(texture: Checkerboard) -> Bitmap:
     """Return a checkerboard of constants as an image of 2 x 2 pixels."""
     colors = [
-        np.full(3, 0.5) if is_texture(value) else rgb(value, "reflectance")
+        np.full(3, 0.5) if isinstance(value, Texture) else rgb(value, "reflectance")
         for value in (texture.color0, texture.color1)
     ]
     pixels: Floats32 = np.array([[colors[1], colors[0]], [colors[0], colors[1]]], np.float32)
@@ -342,7 +348,7 @@ def _two_by_two(texture: Checkerboard) -> Bitmap:
 def _emit(network: Network, shader: UsdShade.Shader, emission: Area) -> None:
     """Write what a surface emits: color times luminance, as `load` reads it."""
     radiance = emission.radiance
-    if is_texture(radiance):
+    if isinstance(radiance, Texture):
         _connect(shader, "emission_color", TYPES.Color3f, network.texture(radiance, wide=True))
         shader.CreateInput("emission_luminance", TYPES.Float).Set(1.0)
         return
@@ -363,7 +369,7 @@ def _absorb(
             shader, "transmission_color", tint, params(materials.Openpbr)["transmission_tint"]
         )
         return
-    if is_texture(tint) or not np.allclose(rgb(tint, "reflectance"), 1.0):
+    if isinstance(tint, Texture) or not np.allclose(rgb(tint, "reflectance"), 1.0):
         writer.warn("the tint of what absorbs inside as well")
     depth = 1.0 / float(absorption.max())
     _color(shader, "transmission_color", np.exp(-absorption * depth))
@@ -376,7 +382,7 @@ def _bend(network: Network, shader: UsdShade.Shader, surface: Surface) -> None:
         image = network._image(dataclasses.replace(surface.normals, raw=True), True, vector=True)
         node = network.shader("normals", "normalmap_float", "vector3")
         _connect(node, "in", TYPES.Vector3f, image)
-    elif surface.bump is not None and is_texture(surface.bump):
+    elif surface.bump is not None and isinstance(surface.bump, Texture):
         node = network.shader("bump", "bump_vector3", "vector3")
         _connect(node, "height", TYPES.Float, network.texture(surface.bump, wide=False))
     else:
@@ -386,7 +392,12 @@ def _bend(network: Network, shader: UsdShade.Shader, surface: Surface) -> None:
 
 
 def _connect_preview(
-    writer: MaterialWriter, path: str, shader: UsdShade.Shader, name: str, bitmap: Bitmap, kind: Any
+    writer: MaterialWriter,
+    path: str,
+    shader: UsdShade.Shader,
+    name: str,
+    bitmap: Bitmap,
+    kind: Sdf.ValueTypeName,
 ) -> None:
     """Connect an input of UsdPreviewSurface to an image."""
     wide = kind == TYPES.Color3f

@@ -296,7 +296,7 @@ def test_the_command_tells_what_is_lost_and_renders_skies(tmp_path: Path) -> Non
     file = tmp_path / "b.usda"
     outcome = CliRunner().invoke(cli, ["convert", str(tmp_path / "a.json"), str(file)])
     assert outcome.exit_code == 0, outcome.output
-    assert "not in the file: grey stands for fluorescent" in " ".join(outcome.output.split())
+    assert "not in the file: the fluorescence of materials" in " ".join(outcome.output.split())
     read = clpt.load(file)
     around: Any = read.lights[0]
     assert isinstance(around, lights.Envmap)
