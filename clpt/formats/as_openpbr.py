@@ -18,7 +18,7 @@ import numpy as np
 from clpt import spectra
 from clpt.arrays import Floats
 from clpt.scene import materials as m
-from clpt.scene.params import params
+from clpt.scene.params import fields_of, params
 from clpt.scene.roles import REAL
 from clpt.scene.textures import Bitmap, Mix
 from clpt.scene.values import IndexLike, SpectrumLike, Texture, Textured, TexturedNumber
@@ -94,8 +94,9 @@ def _blend(material: m.Blend, warn: Warn) -> Surface:
     if isinstance(material.first, m.Null):
         return dataclasses.replace(second, opacity=material.weight)
     warn("a blend of materials becomes a blend of their parameters, with the first's index")
+    before, after = fields_of(first.base), fields_of(second.base)
     values = {
-        name: _between(getattr(first.base, name), getattr(second.base, name), material.weight)
+        name: _between(before[name], after[name], material.weight)
         for name, param in params(m.Openpbr).items()
         if param.textured
     }

@@ -370,7 +370,7 @@ def _facing(direction: NDArray[Any]) -> NDArray[Any]:
     return turn
 
 
-def _disk() -> tuple[Floats32, NDArray[np.uint32], None, Floats32]:
+def _disk() -> tuple[Floats32, NDArray[np.uint32], Floats32 | None, Floats32 | None]:
     """Return the unit disk as triangles, whose area is that of the disk."""
     angle = 2.0 * np.pi * np.arange(CORNERS) / CORNERS
     radius = math.sqrt(np.pi / (0.5 * CORNERS * math.sin(2.0 * np.pi / CORNERS)))

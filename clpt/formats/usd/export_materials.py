@@ -20,7 +20,7 @@ from clpt.formats.as_openpbr import Surface, dispersion, rgb
 from clpt.scene import materials
 from clpt.scene.lights import Area
 from clpt.scene.media import Homogeneous, Medium
-from clpt.scene.params import params
+from clpt.scene.params import fields_of, params
 from clpt.scene.phases import HenyeyGreenstein
 from clpt.scene.pixels import image_file
 from clpt.scene.roles import REAL, REFLECTANCE, Param, Spectral
@@ -77,16 +77,13 @@ class MaterialWriter:
         return prim
 
     def _surface(self, network: Network, shader: UsdShade.Shader, surface: Surface) -> None:
-        base, usual = surface.base, materials.Openpbr()
-        for name, param in params(materials.Openpbr).items():
-            value = getattr(base, name)
-            if name not in NOT_INPUTS and (
-                isinstance(value, Texture) or value != getattr(usual, name)
-            ):
-                network.set(shader, name, value, param)
-        network.set(
-            shader, "base_weight", base.base_weight, params(materials.Openpbr)["base_weight"]
-        )
+        base, roles = surface.base, params(materials.Openpbr)
+        usual = fields_of(materials.Openpbr())
+        for name, value in fields_of(base).items():
+            if name in NOT_INPUTS or name not in roles:
+                continue
+            if isinstance(value, Texture) or value != usual[name]:
+                network.set(shader, name, value, roles[name])
         shader.CreateInput("geometry_thin_walled", TYPES.Bool).Set(bool(base.thin_walled))
         ior, abbe = dispersion(base.specular_ior)
         shader.CreateInput("specular_ior", TYPES.Float).Set(ior)
