@@ -26,7 +26,7 @@ from bench import machine
 from bench.renders import MODES, SCENES
 from bench.traversal import HIT, KERNELS
 from clpt import bvh, device
-from clpt.bench.flight import Flight
+from clpt.bench.launches import Flight
 from clpt.records import PATH, SHADOW
 
 WARM, BOUNCES = 6, 24

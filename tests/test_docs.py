@@ -396,7 +396,7 @@ LIMITS = (  # on the page, and where the code has them
     ("| 50 000, and one", "clpt.files.budget", "PARTS", 50_000),
     ("one for each 4 bytes", "clpt.files.budget", "PER_PART", 4),
     ("at most 300 characters", "clpt.errors", "LONGEST", 300),
-    ("| 65 536 bytes |", "clpt.formats.meshes.ply_tables", "LONGEST_HEADER", 65536),
+    ("| 65 536 bytes |", "clpt.formats.meshes.ply", "LONGEST_HEADER", 65536),
     ("| 65 536 corners |", "clpt.formats.meshes.ply", "MOST_CORNERS", 65536),
     ("2^29 pixels", "clpt.images.checks", "PIXELS", 1 << 29),
     ("| 64 |", "clpt.formats.mitsuba.xml", "MAX_NESTING", 64),

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from clpt import bvh, device
-from clpt.bench import agreement, bandwidth, building, pictures, rays, shading, stages, starting
+from clpt.bench import agreement, building, figures, pictures, rays, shading, stages, starting
 from clpt.bench.figures import Figure
 from clpt.bench.scenes import PICTURES, opened
 
@@ -52,7 +52,7 @@ def measure(
     if "pictures" in parts and (scene is None or scene in PICTURES):
         yield from pictures.measure(on, rounds, size, (scene,) if scene else ())
     if "bandwidth" in parts:
-        yield from bandwidth.measure(on, rounds)
+        yield from figures.measure(on, rounds)
     if {"rays", "stages", "agreement", "build"} & set(parts):
         plan = opened(scene or "atrium", mode)
         if "rays" in parts:

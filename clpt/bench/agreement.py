@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 from clpt import device
 from clpt.bench.figures import Figure
-from clpt.bench.flight import Flight
-from clpt.bench.launches import PLAIN, Comparison, launches
+from clpt.bench.launches import PLAIN, Comparison, Flight, launches
 from clpt.errors import ClptError, UnknownKindError
 from clpt.scene import Scene
 

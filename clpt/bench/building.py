@@ -10,10 +10,8 @@ from typing import get_args
 import numpy as np
 
 from clpt import bvh, device
-from clpt.bench.bandwidth import Copying
-from clpt.bench.checks import Truth
-from clpt.bench.figures import Figure, rates
-from clpt.bench.rays import Sets, Traced, sets
+from clpt.bench.figures import Copying, Figure, rates
+from clpt.bench.rays import Sets, Traced, Truth, sets
 from clpt.choices import Quality
 from clpt.rays import Accel
 from clpt.scene import Scene

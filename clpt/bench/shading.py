@@ -13,7 +13,7 @@ import numpy as np
 
 from clpt import device, transforms
 from clpt.bench.figures import Figure, Taken, clock_complaint
-from clpt.bench.flight import Flight
+from clpt.bench.launches import Flight
 from clpt.errors import UnknownKindError
 from clpt.scene import Scene, integrators, lights, params, textures
 from clpt.scene.cameras import Perspective

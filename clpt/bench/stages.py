@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from clpt import device
-from clpt.bench.bandwidth import Copying
-from clpt.bench.figures import Figure, Taken, clock_complaint, timed
-from clpt.bench.flight import Flight
+from clpt.bench.figures import Copying, Figure, Taken, clock_complaint, timed
+from clpt.bench.launches import Flight
 from clpt.records import SLABS
 from clpt.render.film.state import FILM_WORDS
 from clpt.render.flow import blocks, programs

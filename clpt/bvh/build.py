@@ -1,4 +1,9 @@
-"""Builds of acceleration structures over triangles or boxes."""
+"""Builds of acceleration structures over triangles or boxes.
+
+For triangles with moving vertices the tree is built over the middle positions, and refitted to
+every key: nodes and leaves have a copy for each. Copies of a record for consecutive keys are
+neighbours, see kernels/bvh/keyed.cl.
+"""
 
 from __future__ import annotations
 
@@ -16,10 +21,103 @@ from numpy.typing import NDArray
 from ..choices import Quality
 from ..device import Device
 from ..errors import SceneError
-from ..records import TREE_REACHES
+from ..records import TREE_BITS, TREE_REACHES
 from .building import Array, Building
-from .keyed import keyed
-from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh, Part
+from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh, Packed, Part, refit_nodes
+
+WORDS = {
+    "binary": (8, 16),
+    "wide8": (64, 88),
+    "compact": (20, 12),
+}  # words of a node, and of a leaf
+_FARTHEST = 1e38  # bounds of empty boxes: finite, so that a product with 0 is not NaN
+_LEAF = np.uint32(TREE_BITS["leaf"])
+
+
+def keyed(
+    building: Building,
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.uint32],
+    tags: NDArray[np.uint32],
+    keys: int,
+    layout: str,
+    quality: Quality = "high",
+) -> Packed:
+    """Build a tree over triangles whose vertices have a row for each key.
+
+    vertices: (n, 3) float32, with consecutive rows for a vertex's keys; faces: (m, 3) uint32 first
+    rows of vertices; keys: their number. The tree cannot be refitted. Raises MemoryBudgetError.
+    """
+    first = int(faces.min())
+    used = vertices[first : int(faces.max()) + keys]
+    count = len(used) - keys + 1
+    lower, upper = (keys - 1) // 2, keys // 2
+    middle = used.copy()
+    middle[:count] = 0.5 * (used[lower : lower + count] + used[upper : upper + count])
+    local = np.ascontiguousarray(faces - np.uint32(first))
+    mesh = Mesh(
+        len(local),
+        building.upload(middle, np.float32),
+        building.upload(local, np.uint32),
+        building.upload(tags, np.uint32),
+        quality,
+    )
+    packed = LAYOUTS[layout](building, mesh)
+    copies = _refitted(building, packed, used, local, keys)
+    node_words, leaf_words = WORDS[layout]
+    keyed_nodes = _interleaved([nodes for nodes, _ in copies], node_words)
+    if layout == "wide8":
+        _finish_wide(keyed_nodes, keys)
+    keyed_leaves = _interleaved([leaves for _, leaves in copies], leaf_words)
+    buffers = {"nodes": _padded(keyed_nodes), "leaves": _padded(keyed_leaves)}
+    uploaded = {name: building.upload(words, np.uint32) for name, words in buffers.items()}
+    return Packed(uploaded, Part(0), packed.stats)
+
+
+def _refitted(
+    building: Building,
+    packed: Packed,
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.uint32],
+    keys: int,
+) -> list[tuple[NDArray[np.uint32], NDArray[np.uint32]]]:
+    """Return the nodes and leaves of a tree at each key."""
+    nodes, leaves = packed.buffers["nodes"], packed.buffers["leaves"]
+    places = building.upload(vertices, np.float32)
+    copies: list[tuple[NDArray[np.uint32], NDArray[np.uint32]]] = []
+    for key in range(keys):
+        source = {"vertices": places, "faces": building.upload(faces + np.uint32(key), np.uint32)}
+        trees = {"nodes": nodes, "leaves": leaves, "boxes": None, "indices": None}
+        refit_nodes(building, packed.part, **trees, **source)
+        copies.append(
+            (
+                building.read(nodes, nodes.size // 4, np.uint32),
+                building.read(leaves, leaves.size // 4, np.uint32),
+            )
+        )
+    return copies
+
+
+def _interleaved(copies: list[NDArray[np.uint32]], words: int) -> NDArray[np.uint32]:
+    """Return records of `words` words of several copies, (n, copies, words)."""
+    count = len(copies[0]) // words
+    return np.stack([c[: count * words].reshape(count, words) for c in copies], axis=1)
+
+
+def _finish_wide(nodes: NDArray[np.uint32], keys: int) -> None:
+    """Multiply the links of wide nodes by the number of keys, and make boxes finite."""
+    links, exists = nodes[..., 48:56], nodes[..., 56:64] != 0
+    leaf = links & _LEAF
+    links[...] = np.where(exists, leaf | (links ^ leaf) * np.uint32(keys), links)
+    boxes = nodes[..., :48].view(np.float32)
+    boxes[...] = np.clip(boxes, -_FARTHEST, _FARTHEST)
+
+
+def _padded(words: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Return words padded to steps of 32 bytes, the alignment of trees in shared buffers."""
+    flat = words.reshape(-1)
+    return np.concatenate([flat, np.zeros(-len(flat) % 8, np.uint32)])
+
 
 log = logging.getLogger(__name__)
 
@@ -89,11 +187,12 @@ def build(
     vertices: (n, 3) float32; faces: (m, 3) uint32; tags: (m,) uint32, a word for each triangle that
     its hits return (zeros if None). Buffers of these types are read in place, without checks.
     layout: a key of LAYOUTS; None calls `choose_layout`. quality: "fast" cuts leaves from a
-    space-filling curve, and builds the nodes above them like "high"; brute has no tree.
+    space-filling curve, and builds the nodes above them like "high"; brute has no tree. Other
+    devices than CPUs build trees from the leaves up, and consider fewer neighbours for "fast".
 
-    The build takes up to 250 bytes a triangle and .25 MiB on the device, in addition to its input.
-    About 60 bytes a triangle stay (binary: 130); no buffer has more than 64 bytes a triangle. Other
-    devices than CPUs take 45 kB more for each compute unit, for counters.
+    The build takes up to 270 bytes a triangle and .25 MiB on the device, in addition to its input.
+    About 60 bytes a triangle stay (binary, or wide8 from the leaves up where triangles lie far
+    apart: 130); no other buffer has more than 64 bytes a triangle.
     Trees are never deeper than BVH_DEPTH of kernels/bvh/node.cl: traversals cannot overflow.
 
     Raises SceneError for vertices that are not finite or beyond 1e12, for indices out of range and
@@ -138,7 +237,7 @@ class Runs:
     """Consecutive runs of triangles; triangles count from 0 in each run.
 
     counts: their lengths; keys: the number of rows of a vertex in each run, 1 by default, see
-    clpt.bvh.keyed; corners: the vertices on the host, for runs with several keys.
+    see `keyed`; corners: the vertices on the host, for runs with several keys.
     """
 
     counts: Sequence[int]

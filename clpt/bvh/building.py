@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -15,8 +16,34 @@ from ..device import build as build_program
 Array: TypeAlias = NDArray | cl.Buffer
 
 _ZERO_COPY = 1 << 16  # [bytes] arrays from this size on are read in place
-_GROUP = 8  # work-items of a group, each with a triangle or node
+_SCAN = "bvh/scan.cl#sums"
 _ADVICE = "use fewer triangles, or a device with more memory"
+
+
+@dataclass(frozen=True)
+class Grain:
+    """The division of a build among work-items.
+
+    each: work-items of a group, with a triangle or node each; group: work-items that share a tile;
+    tile: clusters or nodes of a tile; keys: keys of a tile that is sorted, 0 for a few tiles a
+    compute unit; digit, passes: bits of a digit, and digits; stretch: items that a work-item
+    bounds, or cuts into leaves; extents: that a work-item unites; upward: whether trees are built
+    from the leaves up.
+    """
+
+    each: int
+    group: int
+    tile: int
+    keys: int
+    digit: int
+    passes: int
+    stretch: int
+    extents: int
+    upward: bool
+
+
+FEW = Grain(8, 1, 2048, 0, 11, 3, 2048, 1 << 20, upward=False)  # work-items at a time, as on CPUs
+MANY = Grain(64, 128, 512, 2048, 4, 8, 128, 32, upward=True)
 
 
 @functools.cache
@@ -34,6 +61,7 @@ class Building:
         self.device = device
         self.buffers = Buffers(device)
         self.stream: Stream = stream or Stream(device.queue)
+        self.grain = FEW if device.info.is_cpu else MANY
         self._programs: dict[str, Program] = {}
 
     def run(self, root: str, kernel: str, n: int, **arguments: object) -> None:
@@ -42,7 +70,37 @@ class Building:
 
     def run_each(self, root: str, kernel: str, n: int, **arguments: object) -> None:
         """Enqueue like `run`, in larger groups, for kernels with an argument `count`, set to n."""
-        self._enqueue(root, kernel, n, _GROUP, {"count": n, **arguments})
+        self._enqueue(root, kernel, n, self.grain.each, {"count": n, **arguments})
+
+    def run_stretches(self, root: str, kernel: str, n: int, **arguments: object) -> None:
+        """Enqueue n work-items like `run`, for kernels that end early beyond an array."""
+        group = 1 if self.grain.group == 1 else self.grain.each
+        self._enqueue(root, kernel, n, group, arguments)
+
+    def run_tiles(self, root: str, kernel: str, groups: int, **arguments: object) -> None:
+        """Enqueue groups of `grain.group` work-items, each with a tile; more groups may start."""
+        group = self.grain.group
+        self._enqueue(root, kernel, groups * group, group, arguments)
+
+    def local(self, words: int) -> cl.LocalMemory:
+        """Return local memory for `run_tiles`; words: of a work-item."""
+        return cl.LocalMemory(4 * words * self.grain.group)
+
+    def sums_before(self, numbers: cl.Buffer, count: int) -> None:
+        """Enqueue the replacement of uint32 numbers by the sums before them; the last follows."""
+        source = {"numbers": numbers, "count": count, "sums": self.local(2)}
+        self.run_tiles(_SCAN, "scan_sums", 1, **source)
+
+    def few_extents(self, extents: cl.Buffer) -> cl.Buffer:
+        """Return few extents, in place of many, with the same bounds."""
+        run = self.grain.extents
+        while (count := extents.size // 64) > run:
+            size = -(-count // run)
+            fewer = self.allocate(64 * size)
+            source = {"parts": extents, "count": count, "run": run, "extents": fewer}
+            self.run_stretches(_SCAN, "scan_extents", size, **source)
+            extents = fewer
+        return extents
 
     def allocate(self, nbytes: int) -> cl.Buffer:
         """Return a buffer. Raises MemoryBudgetError."""

@@ -12,9 +12,8 @@ from ..errors import SceneError
 from ..formats import FORMATS, locate, save
 from .info import read_scene
 from .options.grading import GradingOptions, grading_options
-from .options.loading import loading_options
 from .options.records import with_records
-from .options.scene_options import Loading
+from .options.scene_options import Loading, loading_options
 from .options.values import Choice
 from .process import terminal
 

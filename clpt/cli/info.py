@@ -10,8 +10,7 @@ import click
 
 from ..errors import SceneError
 from ..formats import errors_of, locate
-from .options.loading import loading_options
-from .options.scene_options import Loading
+from .options.scene_options import Loading, loading_options
 from .options.values import ScenePath
 from .process import terminal
 

@@ -13,8 +13,8 @@ from clpt.files import output_files
 from ..choices import LAYOUTS, MODES, PICTURE_SCENES
 from ..errors import SceneError
 from ..formats import load, locate
-from .options.loading import loading_options
 from .options.records import with_records
+from .options.scene_options import loading_options
 from .options.values import Choice, ScenePath
 from .process import terminal
 

@@ -9,7 +9,7 @@ import click
 
 from ..choices import QUANTITIES
 from ..formats import locate
-from .options.loading import loading_options
+from .options.scene_options import loading_options
 from .options.values import Choice, ScenePath
 from .process import terminal
 

@@ -18,7 +18,7 @@ from clpt.files import output_files
 from ..errors import SceneError
 from ..images import to_srgb8
 from ..lenses import Prescription, cardinal, tracing
-from ..lenses.glasses import AIR, LINE_D
+from ..lenses.prescription import AIR, LINE_D
 from ..lenses.tracing import Rays, intersect, refract, sag
 from ..spectra import cie_xyz, xyz_to_rgb
 from .files.image_contents import ImageContents, Pixel

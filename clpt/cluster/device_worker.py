@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from queue import Empty, SimpleQueue
-from typing import Any, TypeVar
+from typing import Any
 
 from clpt.device import Device
 from clpt.errors import SceneError
@@ -18,7 +18,6 @@ from clpt.render.wavefront.tracer import Selection, use_all_pixels
 from clpt.render.wavefront.wavefront import Counts, Wavefront
 
 TICK = 0.05  # seconds between two polls for changes without notice
-_Value = TypeVar("_Value")
 
 
 class Threads:
@@ -93,26 +92,6 @@ def on_all(action: Callable[[Any], Any], items: list[Any]) -> list[Any]:
     finally:
         threads.end()
     return [results[i] for i in range(len(items))]
-
-
-class Once:
-    """Values that several devices share: the first request computes a value."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._values: dict[Any, Any] = {}
-
-    def __call__(self, key: object, make: Callable[[], _Value]) -> _Value:
-        """Return the value of a key. Repeats a SceneError of `make`."""
-        with self._lock:
-            if key not in self._values:
-                try:
-                    self._values[key] = make()
-                except SceneError as error:
-                    self._values[key] = error
-            if isinstance(self._values[key], SceneError):
-                raise self._values[key]
-            return self._values[key]
 
 
 class DeviceWorker:

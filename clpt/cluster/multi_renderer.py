@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from clpt import device as dev
 from clpt.cluster.crew import Crew
-from clpt.cluster.device_worker import DeviceWorker, Once, device_names, results_where_possible
+from clpt.cluster.device_worker import DeviceWorker, device_names, results_where_possible
 from clpt.cluster.host_maker import HostMaker
 from clpt.errors import DeviceError, SceneError
 from clpt.render.edit.plans import Plan
 from clpt.render.film.state import FilmState, Ranges
 from clpt.render.makers import planning
 from clpt.render.makers.contents import Contents, Settle
-from clpt.render.makers.device_film import DeviceFilm, texture_budget_of
+from clpt.render.makers.device_film import DeviceFilm, Once, texture_budget_of
 from clpt.render.makers.maker import Call, Held, Tick
 from clpt.render.makers.planning import Changes
 from clpt.render.options import RenderOptions, check_options, check_scene

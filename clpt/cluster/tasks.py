@@ -28,6 +28,7 @@ from clpt.errors import ClptError, ClusterError, MemoryBudgetError, SceneError
 from clpt.render.film.state import DIMENSIONS, FilmState
 from clpt.render.film_renderer import maker_of
 from clpt.render.makers.device_film import kernels_digest
+from clpt.render.makers.maker import Tick
 from clpt.render.renderer import Renderer
 from clpt.render.wavefront.tracer import Paths, Selection
 from clpt.scene import Scene
@@ -80,9 +81,7 @@ class _Job:
         self._tracer = maker_of(self.renderer).tracer()
         return True
 
-    def block(
-        self, first: int, end: int, packed: Reply | None, wanted: Callable[[], bool]
-    ) -> Reply:
+    def block(self, first: int, end: int, packed: Reply | None, wanted: Tick) -> Reply:
         """Render samples first to end - 1; return the film with its time and counts.
 
         packed: a selection from `pack_selection`; None selects every pixel.
@@ -338,7 +337,7 @@ def _parsed(job: str) -> dict[str, Any]:
     return document
 
 
-def _wanted() -> tuple[Callable[[], bool], str]:
+def _wanted() -> tuple[Tick, str]:
     """Return a function that tells whether the task is wanted, and the worker's address."""
     from distributed.core import Status
     from distributed.worker import get_worker, thread_state

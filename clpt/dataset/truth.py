@@ -19,10 +19,10 @@ from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.cameras import Calibrated, Perspective
 from clpt.scene.conventions import calibrated, pose
-from clpt.scene.framing import shape_bounds
 from clpt.scene.integrators import Box, Path
 from clpt.scene.motion import decomposed, rotation
 from clpt.scene.shapes import Shape
+from clpt.scene.studio import shape_bounds
 
 NUMBER = re.compile(r"[._#/ -]?\d+$")
 WHITE = mt.Diffuse()

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.files import output_files
-from clpt.files import text as text_files
+from clpt.files import input_files, output_files
 from clpt.scene.cameras import Calibrated
 from clpt.scene.conventions import pose, to_world
 from clpt.scene.motion import quaternion, rotation
@@ -68,7 +67,7 @@ def read_colmap(folder: str | Path) -> list[Capture]:
 
 def _rows(path: Path, least: int, step: int = 1) -> list[tuple[Path, int, list[str]]]:
     """Return the words of each `step`-th line that is no comment, and its number."""
-    lines = enumerate(text_files.read(path).splitlines(), 1)
+    lines = enumerate(input_files.read(path).splitlines(), 1)
     rows = [(path, number, line.split()) for number, line in lines if line[:1] != "#"]
     rows = rows[::step] if step > 1 else [row for row in rows if row[2]]
     for _, number, row in rows:
@@ -132,7 +131,7 @@ def read_transforms(path: str | Path, size: tuple[int, int] | None = None) -> li
     size: (width, height) [pixels] of files without `w` and `h`. Raises SceneError.
     """
     try:
-        document = json.loads(text_files.read(path))
+        document = json.loads(input_files.read(path))
         return [_frame({**document, **frame}, size) for frame in document["frames"]]
     except (ValueError, KeyError, TypeError) as error:
         if isinstance(error, SceneError):

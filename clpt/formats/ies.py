@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
-from clpt.files import text as text_files
+from clpt.files import input_files as text_files
 from clpt.scene.lights import STRENGTHS, Goniometric
 from clpt.scene.params import fields_of
 from clpt.scene.textures import Bitmap

@@ -1,22 +1,27 @@
-"""Readers of all formats share these: errors with a location, collected errors, packed files.
+"""Readers of all formats share these: errors with a location, names of files, colours, progress.
 
-While errors are collected, a reader goes on after each of them.
+While errors are collected, a reader goes on after each of them. Programs of other systems write
+the names of files in other ways; `find` finds the files. Grey stands for images that are missing.
 """
 
 from __future__ import annotations
 
 import gzip
 import os
+import unicodedata
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from clpt.errors import SceneError
 from clpt.files import budget, input_files
+from clpt.scene.roles import REFLECTANCE, Spectral
 
 
 class Located(ABC):
@@ -109,3 +114,60 @@ def read_bytes(path: Path) -> bytes:
         except (OSError, EOFError, ValueError, zlib.error) as error:
             reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
             raise SceneError(f"cannot be read: {reason}", file=path) from None
+
+
+def find(folder: Path, name: str) -> Path | None:
+    """Return the file that `name` means in `folder`, None where there is none.
+
+    The name may be quoted; backslashes may precede its blanks and divide its folders. If no name
+    matches exactly, a single name that differs in case is taken; for a path of another machine,
+    the file of that name in the folder.
+    """
+    name = name.strip()
+    if len(name) > 1 and name[0] == name[-1] and name[0] in "\"'":
+        name = name[1:-1].strip()
+    for known in dict.fromkeys((name, name.replace("\\ ", " "), name.replace("\\", "/"))):
+        if known and (path := _resolved(folder, known)) is not None:
+            return input_files.named("mesh", folder, path)
+    last = name.replace("\\", "/").rpartition("/")[2]
+    path = _resolved(folder, last) if last else None
+    return None if path is None else input_files.named("mesh", folder, path)
+
+
+def _resolved(folder: Path, name: str) -> Path | None:
+    try:
+        if (folder / name).is_file():
+            return folder / name
+        here = Path("/") if name.startswith("/") else folder
+        for part in [part for part in name.split("/") if part not in ("", ".")]:
+            if (here / part).exists():
+                here /= part
+                continue
+            alike = [entry for entry in os.listdir(here) if _folded(entry) == _folded(part)]
+            if len(alike) != 1:
+                return None
+            here /= alike[0]
+        return here if here.is_file() else None
+    except (OSError, ValueError):  # no folder, or no name of a file
+        return None
+
+
+def _folded(name: str) -> str:
+    return unicodedata.normalize("NFC", name).casefold()
+
+
+GREY = np.full((1, 1, 3), 0.5, np.float32)
+EVEN = np.array([[[0.5, 0.5, 1.0]]], np.float32)  # a normal map that bends nothing
+GREY.flags.writeable = EVEN.flags.writeable = False
+
+
+def grey_for(name: object) -> str:
+    """Return the warning of an image that GREY or EVEN replaces."""
+    return f"there is no file {str(name)!r}; grey stands for it"
+
+
+def colour(role: Spectral, rgb: Sequence[float]) -> Any:
+    """Return linear Rec.709 as the spectrum of a role; its kind checks the limits."""
+    if role is REFLECTANCE or role.colour is None:
+        return tuple(rgb)
+    return role.colour(*rgb)

@@ -18,9 +18,9 @@ from clpt import transforms
 from clpt.arrays import Matrices, Points, on_host, single
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.geometry import analytic, shape_records, shapes, strands, triangles, tubes
+from clpt.geometry import analytic, shapes, strands, triangles, tubes
 from clpt.geometry.analytic import keeps_its_kind, tessellate
-from clpt.geometry.shapes import where
+from clpt.geometry.shapes import ANALYTIC, where
 from clpt.geometry.tubes import Tubes, as_tubes
 from clpt.records import INSTANCE
 from clpt.scene.shapes import Curves, Cylinder, Group, Mesh, Shape, Sphere
@@ -125,7 +125,7 @@ def sort(
         as_met = _met_as(member)
         if (group := as_met.group) is not None:
             groups.setdefault(id(group), (group, []))[1].append(number)
-        elif number in moving and as_met.kind not in shape_records.ANALYTIC:
+        elif number in moving and as_met.kind not in ANALYTIC:
             prototypes.append(_alone(as_met, number))
         else:
             placed.append(Placed(as_met, number))
@@ -135,7 +135,7 @@ def sort(
         for member in group.shapes:
             shape = _met_as(member, to_world)
             whole = Prototype((shape,), to_world, np.array(numbers, np.int32))
-            if shape.kind in shape_records.ANALYTIC:
+            if shape.kind in ANALYTIC:
                 placed += _analytic(shape, whole, prototypes, warnings, moving)
             elif shape.emission is not None or len(numbers) == 1:
                 placed += _own(_copies(shape, whole), prototypes, moving)

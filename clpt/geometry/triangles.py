@@ -15,8 +15,7 @@ from clpt.arrays import Faces, Points, Words, on_host, single
 from clpt.errors import SceneError
 from clpt.files import budget
 from clpt.geometry import distance_grids, refining
-from clpt.geometry.shape_records import ONE_OF
-from clpt.geometry.shapes import placement, where
+from clpt.geometry.shapes import ONE_OF, placement, where
 from clpt.geometry.tubes import tubes
 from clpt.scene import shapes
 from clpt.scene.motion import Deformation

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.geometry import analytic, shapes, spheres
+from clpt.geometry import analytic, shapes
 from clpt.geometry.analytic import keeps_its_kind, tessellate
 from clpt.geometry.triangles import counted, triangulate
 from clpt.scene.shapes import Cylinder, Disk, Mesh, Shape, Sphere, Spheres
@@ -99,7 +99,7 @@ def winding_number(vertices: NDArray[Any], faces: NDArray[Any], p: NDArray[np.fl
 
 def balls(shape: Spheres) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return centres and radii of many spheres, in the world."""
-    rows = np.asarray(spheres.balls(shape), np.float64)
+    rows = np.asarray(analytic.balls(shape), np.float64)
     return rows[:, :3], np.abs(rows[:, 3])
 
 

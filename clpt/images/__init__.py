@@ -6,6 +6,16 @@ Rec. 709 unless data is asked for. docs/images.md has a table of statements by f
 """
 
 from clpt.choices import FOR_SCREENS, WRITABLE
+from clpt.images.colour import (
+    linear_to_srgb,
+    multiplied,
+    srgb8_steps,
+    srgb_to_linear,
+    straight,
+    to_codes,
+    to_rec709,
+    to_srgb8,
+)
 from clpt.images.exr import STOPS, matrix_of, read_channels, read_layers
 from clpt.images.exr_files import attributes, part_names, write_channels
 from clpt.images.float_files import write_npy as write_npy
@@ -25,16 +35,6 @@ from clpt.images.pillow import decoded
 from clpt.images.pillow import texts as png_text
 from clpt.images.screen_files import png
 from clpt.images.stored import Stored, from_array
-from clpt.images.transfer import (
-    linear_to_srgb,
-    multiplied,
-    srgb8_steps,
-    srgb_to_linear,
-    straight,
-    to_codes,
-    to_rec709,
-    to_srgb8,
-)
 
 __all__ = [
     "FOR_SCREENS",

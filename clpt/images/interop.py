@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from clpt.arrays import Floats, Matrix
-from clpt.images.transfer import decoded
+from clpt.images.colour import decoded
 from clpt.spectra import spaces
 
 ADOBE_RGB = (0.64, 0.33, 0.21, 0.71, 0.15, 0.06, 0.3127, 0.329)  # red, green, blue, D65: x, y

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats, Floats32
 from clpt.choices import Exposure
-from clpt.images.colour import LUMINANCE, View
-from clpt.images.transfer import to_codes
+from clpt.images.colour import LUMINANCE, View, to_codes
 
 GREY = 0.18  # reflectance of the middle grey that photographers expose for
 DIM = 1e-4  # of the mean: a pixel below counts as if it were as bright

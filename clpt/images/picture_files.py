@@ -13,20 +13,19 @@ from clpt.arrays import Floats32
 from clpt.choices import FOR_SCREENS, WRITABLE, Exposure
 from clpt.errors import SceneError
 from clpt.files import budget, output_files
-from clpt.images import exr, float_files, hdr, pillow, screen_files
+from clpt.images import exr, float_files, pillow, screen_files
 from clpt.images.checks import check_there, reading
-from clpt.images.colour import View
+from clpt.images.colour import View, multiplied, straight, to_codes, to_rec709
 from clpt.images.measures import stops
 from clpt.images.screen_files import Metadata, png
 from clpt.images.stored import Stored, from_array
-from clpt.images.transfer import multiplied, straight, to_codes, to_rec709
 from clpt.spectra.spaces import chromaticities
 
 log = logging.getLogger("clpt.images")
 READERS: dict[str, Callable[[Path], Stored]] = {
     ".exr": exr.read,
-    ".hdr": hdr.read,
-    ".pic": hdr.read,
+    ".hdr": float_files.read_hdr,
+    ".pic": float_files.read_hdr,
     ".pfm": float_files.read_pfm,
     ".npy": float_files.read_npy,
     **dict.fromkeys(pillow.SUFFIXES, pillow.read),
@@ -125,7 +124,7 @@ def write(
         elif suffix in FOR_SCREENS:
             _write_for_screens(path, to_rec709(pixels, space), exposure, tone, view, metadata)
         elif suffix == ".hdr":
-            hdr.write(path, pixels, space)
+            float_files.write_hdr(path, pixels, space)
         elif suffix == ".pfm":
             float_files.write_pfm(path, to_rec709(pixels, space))
         else:

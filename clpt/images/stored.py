@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from clpt.arrays import Floats32, Matrix, on_host, single
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.images.transfer import decoded, srgb_to_linear
+from clpt.images.colour import decoded, srgb_to_linear
 
 BLOCK = 1 << 22  # values that are decoded at once, so that what is between takes no memory
 CHANNELS = (1, 3, 4)

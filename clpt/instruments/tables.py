@@ -10,7 +10,7 @@ import numpy as np
 
 from clpt.arrays import Floats
 from clpt.errors import SceneError
-from clpt.files import text as text_files
+from clpt.files import input_files as text_files
 from clpt.instruments.measuring import Measurement
 
 TITLES = (("x", "y", "z"), ("nx", "ny", "nz"), ("dx", "dy", "dz"))

@@ -17,9 +17,8 @@ from functools import cache
 from pathlib import Path
 
 from clpt.errors import SceneError, UnknownKindError
-from clpt.files import input_files, text
-from clpt.lenses.glasses import AIR, by_name, by_number, known
-from clpt.lenses.prescription import Coat, Prescription, Surface
+from clpt.files import input_files
+from clpt.lenses.prescription import AIR, Coat, Prescription, Surface, by_name, by_number, known
 from clpt.spectra import Constant, Spectrum
 
 PLANES = ("infinity", "inf", "∞", "0", "0.0", "")
@@ -343,5 +342,5 @@ def read(path: str | Path, aperture: float | None = None) -> Prescription:
     data = input_files.read_bytes(path)
     if len(data) > LARGEST:
         raise SceneError("is too large for a lens", file=path)
-    lens = READERS[path.suffix.lower()](text.decode(data), path)
+    lens = READERS[path.suffix.lower()](input_files.decode(data), path)
     return lens if aperture is None else lens.with_stop(0.5 * aperture)

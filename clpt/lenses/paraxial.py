@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.lenses.glasses import LINE_D
-from clpt.lenses.prescription import Prescription
+from clpt.lenses.prescription import LINE_D, Prescription
 
 NO_POWER = 1e-9  # [1/mm], a lens of less power has no focus
 

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats
 from clpt.errors import SceneError
-from clpt.lenses.glasses import LINE_D
 from clpt.lenses.paraxial import cardinal, film_distance, stop_radius
-from clpt.lenses.prescription import Prescription, Surface
+from clpt.lenses.prescription import LINE_D, Prescription, Surface
 
 NEWTON_STEPS = 12
 ZONES = 64  # rings of the film

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats
 from clpt.lenses import COATINGS, Prescription
-from clpt.lenses.glasses import LINE_D
-from clpt.lenses.prescription import DESIGN, reflectance
+from clpt.lenses.prescription import DESIGN, LINE_D, reflectance
 from clpt.lenses.tracing import ZONES, FocusedLens, sag
 from clpt.render.records.camera import GHOST_CELLS, LENS_SURFACE, RECORDS
 from clpt.scene.cameras import Camera, Lens
-from clpt.scene.indices import check_index
+from clpt.scene.insides import check_index
 from clpt.scene.integrators import Film
 from clpt.spectra import Constant, Spectrum
 

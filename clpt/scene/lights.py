@@ -30,7 +30,7 @@ from clpt.scene.values import ImageLike, Matrix4, SpectrumLike, Textured, Vector
 from clpt.spectra import Blackbody, RGBIlluminant, Spectrum, lumens, scaled, watts
 
 RADIANCE = "W m^-2 sr^-1 nm^-1"
-SPOT_EDGES = ("linear", "smooth")
+SPOT_EDGES = ("linear", "smooth", "quartic")
 NARROW = 0.02  # [rad] around a cone that holds all rays of a point
 CONE_RINGS = 4096  # of equal width, over which a spot's intensity is summed
 Reach = Literal["surface", "placed", "distant", "infinite"]
@@ -295,7 +295,9 @@ class Spot(PoweredLamp):
     cutoff: float = real(20.0, "half angle beyond which it is dark", "degrees", 0.0, 180.0)
     beam_width: float = real(15.0, "half angle of full intensity", "degrees", 0.0, 180.0)
     edge: str = choice(
-        "linear", "how it falls off: linear in the angle, or smooth in its cosine", SPOT_EDGES
+        "linear",
+        "how it falls off: linear in the angle; smooth, a cubic in the cosine, or its 4th power",
+        SPOT_EDGES,
     )
     image: Textured = reflectance(
         1.0, "what its light passes through; a texture fills the square around a cone below 90"
@@ -310,7 +312,7 @@ class Spot(PoweredLamp):
         return {
             "cutoff": np.radians(self.cutoff),
             "beam_width": np.radians(min(self.beam_width, self.cutoff)),
-            "smooth": SPOT_EDGES.index(self.edge),
+            "edge": SPOT_EDGES.index(self.edge),
             **({"factor": self.image} if is_texture(self.image) else {}),
         }
 
@@ -329,7 +331,7 @@ class Spot(PoweredLamp):
         else:
             end, full = math.cos(cutoff), math.cos(beam)
             x = np.clip((np.cos(theta) - end) / max(full - end, 1e-7), 0.0, 1.0)
-            across = x * x * (3.0 - 2.0 * x)
+            across = x**4 if self.edge == "quartic" else x * x * (3.0 - 2.0 * x)
         return 2.0 * math.pi * float(across @ np.sin(theta)) * cutoff / CONE_RINGS
 
     def bounds(self) -> LightBounds:

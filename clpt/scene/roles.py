@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import arrays, spectra
 from clpt.arrays import LARGEST
 from clpt.errors import SceneError
-from clpt.images.transfer import from_hex
+from clpt.images.colour import from_hex
 from clpt.measured import Measurement, MerlTable
 from clpt.records import GRATING_SIZES
 from clpt.spectra import (

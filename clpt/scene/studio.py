@@ -1,8 +1,11 @@
-"""The studio of a bare mesh: a camera that frames it, a backdrop, a warm and a cool light."""
+"""Bounds of shapes, the camera that frames them, and the studio of a bare mesh.
+
+A studio has a camera that frames the mesh, a backdrop, a warm and a cool light.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -11,9 +14,156 @@ from numpy.typing import NDArray
 from clpt import spectra, transforms
 from clpt.errors import SceneError
 from clpt.scene import cameras, integrators, lights, shapes
-from clpt.scene.framing import direction, framing_camera, middle, world_bounds
+from clpt.scene.cameras import Perspective
 from clpt.scene.materials import Diffuse
 from clpt.spectra import RGBIlluminant
+
+FOV = 35.0
+EXACT = 1 << 25  # most points of instances that are transformed; else corners of boxes
+CHUNK = 1 << 18  # points at a time
+MARGIN = 1.05
+FROM = (0.4, 0.35, 1.0)  # direction from the centre of the scene to the camera, +y up
+
+
+def framing_camera(
+    scene_shapes: Sequence[shapes.Shape],
+    up: transforms.Matrix = transforms.IDENTITY,
+    *,
+    from_: Sequence[float] = FROM,
+    top: Sequence[float] = (0.0, 1.0, 0.0),
+    distance: float = 1.0,
+) -> Perspective:
+    """Return a camera that looks at the middle of shapes; together they fill its shorter side.
+
+    from_: the direction from the shapes to the camera, the front and above by default; top: the
+    upward direction in its picture, both before the rotation `up`; distance: a factor on the
+    distance that frames all shapes.
+    Raises SceneError for shapes too large to be framed.
+    """
+    centre, radius = middle(*world_bounds(scene_shapes), where="the scene")
+    upward = transforms.transform_vectors(up, top)
+    view = transforms.look_at(direction(from_, up), np.zeros(3), upward)[:3, :3]
+    all_seen = 1.5 * radius
+    for points in _outlines(scene_shapes):
+        local = (points - centre) @ view
+        aside = np.abs(local[:, :2]).max(axis=1) / np.tan(np.radians(FOV / 2.0))
+        all_seen = max(all_seen, MARGIN * float(np.max(aside - local[:, 2])))
+    origin = centre + distance * all_seen * direction(from_, up)
+    return Perspective(
+        to_world=transforms.look_at(origin, centre, upward),
+        fov=FOV,
+        fov_axis="smaller",
+        near=1e-3 * min(distance, 1.0) * all_seen,
+        far=1e3 * max(distance, 1.0) * all_seen,
+    )
+
+
+def world_bounds(
+    scene_shapes: Sequence[shapes.Shape],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the least and largest corner (3,) of all shapes in world space; a box for no shapes.
+
+    For very many instances they bound the boxes of groups.
+    """
+    boxes = [
+        shape_bounds(shape) for shape in scene_shapes if not isinstance(shape, shapes.Instance)
+    ]
+    boxes += [(points.min(axis=0), points.max(axis=0)) for points in _instance_points(scene_shapes)]
+    if not boxes:
+        boxes = [(-np.ones(3), np.ones(3))]
+    return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+
+
+def shape_bounds(shape: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the least and largest corner (3,) of a shape in world space."""
+    matrix = np.asarray(shape.to_world, np.float64)
+    linear = matrix[:3, :3]
+    if isinstance(shape, shapes.Sphere):
+        points = transforms.transform_points(matrix, np.atleast_2d(shape.center))
+        reach = shape.radius * np.linalg.norm(linear, axis=1)
+    elif isinstance(shape, shapes.Spheres):
+        rows = np.asarray(shape.centers, np.float64)
+        points = transforms.transform_points(matrix, rows[:, :3])
+        radius = np.max(rows[:, 3] if rows.shape[1] == 4 else shape.radii)
+        reach = radius * np.linalg.norm(linear, axis=1)
+    elif isinstance(shape, shapes.Disk):
+        points, reach = matrix[None, :3, 3], np.linalg.norm(linear[:, :2], axis=1)
+    elif isinstance(shape, shapes.Cylinder):
+        points = transforms.transform_points(matrix, np.stack([shape.p0, shape.p1]))
+        axis = np.subtract(shape.p1, shape.p0) / np.linalg.norm(np.subtract(shape.p1, shape.p0))
+        # A circle about the axis reaches r |row x axis| along each row of the matrix.
+        reach = shape.radius * np.linalg.norm(np.cross(linear, axis), axis=1)
+    elif isinstance(shape, shapes.Curves):
+        rows = np.asarray(shape.points, np.float64)
+        points = transforms.transform_points(matrix, rows[:, :3])
+        reach = rows[:, 3].max() * np.linalg.norm(linear, axis=1)
+    else:
+        points, reach = transforms.transform_points(matrix, _corners(shape)), np.zeros(3)
+    return points.min(axis=0) - reach, points.max(axis=0) + reach
+
+
+def _outlines(scene_shapes: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
+    """Yield for each shape points (n, 3) in world space whose hull contains it."""
+    for shape in scene_shapes:
+        if isinstance(shape, shapes.Mesh):
+            yield transforms.transform_points(np.asarray(shape.to_world), shape.vertices)
+        elif not isinstance(shape, shapes.Instance):
+            yield _box_corners(*shape_bounds(shape))
+    yield from _instance_points(scene_shapes)
+
+
+def _instance_points(scene_shapes: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
+    """Yield points (n, 3) whose hull contains instances: of groups, or of boxes for very many."""
+    instances: dict[int, list[shapes.Instance]] = {}
+    for shape in scene_shapes:
+        if isinstance(shape, shapes.Instance) and shape.group.shapes:
+            instances.setdefault(id(shape.group), []).append(shape)
+    for placed in instances.values():
+        matrices = np.stack([np.asarray(shape.to_world, np.float64)[:3] for shape in placed])
+        points = np.concatenate(list(_outlines(placed[0].group.shapes)))
+        if len(points) * len(matrices) > EXACT:
+            points = _box_corners(points.min(axis=0), points.max(axis=0))
+        step = max(CHUNK // len(points), 1)
+        for first in range(0, len(matrices), step):
+            part = matrices[first : first + step]
+            yield (points @ part[:, :, :3].transpose(0, 2, 1) + part[:, None, :, 3]).reshape(-1, 3)
+
+
+def _box_corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+    return low + (high - low) * (_corners(shapes.Cube()) + 1.0) / 2.0
+
+
+def _corners(shape: shapes.Shape) -> NDArray[np.float64]:
+    if isinstance(shape, shapes.Mesh):
+        return np.asarray(shape.vertices, np.float64)
+    if isinstance(shape, shapes.SdfGrid):
+        return np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+    depth = (-1.0, 1.0) if isinstance(shape, shapes.Cube) else (0.0,)
+    return np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in depth])
+
+
+def middle(
+    low: NDArray[np.float64], high: NDArray[np.float64], **location: Any
+) -> tuple[NDArray[np.float64], float]:
+    """Return the middle (3,) and the radius of a box. Raises SceneError if the radius overflows."""
+    with np.errstate(over="ignore"):
+        centre, radius = (low + high) / 2.0, _radius(low, high)
+    if not np.isfinite(radius):
+        raise SceneError("is too large to be framed", **location)
+    return centre, radius
+
+
+def _radius(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
+    """Return the radius of the sphere around a box; above zero, even around a point."""
+    radius = float(np.linalg.norm(high - low)) / 2.0
+    return radius if radius > 0.0 else max(1.0, float(np.abs(low).max()))
+
+
+def direction(from_: Sequence[float], up: transforms.Matrix) -> NDArray[np.float64]:
+    """Return a direction (3,) of unit length after the rotation `up`."""
+    turned = transforms.transform_vectors(up, from_)
+    return turned / np.linalg.norm(turned)
+
 
 Up = Literal["y", "z"]
 

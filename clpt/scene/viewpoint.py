@@ -12,7 +12,7 @@ import numpy as np
 from clpt import images, transforms
 from clpt.arrays import Floats
 from clpt.errors import SceneError
-from clpt.scene import Scene, framing
+from clpt.scene import Scene, studio
 from clpt.scene.cameras import Camera, Matrix, Perspective
 from clpt.scene.lights import Envmap
 from clpt.scene.shapes import Shape
@@ -85,7 +85,7 @@ def orbiting(scene: Scene, azimuth: float, elevation: float, distance: float = 1
     aside, ahead = math.sin(around), math.cos(around)
     from_ = (math.cos(above) * aside, math.sin(above), math.cos(above) * ahead)
     top = (-math.sin(above) * aside, math.cos(above), -math.sin(above) * ahead)
-    return framing.framing_camera(
+    return studio.framing_camera(
         _own_shapes(scene), up_of(scene), from_=from_, top=top, distance=distance
     )
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
-from clpt.files import text as text_files
+from clpt.files import input_files as text_files
 from clpt.spectra.dispersion import MICROMETRE, from_formula
 from clpt.spectra.spectrum import (
     Constant,

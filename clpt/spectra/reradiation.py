@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats, Matrix
 from clpt.errors import SceneError
-from clpt.files import text as text_files
+from clpt.files import input_files as text_files
 from clpt.spectra import cie
 from clpt.spectra.files import fields_of
 from clpt.spectra.spectrum import Spectrum, Tabulated, _floats, d65, extremes, gridded

@@ -23,8 +23,8 @@ from clpt.scene.roles import INDEX, MEASUREMENT, MERL, SPECTRA, Param
 from clpt.scene.shapes import Shape
 from clpt.scene.values import is_texture
 from clpt.spectra.sensors import OBSERVERS
+from clpt.view.beginning import each
 from clpt.view.messages import OF_VIEW, CommandError
-from clpt.view.solid import each
 from clpt.view.target import Change
 
 # Controls of the page by the names of roles; others cannot be edited there.

@@ -17,8 +17,8 @@ from clpt.device import Device
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
 from clpt.scene.integrators import Box, Integrator, Path, shared
+from clpt.view.beginning import bare, each
 from clpt.view.messages import Reply, answering
-from clpt.view.solid import bare, each
 
 BANDS = 47  # of 10 nm, of all light
 BATCH = 256  # samples

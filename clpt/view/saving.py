@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError, UnknownKindError
-from clpt.files import output_files, text
+from clpt.files import input_files, output_files
 from clpt.formats import save as save_scene
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene, kinds
@@ -82,7 +82,7 @@ def request(document: object) -> Request:
 
 def load(path: Path) -> Request:
     """Return the command that opens the view of a file. Raises SceneError."""
-    content = text.read(path)
+    content = input_files.read(path)
     try:
         return request(json.loads(content))
     except (ValueError, CommandError) as error:

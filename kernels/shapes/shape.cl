@@ -1,5 +1,5 @@
 /* The contract of a shape kind: kernels/shapes/kinds/<kind>.cl has, where <Kind> is a Record in
- * clpt/geometry/shape_records.py whose rows lie in `geometry`,
+ * clpt/geometry/shapes.py whose rows lie in `geometry`,
  *
  *   ShapeSample <kind>_sample(<Kind> s, vec3 p, vec2 u);      a point of the shape, as seen from p
  *   real        <kind>_pdf(<Kind> s, vec3 p, vec3 wi, real t, vec3 n);   of sample [1/sr], for a hit at distance t

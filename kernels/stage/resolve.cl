@@ -1,6 +1,6 @@
 /* From a film (r g b linear, samples) to a picture for a screen or a program: exposure, a tone curve,
  * the sRGB transfer (IEC 61966-2-1), opaque alpha. NaN is black. Codes of 8 bits come from a table of
- * the least linear value of each, clpt.images.transfer.srgb8_steps, so they are those of a written .png to the bit.
+ * the least linear value of each, clpt.images.colour.srgb8_steps, so they are those of a written .png to the bit.
  * With a table of a display's codes (`size` points on an axis, else 0) these take the place of curve and
  * transfer. */
 #include "film/tone.cl"

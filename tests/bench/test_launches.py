@@ -15,8 +15,7 @@ import pytest
 from clpt import bench as benchmark
 from clpt import device
 from clpt.bench import agreement, launches
-from clpt.bench.flight import Flight
-from clpt.bench.launches import EXACT, FREE, Launch
+from clpt.bench.launches import EXACT, FREE, Flight, Launch
 from clpt.device import native_programs
 from clpt.errors import SceneError, UnknownKindError
 from clpt.records import PATH

@@ -10,7 +10,7 @@ import pytest
 
 from clpt import bench as benchmark
 from clpt import device
-from clpt.bench import bandwidth, building, rays, shading, stages
+from clpt.bench import building, figures, rays, shading, stages
 from clpt.errors import SceneError, UnknownKindError
 from clpt.rays import Accel
 from clpt.records import PATH
@@ -24,7 +24,7 @@ COUNT = 1024
 def small_copies() -> Iterator[None]:
     """What bandwidth is measured with at its largest."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bandwidth, "LARGEST", 1 << 20)
+        patch.setattr(figures, "LARGEST", 1 << 20)
         yield
 
 
@@ -189,8 +189,8 @@ def test_builds_and_copies(on: device.Device, scene: Scene) -> None:
     Lying.change = staticmethod(_misses)
     refused = [f.refused for f in building.measure(on, scene, 1, ("wide8",), COUNT, Lying)]
     assert all("tried with every triangle" in told for told in refused)
-    (copied,) = bandwidth.measure(on, 2, (1 << 16,))
+    (copied,) = figures.measure(on, 2, (1 << 16,))
     assert copied.refused == "" and 0.01 < copied.value < 1e5
-    copying = bandwidth.Copying(on)
+    copying = figures.Copying(on)
     assert copying.complaint(1e3, 1.0, 1 << 16) == ""
     assert "GB/s cannot be" in copying.complaint(1e15, 1e-3, 1 << 16)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from clpt import transforms
-from clpt.bench import checks
+from clpt.bench import rays
 from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene
 from clpt.scene.cameras import Perspective
@@ -24,10 +24,10 @@ def test_instances_are_where_they_are_placed(monkeypatch) -> None:
     shapes = [mesh, *(Instance(group=group, to_world=place) for place in places)]
     lowered = lower(Scene(camera=Perspective(), shapes=shapes))
     assert len(lowered.faces) == 6  # the instances share theirs
-    vertices, faces = checks.world(lowered)
+    vertices, faces = rays.world(lowered)
     placed = [points, *(transforms.transform_points(place, points) for place in places)]
     expected = np.concatenate(placed).reshape(-1, 3, 3)
     np.testing.assert_allclose(vertices[faces], expected, rtol=0, atol=2e-5)
 
-    monkeypatch.setattr(checks, "MOST", 6)
-    assert len(checks.world(lowered)[1]) == 6
+    monkeypatch.setattr(rays, "MOST", 6)
+    assert len(rays.world(lowered)[1]) == 6

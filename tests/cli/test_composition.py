@@ -18,7 +18,7 @@ from clpt.cli.options.applied import changed, composed
 from clpt.cli.options.changes import CameraType, CropType, SceneChanges
 from clpt.errors import SceneError
 from clpt.formats import brought, load
-from clpt.scene import Film, Scene, cameras, framing, lights, shapes
+from clpt.scene import Film, Scene, cameras, lights, shapes, studio
 from clpt.scene.viewpoint import pose, up_of
 
 CORNELL = str(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
@@ -55,7 +55,7 @@ def test_an_orbit_stands_where_it_says(scenes):
 
 def test_the_studio_frames_as_an_orbit_does(scenes):
     scene = load(scenes / "bowl.obj")
-    x, y, z = framing.FROM
+    x, y, z = studio.FROM
     angles = math.degrees(math.atan2(x, z)), math.degrees(math.atan2(y, math.hypot(x, z)))
     assert np.allclose(seen_from(scene, *angles).to_world, scene.camera.to_world)
 

@@ -13,8 +13,7 @@ from clpt.cli import COMMANDS, cli
 from clpt.cli.inspect import PixelType
 from clpt.cli.options.applied import changed
 from clpt.cli.options.changes import CameraType, CropType, SceneChanges
-from clpt.cli.options.loading import Bytes
-from clpt.cli.options.scene_options import Where
+from clpt.cli.options.scene_options import Bytes, Where
 from clpt.cli.options.values import (
     Count,
     LightPaths,

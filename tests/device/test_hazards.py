@@ -14,7 +14,7 @@ import pytest
 
 import clpt
 from clpt import device
-from clpt.bench import bandwidth
+from clpt.bench import figures
 from clpt.device import building, compilers, native_programs, program
 from clpt.render.wavefront import bounce_loop
 from clpt.render.wavefront.bounce_loop import LEAST_ITEMS
@@ -227,7 +227,7 @@ def test_nothing_needs_images_or_finish(
     no_images(monkeypatch)
     monkeypatch.setattr(cl.CommandQueue, "finish", lambda _: 1 / 0)
     assert np.array_equal(rendered(scene, BadDevice()), picture)
-    copying = bandwidth.Copying(device.choose(profiling=True))
+    copying = figures.Copying(device.choose(profiling=True))
     _, complaint = copying.rounds(1 << 12, 1)
     assert complaint == ""
 

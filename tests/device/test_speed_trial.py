@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 
-from clpt.device import DeviceInfo, choosing, disk_cache, speed_trial
+from clpt.device import DeviceInfo, choosing, disk_cache
 
 SECONDS = {"Alpha": 0.003, "Beta": 0.001, "Gamma": 0.002}
 
@@ -104,5 +104,5 @@ def test_without_a_cache_there_is_no_trial(runtimes, tried, monkeypatch):
 
 
 def test_a_trial_takes_time(device):
-    for seconds in speed_trial.measure([(device.queue, device.lanes), (device.queue, 8)]):
+    for seconds in choosing.measure_speed([(device.queue, device.lanes), (device.queue, 8)]):
         assert 0.0 < seconds < 60.0

@@ -6,7 +6,7 @@ import pytest
 
 from clpt import spectra
 from clpt.errors import SceneError
-from clpt.files import text
+from clpt.files import input_files
 from clpt.formats import load
 from clpt.formats.ies import read as read_ies
 from clpt.formats.meshes.spheres_curves import read_strands
@@ -17,31 +17,31 @@ WORD = "größe 1\n"
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
 def test_encodings(tmp_path, encoding):
     data = WORD.encode(encoding)
-    assert text.decode(data) == WORD
-    assert text.plain(data).endswith(b"e 1\n")
-    assert text.decode(text.plain(data)) == WORD
+    assert input_files.decode(data) == WORD
+    assert input_files.plain(data).endswith(b"e 1\n")
+    assert input_files.decode(input_files.plain(data)) == WORD
     (tmp_path / "a").write_bytes(WORD.replace("\n", "\r\n").encode(encoding))
-    assert text.read(tmp_path / "a") == WORD
+    assert input_files.read(tmp_path / "a") == WORD
 
 
 def test_utf_16_of_the_other_order():
     data = "\ufeff".encode("utf-16-be") + WORD.encode("utf-16-be")
-    assert text.decode(data) == WORD
-    assert text.decode(data[:-1])  # cut within a letter: the rest is there
-    assert text.plain(b"") == b"" and text.decode(b"") == ""
+    assert input_files.decode(data) == WORD
+    assert input_files.decode(data[:-1])  # cut within a letter: the rest is there
+    assert input_files.plain(b"") == b"" and input_files.decode(b"") == ""
 
 
 def test_no_such_file(tmp_path):
     for path in (tmp_path / "no", tmp_path, "a\0b"):
         with pytest.raises(SceneError, match=r"cannot be read|is a folder"):
-            text.read(path)
+            input_files.read(path)
 
 
 def test_decimal_commas():
-    assert text.comma_message("1,5 2 3") == (
+    assert input_files.comma_message("1,5 2 3") == (
         "write numbers with a decimal point, not a comma: '1,5 2 3'"
     )
-    assert text.comma_message("1, 5") is None
+    assert input_files.comma_message("1, 5") is None
 
 
 PBRT = 'Camera "perspective" # größe\nWorldBegin\nShape "sphere" "float radius" 2\n'

@@ -30,7 +30,7 @@ import numpy as np
 from clpt import images, lenses, measured, spectra
 from clpt.formats import ies, load, volumes
 from clpt.formats.meshes import mesh, mtl_statements, spheres_curves
-from clpt.formats.mitsuba.serialized import read as read_serialized
+from clpt.formats.mitsuba.shapes import read as read_serialized
 from clpt.images import read_stored
 from clpt.images.spectral_exr import SpectralImage
 from clpt.images.spectral_exr import read as read_spectral
@@ -547,7 +547,10 @@ FORMATS: dict[str, Format] = {
     "stl text": Format(".stl", lambda: [STL], words, mesh.read_mesh),
     "off": Format(".off", lambda: [OFF], words, mesh.read_mesh),
     "serialized": Format(
-        ".serialized", lambda: [_serialized()], serialized, lambda path: read_serialized(path, 0)
+        ".serialized",
+        lambda: [_serialized()],
+        serialized,
+        lambda path: read_serialized(path, 0, {}),
     ),
     "strands": Format(".txt", lambda: [STRANDS], words, spheres_curves.read_strands),
     "spheres": Format(

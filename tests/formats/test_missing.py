@@ -9,7 +9,7 @@ import pytest
 
 from clpt.errors import SceneError
 from clpt.formats import load
-from clpt.formats.colours import EVEN, GREY
+from clpt.formats.reading import EVEN, GREY
 from clpt.scene.textures import Bitmap, textures_in
 
 BITMAP = '<texture type="bitmap" name="{}"><string name="filename" value="no.png"/></texture>'

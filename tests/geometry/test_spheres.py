@@ -15,7 +15,7 @@ from clpt import transforms as T
 from clpt.cli.files.scene_contents import summary
 from clpt.errors import SceneError
 from clpt.formats.native import load, save
-from clpt.geometry import spheres
+from clpt.geometry import analytic
 from clpt.records import LIGHT
 from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene, cameras, integrators, lights, materials, shapes
@@ -65,7 +65,7 @@ def test_rays_meet_the_nearest_sphere(layout: str) -> None:
     found = {name: layer.reshape(48 * 48, -1) for name, layer in layers.items()}
     position = found["position"].astype(np.float64)
     single = np.array([[0.5, 0.5, 1.0, 0.4]])
-    all_balls = np.concatenate([spheres.balls(MANY), single, spheres.balls(FEW)])
+    all_balls = np.concatenate([analytic.balls(MANY), single, analytic.balls(FEW)])
     which, top = nearest(all_balls, position)
     above = (np.abs(position[:, :2]).max(axis=1) < 0.3) & (top < 0.0)  # what the square hides
     met = (which >= 0) & ~above & position.any(axis=1)
@@ -89,16 +89,16 @@ def test_arrays_of_a_device_are_as_good() -> None:
     given = cl_array.to_device(queue, np.asarray(MANY.centers))
     radii = cl_array.to_device(queue, np.asarray(MANY.radii))
     other = shapes.Spheres(centers=given, radii=radii, to_world=PLACE)
-    np.testing.assert_array_equal(spheres.balls(other), spheres.balls(MANY))
+    np.testing.assert_array_equal(analytic.balls(other), analytic.balls(MANY))
     four = np.column_stack([MANY.centers, MANY.radii])
     other = shapes.Spheres(centers=cl_array.to_device(queue, four), to_world=PLACE)
-    np.testing.assert_array_equal(spheres.balls(other), spheres.balls(MANY))
+    np.testing.assert_array_equal(analytic.balls(other), analytic.balls(MANY))
 
 
 def test_boxes_hold_the_spheres() -> None:
     far = np.array([[1e5, -3.0, 0.0, 0.25]], np.float32)
-    low, high = spheres.boxes([spheres.balls(MANY), far]).transpose(1, 0, 2).astype(np.float64)
-    whole = np.concatenate([spheres.balls(MANY), far]).astype(np.float64)
+    low, high = analytic.boxes([analytic.balls(MANY), far]).transpose(1, 0, 2).astype(np.float64)
+    whole = np.concatenate([analytic.balls(MANY), far]).astype(np.float64)
     reach = whole[:, 3:]
     assert (low < whole[:, :3] - reach).all() and (high > whole[:, :3] + reach).all()
     assert (high - low < 2.1 * reach)[:-1].all()
@@ -129,9 +129,9 @@ def test_files_keep_them(tmp_path) -> None:
     again = load(tmp_path / "scene.json")
     many = again.shapes[0]
     assert isinstance(many, shapes.Spheres) and many.name == "bodies"
-    np.testing.assert_array_equal(spheres.balls(many), spheres.balls(MANY))
+    np.testing.assert_array_equal(analytic.balls(many), analytic.balls(MANY))
     np.testing.assert_array_equal(many.attributes["vertex_color"], COLOURS)
-    np.testing.assert_array_equal(spheres.balls(again.shapes[3]), spheres.balls(FEW))
+    np.testing.assert_array_equal(analytic.balls(again.shapes[3]), analytic.balls(FEW))
     assert summary(again)["spheres"] == 43
     document = json.loads((tmp_path / "scene.json").read_text())
     document["shapes"] = [{"type": "spheres", "centers": [[0, 0, 0], [1, 2, 3]], "radii": [1, 2]}]
@@ -230,7 +230,7 @@ def test_they_move_on_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_tree_is_built_anew_in_place(layout: str) -> None:
     """Over boxes that moved, bit for bit as a new one."""
     on = opened()
-    old, new = (spheres.boxes([RNG.random((500, 4)).astype(np.float32)]) for _ in range(2))
+    old, new = (analytic.boxes([RNG.random((500, 4)).astype(np.float32)]) for _ in range(2))
     tree, expected = (bvh.build_boxes(on, boxes, layout) for boxes in (old, new))
     building = bvh.Building(on)
     bvh.rebuild_boxes(building, tree, building.upload(new, np.float32))
@@ -256,7 +256,7 @@ def test_a_tree_for_which_there_is_no_room_is_refitted() -> None:
     """It holds the boxes that moved, in the nodes that it had."""
     on = opened()
     building = bvh.Building(on)
-    balls = [spheres.boxes([RNG.random((500, 4)).astype(np.float32)]) for _ in range(8)]
+    balls = [analytic.boxes([RNG.random((500, 4)).astype(np.float32)]) for _ in range(8)]
     trees = [bvh.build_boxes(on, boxes, "shapes_wide8") for boxes in balls]
     sizes = [int(tree.stats["nodes"]) for tree in trees]
     small, large = np.argmin(sizes), np.argmax(sizes)

@@ -10,7 +10,7 @@ import pytest
 
 import clpt
 from clpt.images import interop
-from clpt.images.transfer import linear_to_srgb
+from clpt.images.colour import linear_to_srgb
 from clpt.scene import Film, Scene, cameras, lights
 from clpt.spectra import spaces
 

@@ -10,7 +10,7 @@ import numpy as np
 import pyopencl as cl
 
 from clpt import device
-from clpt.geometry import analytic, shape_records, triangles
+from clpt.geometry import analytic, shapes, triangles
 from clpt.records import SETTINGS, SHAPE
 from clpt.render.flow.signatures import scene_text
 from clpt.render.geometry import cases as shape_text
@@ -150,7 +150,7 @@ def lit(
         row = np.zeros(1, SHAPE.dtype)
         row["prim"] = first
         vertices = faces = uvs = None
-        if shape.kind not in shape_records.ANALYTIC:
+        if shape.kind not in shapes.ANALYTIC:
             vertices, faces, _, uvs = triangles.triangulate(shape)
             base = encoder.store.size("uvs") // 2
             encoder.store.append("faces", faces + np.uint32(base))

@@ -477,10 +477,13 @@ def test_envmap_is_mitsuba_s(mode):
         np.testing.assert_allclose(ours[:, i], expected, rtol=2e-3, atol=1e-5)
 
 
-def test_a_spot_s_smooth_edge():
-    """pbrt's spot: a cubic of the cosine, from one at the beam's edge to zero at the cone's."""
+@pytest.mark.parametrize(
+    ("edge", "fall"), [("smooth", lambda x: x * x * (3.0 - 2.0 * x)), ("quartic", lambda x: x**4)]
+)
+def test_a_spot_s_edge_by_its_cosine(edge, fall):
+    """pbrt-v4's cubic and pbrt-v3's power: one at the beam's edge, zero at the cone's."""
     place = T.look_at([1, 2, 3], [0.1, 0.2, 0], [0, 1, 0])
-    given = {"cutoff": 25.0, "beam_width": 12.0, "edge": "smooth"}
+    given = {"cutoff": 25.0, "beam_width": 12.0, "edge": edge}
     scene = lit([Spot(to_world=place, intensity=(1.0, 2.0, 3.0), **given)])
     p = np.random.default_rng(4).normal(size=(3, 300)) * [[1.2], [1.2], [0.1]]
     ours = scene(SAMPLE, np.vstack([p, np.zeros((3, 300))]), 8)
@@ -488,7 +491,7 @@ def test_a_spot_s_smooth_edge():
     distance = np.linalg.norm(away, axis=0)
     end, full = np.cos(np.radians([25.0, 12.0]))
     x = np.clip((place[:3, 2] @ away / distance - end) / (full - end), 0.0, 1.0)
-    wanted = x * x * (3.0 - 2.0 * x) / distance**2
+    wanted = fall(x) / distance**2
     np.testing.assert_allclose(ours[5], wanted, rtol=1e-3, atol=1e-6)
     assert ((x > 0.0) & (x < 1.0)).sum() > 30
 

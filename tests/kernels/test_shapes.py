@@ -9,7 +9,7 @@ from scipy.stats import chi2
 import clpt
 from clpt import transforms as T
 from clpt.errors import SceneError
-from clpt.geometry import analytic, shape_records, triangles
+from clpt.geometry import analytic, shapes, triangles
 from clpt.scene import Film, Scene
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import Path
@@ -27,7 +27,7 @@ SHAPES = {
     "cylinder": Cylinder(p0=(0.1, 0.2, -0.4), p1=(-0.2, 0.5, 0.9), radius=0.6, to_world=PLACED),
     "rectangle": Rectangle(to_world=STRETCHED),
 }
-ANALYTIC = [name for name, shape in SHAPES.items() if shape.kind in shape_records.ANALYTIC]
+ANALYTIC = [name for name, shape in SHAPES.items() if shape.kind in shapes.ANALYTIC]
 OUTSIDE, FAR_OFF = (2.0, 1.5, -1.0), (30.0, -60.0, 80.0)
 NEAR = (0.4, -0.22, 0.73)  # inside of the closed shapes
 # Chance that any one chi-square test of this file fails where all is right: 1e-3 (Sidak).
@@ -57,7 +57,7 @@ MEET = """
 
 
 def call(shape, body: str, given: np.ndarray, results: int, lanes: int = 8) -> np.ndarray:
-    record = shape_records.RECORDS[shape.kind]
+    record = shapes.RECORDS[shape.kind]
     text = body.format(T=record.name, k=shape.kind)
     return shape_probe(shape)(text, given, results, lanes).astype(np.float64)
 

@@ -10,9 +10,18 @@ import pytest
 from clpt import lenses, spectra
 from clpt.errors import SceneError
 from clpt.lenses import Prescription, Surface, tracing
-from clpt.lenses.glasses import AIR, LINE_C, LINE_D, LINE_F, by_name, by_number
 from clpt.lenses.paraxial import film_distance, stop_radius
-from clpt.lenses.prescription import COATINGS, quarter_wave, reflectance
+from clpt.lenses.prescription import (
+    AIR,
+    COATINGS,
+    LINE_C,
+    LINE_D,
+    LINE_F,
+    by_name,
+    by_number,
+    quarter_wave,
+    reflectance,
+)
 from clpt.lenses.tracing import ZONES, Rays, axis_solid_angle, trace, zones
 from clpt.spectra import Constant
 

@@ -51,6 +51,10 @@ def emitted(light: lights.Light, to_world: Any = SQUARE) -> spectra.Spectrum:
             lambda **more: lights.Spot(cutoff=60.0, beam_width=0.0, edge="smooth", **more),
             2.0 * math.pi * 0.25,
         ),
+        (  # the integral of the 4th power is a fifth
+            lambda **more: lights.Spot(cutoff=60.0, beam_width=0.0, edge="quartic", **more),
+            2.0 * math.pi * 0.1,
+        ),
     ],
 )
 def test_watts_and_lumens(light: Callable[..., lights.Light], extent: float) -> None:

@@ -24,10 +24,9 @@ from clpt.scene.shapes import Cube, Group, Instance, Mesh, Rectangle
 from clpt.scene.textures import Bitmap, Checkerboard
 from clpt.transforms import look_at, scale
 from clpt.view import beginning
-from clpt.view.beginning import Making
+from clpt.view.beginning import SAMPLES, Making, colour, shaded, solid
 from clpt.view.pictures import Display
 from clpt.view.render_loop import RenderLoop
-from clpt.view.solid import SAMPLES, colour, shaded, solid
 from clpt.view.target import Change
 from tests.view.test_session import Audience, small
 

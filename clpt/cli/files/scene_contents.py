@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from ...geometry.triangles import triangulate
-from ...scene import Scene, framing, materials, shapes, textures
+from ...scene import Scene, materials, shapes, studio, textures
 from ...scene.params import Kind, fields_of
 
 DIGITS = 4  # of bounds that people read
@@ -34,7 +34,7 @@ def summary(scene: Scene) -> dict[str, Any]:
     kinds = list(_nested(surfaces))
     lights = [light.kind for light in scene.lights[: len(scene.lights) - added["lights"]]]
     lights += [shape.emission.kind for shape in surfaces if shape.emission is not None]
-    bounds = [corner.tolist() for corner in framing.world_bounds(authored)] if authored else None
+    bounds = [corner.tolist() for corner in studio.world_bounds(authored)] if authored else None
     return {
         "format": scene.extra.get("format", "python"),
         "triangles": sum(counts.values()),

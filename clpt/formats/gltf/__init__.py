@@ -15,7 +15,7 @@ from clpt.formats.gltf import (
     animation,
     cameras_lights,
     checks,
-    draco,
+    geometry,
     materials,
     meshes,
     meshopt,
@@ -30,7 +30,7 @@ VARIABLES = (
     "time", "animation", "camera", "scene", "shutter", "variant", "lumens", "multiple_scattering",
 )  # fmt: skip
 SUPPORTED = (
-    draco.NAME, *meshopt.EXTENSIONS, "KHR_mesh_quantization", "KHR_texture_transform",
+    geometry.DRACO, *meshopt.EXTENSIONS, "KHR_mesh_quantization", "KHR_texture_transform",
     "EXT_texture_webp", cameras_lights.LIGHTS, meshes.INSTANCING, *materials.EXTENSIONS,
     animation.POINTER,
     "FB_ngon_encoding",  # says which triangles make a polygon: the picture is the same

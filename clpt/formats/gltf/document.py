@@ -20,7 +20,7 @@ from urllib.parse import unquote, unquote_to_bytes
 from clpt.arrays import is_flag, is_number, is_whole
 from clpt.choices import Missing
 from clpt.errors import SceneError
-from clpt.files import budget, input_files, text
+from clpt.files import budget, input_files
 
 T = TypeVar("T")
 REQUIRED: Any = object()
@@ -312,7 +312,7 @@ def _parsed(file: Path, data: bytes) -> Any:
         raise ValueError(f"{constant} is no number")
 
     try:
-        value = json.loads(text.decode(data), parse_constant=refuse)
+        value = json.loads(input_files.decode(data), parse_constant=refuse)
     except (ValueError, RecursionError) as error:
         reason = str(error).splitlines()[0][:80]
         raise SceneError(f"is not glTF: {reason}", file=file) from None

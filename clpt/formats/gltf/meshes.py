@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import Floats32, Matrix
 from clpt.files import budget
-from clpt.formats.gltf import draco, geometry, materials
+from clpt.formats.gltf import geometry, materials
 from clpt.formats.gltf.accessors import COMPONENTS, floats, integers, stored
 from clpt.formats.gltf.document import Element
 from clpt.formats.gltf.geometry import Geometry, target_types, types, warn_of_whole_numbers
@@ -42,8 +42,11 @@ def primitive_geometry(primitive: Element) -> Geometry | None:
     if "POSITION" not in attributes:
         primitive.warn("left out, since it has no positions")
         return None
-    compressed = primitive.extension(draco.NAME)
-    decoded = _plain(attributes) if compressed is None else draco.attributes(primitive, compressed)
+    compressed = primitive.extension(geometry.DRACO)
+    if compressed is None:
+        decoded = _plain(attributes)
+    else:
+        decoded = geometry.draco_attributes(primitive, compressed)
     vertices = len(decoded.attributes["POSITION"])
     for name, values in decoded.attributes.items():
         if len(values) != vertices:

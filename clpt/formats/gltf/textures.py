@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from clpt import images
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.formats.colours import EVEN, GREY, grey_for
 from clpt.formats.gltf import accessors
 from clpt.formats.gltf.document import Document, Element
+from clpt.formats.reading import EVEN, GREY, grey_for
 from clpt.scene.textures import Bitmap
 
 FORMATS = ("PNG", "JPEG", "WEBP")

@@ -17,9 +17,9 @@ from clpt import images, transforms
 from clpt.choices import Missing
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.formats.meshes import corners, mtl, obj, off, ply, stl
-from clpt.formats.meshes.named_files import find
+from clpt.formats.meshes import mtl, obj, off, ply, stl, triangles
 from clpt.formats.meshes.triangles import TANGENTS, Triangles, attributes
+from clpt.formats.reading import find
 from clpt.geometry.polygons import smooth_normals
 from clpt.scene.materials import Diffuse, Material, TwoSided
 from clpt.scene.shapes import Mesh
@@ -225,7 +225,7 @@ def _obj(path: Path, library: mtl.Library | None, warnings: list[str]) -> list[M
     if library is not None:
         for names in contents.libraries:
             library.add(names)
-    parts = list(corners.parts(contents, whole=library is None))
+    parts = list(triangles.parts(contents, whole=library is None))
     if not parts:
         held = f"{len(contents.vertices)} vertices (v), but no faces (f)"
         message = "; ".join([f"holds no triangles: {held}", *contents.warnings])

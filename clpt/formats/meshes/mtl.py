@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from clpt import images, spectra
 from clpt.choices import Missing
 from clpt.errors import SceneError
-from clpt.formats.colours import EVEN, GREY, grey_for
 from clpt.formats.meshes.mtl_statements import (
     BLACK,
     WHITE,
@@ -27,7 +26,7 @@ from clpt.formats.meshes.mtl_statements import (
     read,
     uncommented,
 )
-from clpt.formats.meshes.named_files import find
+from clpt.formats.reading import EVEN, GREY, find, grey_for
 from clpt.scene.lights import Area
 from clpt.scene.materials import (
     Blend,

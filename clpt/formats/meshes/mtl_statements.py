@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from clpt.errors import SceneError
-from clpt.files import input_files, text
+from clpt.files import input_files
 
 WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 WORDS = ("-blendu", "-blendv", "-clamp", "-cc", "-imfchan", "-type", "-colorspace")
@@ -53,7 +53,8 @@ class Statement:
         try:
             values = [float(word) for word in words]
         except ValueError:
-            message = text.comma_message(self.value) or f"needs numbers, not {self.value[:60]!r}"
+            unlike = f"needs numbers, not {self.value[:60]!r}"
+            message = input_files.comma_message(self.value) or unlike
             raise self.error(message) from None
         if not values or not all(map(math.isfinite, values)):
             raise self.error(f"needs finite numbers, not {self.value[:60]!r}")
@@ -79,7 +80,8 @@ class Statement:
                 values = self.numbers(taken)
                 options[option] = (*values, *WHOLE.get(option, ())[len(values) :])
             else:
-                message = text.comma_message(unread) or f"{option} needs {OPTIONS[option]} numbers"
+                count = f"{option} needs {OPTIONS[option]} numbers"
+                message = input_files.comma_message(unread) or count
                 raise self.error(message)
         return unread.strip(), options
 
@@ -103,11 +105,11 @@ def uncommented(line: str) -> str:
 
 def read(path: Path) -> dict[str, Statements]:
     """Read the statements of each material by its name. Raises SceneError."""
-    data = text.plain(input_files.read_bytes(path))
+    data = input_files.plain(input_files.read_bytes(path))
     materials: dict[str, Statements] = {}
     statements: Statements = {}
     for number, line in enumerate(data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")):
-        words = text.decode(line.replace(b"\0", b" ")).strip().split(None, 1)
+        words = input_files.decode(line.replace(b"\0", b" ")).strip().split(None, 1)
         if not words or words[0].startswith("#"):
             continue
         key, value = words[0].lower(), words[1] if len(words) > 1 else ""

@@ -17,7 +17,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from clpt.arrays import Bytes, Floats32, Integers
 from clpt.errors import SceneError
-from clpt.files import budget, input_files, text
+from clpt.files import budget, input_files
 
 PER_BYTE = 8  # bytes of memory for each of the file, while it is read
 PIECE = 1 << 19  # bytes that are parsed at a time: they and their arrays fit a processor's cache
@@ -69,7 +69,7 @@ class Contents:
 
 def read(path: Path) -> Contents:
     """Read a file. Raises SceneError with the line that is not as the format has it."""
-    data = text.plain(input_files.read_bytes(path))
+    data = input_files.plain(input_files.read_bytes(path))
     budget.check(PER_BYTE * len(data), "its numbers", path)
     reader = _Reader(path, data)
     reader.read()
@@ -228,8 +228,9 @@ class _Reader:
             words = [b"nan" if NOT_FINITE.fullmatch(word) else word for word in line.split()]
             for word in words:
                 if not NUMBER.fullmatch(word):
-                    message = f"{text.decode(word)[:40]!r} is not a number"
-                    self.fail(at + start - 1, text.comma_message(text.decode(line)) or message)
+                    message = f"{input_files.decode(word)[:40]!r} is not a number"
+                    comma = input_files.comma_message(input_files.decode(line))
+                    self.fail(at + start - 1, comma or message)
             if len(words) < LEAST[kind]:
                 message = f"{NAMES[kind]!r} needs {LEAST[kind]} numbers, and has {len(words)}"
                 self.fail(at + start - 1, message)
@@ -283,10 +284,10 @@ class _Reader:
                 whole = len(more) < 3 and all(INDEX.fullmatch(part) for part in more if part)
                 if not whole or not INDEX.fullmatch(first):
                     known = "1, 1/2, 1//3 or 1/2/3"
-                    message = f"{text.decode(word)[:40]!r} is no corner such as {known}"
+                    message = f"{input_files.decode(word)[:40]!r} is no corner such as {known}"
                     self.fail(at + start - 1, message)
                 if not all(int(part) for part in (first, *more) if part):
-                    message = f"{text.decode(word)[:40]!r} names 0, but numbers begin at 1"
+                    message = f"{input_files.decode(word)[:40]!r} names 0, but numbers begin at 1"
                     self.fail(at + start - 1, message)
         raise AssertionError("every corner is right")
 
@@ -301,12 +302,12 @@ class _Reader:
         others = np.flatnonzero((lines.kind == OTHER) & (piece[lines.head] != HASH))
         for line in others.tolist():
             words = piece[lines.head[line] : lines.stop[line]].tobytes().split(None, 1)
-            name, operands = text.decode(words[0]), words[1] if len(words) > 1 else b""
+            name, operands = input_files.decode(words[0]), words[1] if len(words) > 1 else b""
             if name in changes:
                 changes[name][0].append(line)
-                changes[name][1].append(self.label(name, text.decode(operands).strip()))
+                changes[name][1].append(self.label(name, input_files.decode(operands).strip()))
             elif name == "mtllib":
-                self.libraries.append(text.decode(operands).strip())
+                self.libraries.append(input_files.decode(operands).strip())
             elif name in LEFT_OUT:
                 self.left_out[f"{LEFT_OUT[name]} ({name})"] = None
             elif name not in SILENT:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
-from clpt.files import budget, text
+from clpt.files import budget, input_files
 from clpt.formats.meshes.triangles import Triangles, indices, see_through
 from clpt.formats.reading import read_bytes
 from clpt.geometry.polygons import triangulate
@@ -29,7 +29,7 @@ GREY = (203, 0.6)  # of a mesh without colours: in bytes of sRGB, and linear
 
 def read(path: Path) -> list[Triangles]:
     """Read a file. Raises SceneError with the line of a word that is not a number."""
-    data = COMMENT.sub(b"", text.plain(read_bytes(path))).rstrip(text.FILLING)
+    data = COMMENT.sub(b"", input_files.plain(read_bytes(path))).rstrip(input_files.FILLING)
     budget.check(PER_BYTE * len(data), "its numbers", path)
     try:
         return [_read(data)]
@@ -77,7 +77,7 @@ def _read(data: bytes) -> Triangles:
     if head[2]:
         raise SceneError("it is a binary OFF file; save it as text")
     kind = (head[1] or b"").decode()
-    values = text.numbers(data, head.end(1) if head[1] else 0)
+    values = input_files.numbers(data, head.end(1) if head[1] else 0)
     body = data[head.end(1) if head[1] else 0 :]
     widths = np.array([len(line.split()) for line in body.splitlines()], np.int64)
     numbers = _Numbers(body.split(), values, np.cumsum(widths[widths > 0]))

@@ -1,4 +1,4 @@
-"""Files of many spheres (.npz), and of curves as Mitsuba has them."""
+"""Files of many spheres (.npz), and of curves as Mitsuba 3 and 0.x have them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.files import budget, input_files, numpy_files, output_files, text
+from clpt.files import budget, input_files, numpy_files, output_files
 from clpt.scene.shapes import Spheres
 from clpt.scene.textures import ATTRIBUTES
 
@@ -36,31 +36,56 @@ def write_spheres(path: Path, spheres: Spheres) -> None:
         np.savez(partial, centers=spheres.centers, radii=spheres.radii, **spheres.attributes)
 
 
+BINARY_HAIR = b"BINARY_HAIR"
 PER_BYTE = 64  # bytes of memory for each of the file, while it is read
 
 
-def read_strands(path: Path) -> dict[str, Any]:
+def read_hair(path: Path) -> dict[str, Any]:
+    """Return `points` (n, 3) float32 and `lengths` (k,) int64 of a file of Mitsuba 0.x's `hair`.
+
+    A binary file has a count of points, and floats where infinity begins a strand; a text file has
+    a point a line: src/shapes/hair.cpp. Raises SceneError for a file that is broken or empty.
+    """
+    data = input_files.read_bytes(path)
+    if not data.startswith(BINARY_HAIR):
+        return read_strands(path, "x, y and z")
+    body = data[len(BINARY_HAIR) :]
+    count = int.from_bytes(body[:4], "little")
+    values = np.frombuffer(body, "<f4", (len(body) - 4) // 4, 4) if len(body) > 4 else np.empty(0)
+    first = np.flatnonzero(np.isinf(values))
+    points = np.delete(values, first)
+    if count == 0 or points.size < 3 * count:
+        raise SceneError(f"names {count} points, and holds {points.size // 3}", file=path)
+    starts = np.unique(np.r_[0, (first - np.arange(first.size)) // 3])
+    budget.take(4 * points.size, "its points", path)
+    lengths = np.diff(np.r_[starts[starts < count], count])
+    return {"points": points[: 3 * count].reshape(-1, 3).copy(), "lengths": lengths}
+
+
+def read_strands(path: Path, names: str = "x, y, z and a radius") -> dict[str, Any]:
     """Return `points` (n, 4) float32 and `lengths` (k,) int64, as `Curves` takes them.
 
-    Raises SceneError with the line that is not four numbers, and for an empty file.
+    names: of the numbers of a point; without a radius there are three. Raises SceneError with the
+    line that has fewer numbers, and for an empty file.
     """
-    data = text.plain(input_files.read_bytes(path))
+    width = len(names.replace(" and", ",").split(","))
+    data = input_files.plain(input_files.read_bytes(path))
     budget.check(PER_BYTE * len(data), "its points", path)
     rows = [line.split() for line in data.split(b"\n")]
     columns = np.array([len(row) for row in rows])
-    short = (columns > 0) & (columns < 4)
+    short = (columns > 0) & (columns < width)
     if short.any():
         line = 1 + int(np.argmax(short))
-        raise SceneError("needs x, y, z and a radius", file=path, line=line)
+        raise SceneError(f"needs {names}", file=path, line=line)
     occupied = columns > 0
     if not occupied.any():
         raise SceneError("has no points", file=path)
-    words = [word for row in rows for word in row[:4]]
+    words = [word for row in rows for word in row[:width]]
     try:
-        points = np.array(words).astype(np.float64).reshape(-1, 4)
+        points = np.array(words).astype(np.float64).reshape(-1, width)
     except ValueError:
-        line = _wrong(rows)
-        comma = text.comma_message(text.decode(b" ".join(rows[line - 1])))
+        line = _wrong(rows, width)
+        comma = input_files.comma_message(input_files.decode(b" ".join(rows[line - 1])))
         raise SceneError(comma or "is not all numbers", file=path, line=line) from None
     starts = np.flatnonzero(occupied & ~np.r_[False, occupied[:-1]])
     ends = np.flatnonzero(occupied & ~np.r_[occupied[1:], False])
@@ -77,10 +102,10 @@ def write_strands(path: Path, points: object, lengths: Any) -> None:
     output_files.write_text(path, "\n\n".join(strands) + "\n")
 
 
-def _wrong(rows: list[list[bytes]]) -> int:
-    """Return the first line with a word among its first four that is no number."""
+def _wrong(rows: list[list[bytes]], width: int) -> int:
+    """Return the first line with a word among its first `width` that is no number."""
     for line, row in enumerate(rows, 1):
-        for word in row[:4]:
+        for word in row[:width]:
             try:
                 float(word)
             except ValueError:

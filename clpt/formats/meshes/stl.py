@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError
-from clpt.files import budget, text
+from clpt.files import budget, input_files
 from clpt.formats.meshes.triangles import Triangles
 from clpt.formats.reading import read_bytes
 from clpt.geometry.polygons import triangulate
@@ -41,7 +41,7 @@ def read(path: Path) -> list[Triangles]:
     data = read_bytes(path)
     budget.check(PER_BYTE * len(data), "its triangles", path)
     try:
-        return _text(text.plain(data)) if _is_text(data) else [_binary(data)]
+        return _text(input_files.plain(data)) if _is_text(data) else [_binary(data)]
     except SceneError as error:
         message = f"cannot be read as a .stl mesh: {error.message}"
         raise SceneError(message, file=path, line=error.line) from None
@@ -50,7 +50,7 @@ def read(path: Path) -> list[Triangles]:
 def _is_text(data: bytes) -> bool:
     if len(data) >= HEAD and len(data) == HEAD + FACET.itemsize * _count(data):
         return False
-    beginning = text.plain(data[:BEGINNING])
+    beginning = input_files.plain(data[:BEGINNING])
     return b"\0" not in beginning[:HEAD] and WORDS.search(beginning) is not None
 
 
@@ -96,7 +96,7 @@ def _colours(head: bytes, attributes: NDArray[np.uint16]) -> NDArray[np.uint8] |
 
 def _text(data: bytes) -> list[Triangles]:
     """Return a mesh for each solid of a text."""
-    data = data.rstrip(text.FILLING).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    data = data.rstrip(input_files.FILLING).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     lower = data.lower()
     solids, name, start = [], "", 0
     for solid in [*SOLID.finditer(lower), None]:
@@ -110,7 +110,7 @@ def _text(data: bytes) -> list[Triangles]:
             solids[-1].name = name
         if solid is not None:
             start = solid.end()
-            name = name if closes else text.decode(data[slice(*solid.span(1))]).strip()
+            name = name if closes else input_files.decode(data[slice(*solid.span(1))]).strip()
     return solids
 
 
@@ -145,7 +145,7 @@ def _loops(data: bytes, line: int) -> Triangles:
         words = content.split()
         if not words:
             continue
-        shown = text.decode(content).strip()[:60]
+        shown = input_files.decode(content).strip()[:60]
         match words[0].lower():
             case b"outer":
                 open_, first = True, len(corners)
@@ -169,7 +169,7 @@ def _numbers(words: list[bytes], shown: str, line: int) -> list[float]:
     except ValueError:
         numbers = []
     if len(numbers) != 3:
-        comma = text.comma_message(shown)
+        comma = input_files.comma_message(shown)
         raise SceneError(comma or f"a vertex needs three numbers: {shown!r}", line=line)
     return numbers
 

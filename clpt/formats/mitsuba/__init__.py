@@ -1,4 +1,4 @@
-"""Scenes in the XML of Mitsuba 2 and 3, and in that of Mitsuba 0.3 to 0.6.
+"""Scenes in the XML of Mitsuba 2 and 3, in that of Mitsuba 0.3 to 0.6, and in that of Nori.
 
 The version of the file decides: below 2 the words and defaults of Mitsuba 0.x hold. An unsupported
 element or an unknown parameter is an error that names the element, the file and the line. In files
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from clpt.choices import Missing
-from clpt.formats.mitsuba import dicts, old_words, sensors
+from clpt.formats.mitsuba import dicts, nori, old_words, sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter
 from clpt.formats.mitsuba.grids import Bounds
@@ -25,11 +25,11 @@ from clpt.formats.mitsuba.spectra import texture
 from clpt.formats.mitsuba.xml import Document, Element, parse
 from clpt.formats.reading import attempt
 from clpt.scene import Scene, integrators
-from clpt.scene.framing import framing_camera, world_bounds
 from clpt.scene.integrators import Film, Integrator
 from clpt.scene.lights import Light
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Instance, Shape
+from clpt.scene.studio import framing_camera, world_bounds
 
 __all__ = ["load", "load_dict"]
 
@@ -45,6 +45,9 @@ def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scen
     supported.
     """
     document = parse(path, variables)
+    if nori.is_nori(document.root):
+        nori.rename(document.root)
+        document.makes_normals = False
     if document.is_old:
         document.renamed = old_words.rename(document.root)
     return _from_document(path, document, missing)

@@ -8,11 +8,16 @@ from typing import Any
 import numpy as np
 
 from clpt import measured, spectra
-from clpt.formats.colours import EVEN, GREY
-from clpt.formats.mitsuba.coating import KINDS as COATS
-from clpt.formats.mitsuba.coating import SMOOTHEST, Coat
 from clpt.formats.mitsuba.limits import within
-from clpt.formats.mitsuba.principled import fluorescent, hair, principled, principled_thin
+from clpt.formats.mitsuba.principled import KINDS as COATS
+from clpt.formats.mitsuba.principled import (
+    SMOOTHEST,
+    Coat,
+    fluorescent,
+    hair,
+    principled,
+    principled_thin,
+)
 from clpt.formats.mitsuba.properties import Context, PluginReader, Properties, numbers, unknown
 from clpt.formats.mitsuba.spectra import (
     coefficient,
@@ -27,7 +32,7 @@ from clpt.formats.mitsuba.spectra import (
 )
 from clpt.formats.mitsuba.xml import Element
 from clpt.formats.pbrt.textures import map_values
-from clpt.formats.reading import attempt
+from clpt.formats.reading import EVEN, GREY, attempt
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.params import defaults, params
@@ -349,7 +354,7 @@ def _ward(props: Properties) -> Parameters:
 
 
 def _coated(element: Element, context: Context) -> Material:
-    """Read Mitsuba 0.6's `coating` and `roughcoating`, see coating.py."""
+    """Read Mitsuba 0.6's `coating` and `roughcoating`, see principled.py."""
     props = Properties(element, context)
     (inner,) = _nested(props, 1, 1)
     rough = element.type == "roughcoating"
@@ -386,6 +391,9 @@ def _bent(props: Properties) -> Parameters:
 
 def _normal_map(props: Properties) -> Parameters:
     values = _bent(props)
+    unnamed = nested_textures(props) if props.context.old else []
+    if len(unnamed) == 1 and "normalmap" not in props.named:
+        props.named["normalmap"] = unnamed[0]  # Mitsuba 0.6 does not name it
     if "normalmap" not in props.named:
         raise props.element.error("needs the texture 'normalmap'")
     result = factor(props, "normalmap", None)

@@ -13,12 +13,13 @@ from clpt.formats.mitsuba.principled import dye, fluorescent
 from clpt.formats.mitsuba.properties import Context, PluginReader, Properties, numbers, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.formats.pbrt.scattering import MEDIA as MEASURED
+from clpt.formats.pbrt.textures import map_values
 from clpt.scene import media, phases
 from clpt.scene.media import Grid, Homogeneous, Medium
 from clpt.scene.phases import Phase
 from clpt.scene.textures import Texture
 from clpt.scene.volumes import Volume
-from clpt.spectra import RGBUnbounded
+from clpt.spectra import Constant, RGBUnbounded
 
 PRESET_UNIT = 100.0  # factor on the coefficients [1/mm] of presets in Mitsuba 0.6
 SUBSURFACE = ("dipole", "singlescatter")
@@ -95,6 +96,8 @@ def _even(props: Properties) -> Homogeneous:
             "sigma_t": spectra.coefficient(props, "sigma_t", 1.0),
             "albedo": spectra.reflectance(props, "albedo", 0.75),
         }
+    if props.context.old and props.element.type == "homogeneous" and "g" in props.named:
+        _reduce(parameters, props)
     isotropic: Phase = phases.Isotropic()
     parameters |= {
         "scale": props.number("scale", 1.0),
@@ -104,6 +107,26 @@ def _even(props: Properties) -> Homogeneous:
     if "emission" in props.named:
         parameters["emission"] = spectra.emission(props, "emission")
     return Homogeneous(**within(Homogeneous, parameters, props))
+
+
+def _reduce(parameters: dict[str, Any], props: Properties) -> None:
+    """Take Mitsuba 0.6's `g`, by which scattering is reduced: src/librender/medium.cpp."""
+    g = props.number("g", 0.0)
+    if not -1.0 < g < 1.0:
+        raise props.element.error(f"'g' must lie between -1 and 1, not {g:g}")
+    if "sigma_s" in parameters:
+        parameters["sigma_s"] = map_values(parameters["sigma_s"], lambda s: s * (1.0 - g))
+        return
+    even = [
+        value.value if isinstance(value, Constant) else value
+        for value in (parameters["sigma_t"], parameters["albedo"])
+    ]
+    if not all(isinstance(value, float) for value in even):
+        props.context.warn(props.element, "'g' is left out beside a colour of sigmaT or albedo")
+        return
+    sigma_t, albedo = even
+    kept = 1.0 - albedo * g
+    parameters |= {"sigma_t": sigma_t * kept, "albedo": albedo * (1.0 - g) / kept}
 
 
 def body(element: Element, context: Context) -> tuple[Medium, Any, Any]:

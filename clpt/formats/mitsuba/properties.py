@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.choices import Missing
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
-from clpt.formats.colours import GREY, grey_for
 from clpt.formats.mitsuba.xml import MAX_NESTING, Document, Element
-from clpt.formats.reading import note
+from clpt.formats.reading import GREY, grey_for, note
 from clpt.scene.motion import Keys
 
 OLD_VALUES, OLD_OBJECTS = {"blackbody"}, {"subsurface"}  # of Mitsuba 0.x alone
@@ -47,7 +46,8 @@ class Context:
 
     layers: of the film, which integrators ask for; rooms: the corners of the box that each endless
     medium fills, by the id of its element; endless: media whose boxes are still unknown;
-    volumes: the grids that were read; old: whether the file is of Mitsuba 0.x.
+    volumes: the grids that were read; archives: contents of the .serialized files, by path;
+    old: whether the file is of Mitsuba 0.x.
     """
 
     def __init__(
@@ -64,6 +64,7 @@ class Context:
             self.read_as(element, f"{element.tag} {old!r}", new)
         self.endless: dict[int, Any] = {}
         self.volumes: dict[tuple[str, int], Any] = {}
+        self.archives: dict[Path, bytes] = {}
         self.warnings: list[str] = []
         self.layers: dict[str, None] = {}
         self.ids: dict[str, Element] = {}
@@ -135,11 +136,12 @@ class Context:
 
     def grouped(self) -> list[str]:
         """Return a single warning of all notes, if there are any."""
-        version = self.document.root.attributes.get("version", "")
+        version = f"of Mitsuba {self.document.root.attributes.get('version', '')}"
+        origin = version if self.document.makes_normals else "of Nori"
         groups = (("read", self.replaced), ("left out", self.left_out))
         texts = [f"{verb}: {_with_lines(notes)}" for verb, notes in groups if notes]
         name = self.document.root.file.name
-        return [f"{name}: of Mitsuba {version}: {'; '.join(texts)}"] if texts else []
+        return [f"{name}: {origin}: {'; '.join(texts)}"] if texts else []
 
 
 def _with_lines(notes: Mapping[str, Sequence[int]]) -> str:
@@ -216,9 +218,11 @@ class Properties:
     def object(self, tag: str) -> Element | None:
         """Take the single nested object of a tag, or None."""
         objects = self.objects(tag)
-        if len(objects) > 1:
+        if len(objects) > 1 and not self.context.old:
             raise self.element.error(f"holds more than one <{tag}>")
-        return objects[0] if objects else None
+        if len(objects) > 1:
+            self.context.warn(self.element, f"holds more than one <{tag}>: the last counts")
+        return objects[-1] if objects else None
 
     def number(self, name: str, default: float) -> float:
         """Take a finite number."""
@@ -461,7 +465,10 @@ def _step(step: Element) -> transforms.Matrix:
     if step.tag == "scale":
         return transforms.scale(triple(step, "value", 1.0))
     if step.tag == "rotate":
-        return transforms.rotate(triple(step, "value", 0.0), numbers(step, "angle", 1)[0])
+        axis, (angle,) = triple(step, "value", 0.0), numbers(step, "angle", 1)
+        if angle == 0.0 and not axis.any():
+            return np.eye(4)  # as in Mitsuba, whose matrix is the identity for any axis
+        return transforms.rotate(axis, angle)
     if step.tag == "lookat":
         return _look_at(step)
     if step.tag == "matrix":

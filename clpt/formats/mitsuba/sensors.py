@@ -34,6 +34,12 @@ SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler
 HOLDERS = ("adaptive", "irrcache", "multichannel")  # integrators of Mitsuba 0.6 around another
 NO_LIGHT = ("ao", "field", "motion")  # integrators of Mitsuba 0.6 whose values are no light
 REPLAYED_DEPTH = 6  # default of integrators that differentiate
+# Parameters of integrators that differentiate at edges; they change derivatives alone.
+OF_EDGES = (
+    *("sppc", "sppp", "sppi", "guiding", "guiding_proj", "guiding_rounds"),
+    *("reparam_max_depth", "reparam_rays", "reparam_kappa", "reparam_exp"),
+    *("reparam_antithetic", "reparam_unroll"),
+)
 DEFAULT_SAMPLER = "independent"
 LAYERS = {  # of the values that the integrator aov names
     "depth": "depth",
@@ -333,6 +339,8 @@ def _integrator(element: Element, context: Context) -> Integrator:
         raise unknown(element, INTEGRATORS)
     props = Properties(element, context)
     props.ignore("block_size", "samples_per_pass", "timeout")
+    if kind.endswith(("_reparam", "_projective")):
+        props.ignore(*OF_EDGES)
     with element.locating():
         if kind in HOLDERS and context.old:
             chosen = _inner(props)
@@ -479,4 +487,6 @@ INTEGRATORS: dict[str, PluginReader[Integrator]] = {
     "prb": _replayed(free_panes=False),
     "prb_basic": _replayed(free_panes=False),
     "prbvolpath": _replayed(free_panes=True),
+    **dict.fromkeys(("prb_reparam", "prb_projective"), _replayed(free_panes=False)),
+    **dict.fromkeys(("direct_reparam", "direct_projective"), _direct),
 }

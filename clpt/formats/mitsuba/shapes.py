@@ -1,11 +1,18 @@
-"""Mitsuba 0.6's `maxSmoothAngle`: normals of a mesh that stays sharp at its creases."""
+"""Shapes of a Mitsuba scene, with their groups and instances, and .serialized meshes.
+
+A .serialized file has several meshes, each packed by deflate (mitsuba.readthedocs.io, "Serialized
+mesh loader").
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import struct
+import zlib
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,9 +20,9 @@ from numpy.typing import NDArray
 
 from clpt import transforms
 from clpt.errors import SceneError
+from clpt.files import budget, input_files
 from clpt.formats import volumes
 from clpt.formats.meshes import mesh, spheres_curves
-from clpt.formats.mitsuba import serialized
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import area
 from clpt.formats.mitsuba.media import body, side
@@ -26,6 +33,102 @@ from clpt.geometry.polygons import smooth_normals
 from clpt.scene import shapes
 from clpt.scene.materials import Dielectric, Diffuse, Material, Null
 from clpt.scene.shapes import Group, Instance, Mesh, Shape
+
+MAGIC = 0x041C
+VERSIONS = (3, 4)
+NORMALS, UVS, COLOURS, FLAT, DOUBLE = 0x0001, 0x0002, 0x0008, 0x0010, 0x2000
+DEFLATE = 1032  # most bytes that a compressed byte of deflate stands for
+
+
+class _Stream:
+    """The decompressed bytes of a mesh, read in their order."""
+
+    def __init__(self, path: Path, packed: bytes):
+        self.path, self.packed, self.inflate = path, packed, zlib.decompressobj()
+        self.left = DEFLATE * len(packed)
+
+    def take(self, size: int) -> bytes:
+        """Return the next bytes. Raises SceneError where there are fewer."""
+        if size > self.left:
+            raise SceneError("names more vertices or triangles than it can hold", file=self.path)
+        budget.check(2 * size, "a mesh in it", self.path)
+        self.left -= size
+        parts = []
+        while size > 0:
+            try:
+                part = self.inflate.decompress(self.packed, size)
+            except zlib.error as error:
+                raise SceneError(f"is damaged: {error}", file=self.path) from None
+            self.packed = self.inflate.unconsumed_tail
+            if not part:
+                raise SceneError("ends too early", file=self.path)
+            parts.append(part)
+            size -= len(part)
+        return parts[0] if len(parts) == 1 else b"".join(parts)
+
+    def array(self, rows: int, columns: int, dtype: str) -> NDArray[Any]:
+        data = self.take(rows * columns * np.dtype(dtype).itemsize)
+        return np.frombuffer(data, dtype).reshape(rows, columns)
+
+    def text(self) -> str:
+        """Return the text up to a zero byte."""
+        characters = bytearray()
+        while (byte := self.take(1)) != b"\0":
+            characters += byte
+            if len(characters) > 4096:
+                raise SceneError("a mesh's name has no end", file=self.path)
+        return characters.decode("utf-8", "replace")
+
+
+def read(path: Path, index: int, archives: dict[Path, bytes]) -> tuple[Mesh, bool, list[str]]:
+    """Return the mesh number `index` of a file, whether it is to be flat, and what was left out.
+
+    archives: the contents of the files that were read before, by path; a file is read once.
+    Raises SceneError for a file that is missing or broken, or has no such mesh.
+    """
+    if path not in archives:
+        archives[path] = input_files.read_bytes(path)
+    data = archives[path]
+    first, end, version = _mesh_range(path, data, index)
+    stream = _Stream(path, data[first + 4 : end])
+    (flags,) = struct.unpack("<I", stream.take(4))
+    name = stream.text() if version == 4 else path.name
+    n_vertices, n_faces = struct.unpack("<QQ", stream.take(16))
+    real = "<f8" if flags & DOUBLE else "<f4"
+    vertices = stream.array(n_vertices, 3, real)
+    normals = stream.array(n_vertices, 3, real) if flags & NORMALS else None
+    uvs = stream.array(n_vertices, 2, real) if flags & UVS else None
+    inner = {"vertex_color": stream.array(n_vertices, 3, real)} if flags & COLOURS else {}
+    wide = "<u8" if n_vertices > 0xFFFFFFFF else "<u4"
+    faces = stream.array(n_faces, 3, wide)
+    warnings: list[str] = []
+    values = mesh.Arrays(vertices, faces, normals, uvs, inner)
+    arrays = mesh.checked(path, name, values, warnings)
+    if not len(arrays["faces"]):
+        raise SceneError("holds no triangles", file=path)
+    return Mesh(name=name, **arrays), bool(flags & FLAT), warnings
+
+
+def _mesh_range(path: Path, data: bytes, index: int) -> tuple[int, int, int]:
+    """Return where a mesh begins and ends, by the table at the file's end, and the version."""
+    if len(data) < 12 or struct.unpack_from("<H", data)[0] != MAGIC:
+        raise SceneError("is not a .serialized file", file=path)
+    (version,) = struct.unpack_from("<H", data, 2)
+    if version not in VERSIONS:
+        raise SceneError(f"is of version {version}, not 3 or 4", file=path)
+    (count,) = struct.unpack_from("<I", data, len(data) - 4)
+    width = 8 if version == 4 else 4
+    table = len(data) - 4 - width * count
+    if count == 0 or table < 4:
+        raise SceneError("has a broken table of meshes", file=path)
+    if index >= count:
+        raise SceneError(f"has no mesh {index}: it holds {count}", file=path)
+    offsets = [*np.frombuffer(data, f"<u{width}", count, table).tolist(), table]
+    first, end = offsets[index], offsets[index + 1]
+    if not first + 4 <= end <= table or struct.unpack_from("<H", data, first)[0] != MAGIC:
+        raise SceneError(f"has a broken mesh {index}", file=path)
+    return first, end, version
+
 
 MOST_TURNS = 64  # groups of triangles around a vertex; what is left after them stays together
 
@@ -106,10 +209,15 @@ def _single(element: Element, context: Context) -> list[Shape]:
     """Make the shape of an element; None for an unknown kind if missing kinds are grey."""
     if element.type == "instance":
         return [_instance(element, context)]
-    if element.type not in PLUGINS:
-        known = (*PLUGINS, "shapegroup", "instance", "merge")
+    plugins = _plugins(context)
+    if element.type not in plugins:
+        known = (*plugins, "shapegroup", "instance", "merge")
         return context.stand_in(unknown(element, known), element, [])
     return [shape(element, context)]
+
+
+def _plugins(context: Context) -> dict[str, tuple[type[Shape], PluginReader[Parameters]]]:
+    return {**PLUGINS, **OF_OLD} if context.old else PLUGINS
 
 
 def _merged(element: Element, context: Context) -> list[Element]:
@@ -124,7 +232,7 @@ def _merged(element: Element, context: Context) -> list[Element]:
 
 def shape(element: Element, context: Context) -> Shape:
     """Make the shape that a <shape> describes, which is no group and no instance."""
-    cls, read = PLUGINS[element.type]
+    cls, read = _plugins(context)[element.type]
     props = Properties(element, context)
     props.ignore("silhouette_sampling_weight")
     material, emitter = props.object("bsdf"), props.object("emitter")
@@ -285,7 +393,8 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
         raise props.element.error(f"{path.name!r} is not a {suffix} file")
     try:
         if suffix == ".serialized":
-            whole, own_flat, warnings = serialized.read(path, props.integer("shape_index", 0))
+            index = props.integer("shape_index", 0)
+            whole, own_flat, warnings = read(path, index, props.context.archives)
             flat |= own_flat
         else:
             loaded = mesh.read_mesh(path, materials=False)
@@ -296,6 +405,7 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
         props.context.warn(props.element, f"{path.name}: {warning}")
     if crease >= 0.0 and not flat:
         whole = creased(whole, crease)
+    flat |= whole.normals is None and not props.context.document.makes_normals
     vertices, moves = whole.vertices, not np.array_equal(to_world, transforms.IDENTITY)
     if moves:
         vertices = transforms.transform_points(to_world, vertices).astype(np.float32)
@@ -321,17 +431,35 @@ def _linear_curve(props: Properties) -> Parameters:
     return {"basis": "linear", **_curves(props)}
 
 
+def _hair(props: Properties) -> Parameters:
+    """Mitsuba 0.x: strands of an even radius, which `to_world` scales: src/shapes/hair.cpp."""
+    props.ignore("angle_threshold")
+    if props.number("reduction", 0.0) != 0.0:
+        props.context.warn(props.element, "'reduction' is left out: all strands are there")
+    radius = props.number("radius", 0.025)
+    arrays, to_world = _strands(props, spheres_curves.read_hair)
+    radii = np.full(len(arrays["points"]), radius * np.linalg.norm(to_world[:3, 2]), np.float32)
+    return {**arrays, "basis": "linear", "points": np.column_stack([arrays["points"], radii])}
+
+
 def _curves(props: Properties) -> Parameters:
     """Read strands; `to_world` moves their points and, as in Mitsuba, leaves their radii."""
+    return _strands(props, spheres_curves.read_strands)[0]
+
+
+def _strands(
+    props: Properties, read: Callable[[Path], dict[str, Any]]
+) -> tuple[Parameters, transforms.Matrix]:
+    """Return the strands of a file in the world, and `to_world`."""
     path, to_world = props.file(), props.placement(thin=True)
     try:
-        arrays = spheres_curves.read_strands(path)
+        arrays = read(path)
     except SceneError as error:
         line = f":{error.line}" if error.line else ""
         raise props.element.error(f"{path.name}{line}: {error.message}") from None
     points = arrays["points"]
     points[:, :3] = transforms.transform_points(to_world, points[:, :3])
-    return arrays
+    return arrays, to_world
 
 
 def _sdf_grid(props: Properties) -> Parameters:
@@ -360,4 +488,7 @@ PLUGINS: dict[str, tuple[type[Shape], PluginReader[Parameters]]] = {
     "bsplinecurve": (shapes.Curves, _bspline_curve),
     "linearcurve": (shapes.Curves, _linear_curve),
     "sdfgrid": (shapes.SdfGrid, _sdf_grid),
+}
+OF_OLD: dict[str, tuple[type[Shape], PluginReader[Parameters]]] = {  # of Mitsuba 0.x alone
+    "hair": (shapes.Curves, _hair),
 }

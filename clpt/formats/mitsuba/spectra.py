@@ -13,7 +13,6 @@ import numpy as np
 
 from clpt import images, spectra
 from clpt.errors import UnknownKindError
-from clpt.formats.colours import GREY, colour
 from clpt.formats.mitsuba.properties import (
     Context,
     PluginReader,
@@ -25,7 +24,7 @@ from clpt.formats.mitsuba.properties import (
 )
 from clpt.formats.mitsuba.spectrum_plugins import PLAIN
 from clpt.formats.mitsuba.xml import Element
-from clpt.formats.reading import attempt
+from clpt.formats.reading import GREY, attempt, colour
 from clpt.scene.roles import COEFFICIENT, EMISSION, FACTOR, INDEX, REFLECTANCE, Spectral
 from clpt.scene.textures import (
     ATTRIBUTES,

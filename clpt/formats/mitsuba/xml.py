@@ -77,7 +77,8 @@ class Document:
     """An expanded scene file: its root, and the folders of file names: the scene's, its <path>s.
 
     camera: number or id of the chosen sensor; variables: values by name;
-    renamed: plugins of old files, each with its old and its new name.
+    renamed: plugins of old files, each with its old and its new name;
+    makes_normals: whether a mesh without normals gets smooth ones, as in Mitsuba.
     """
 
     root: Element
@@ -85,6 +86,7 @@ class Document:
     camera: str | None = None
     variables: Mapping[str, str] = field(default_factory=dict)
     renamed: list[tuple[Element, str, str]] = field(default_factory=list)
+    makes_normals: bool = True
 
     @property
     def is_old(self) -> bool:

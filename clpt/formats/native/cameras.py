@@ -10,7 +10,7 @@ from clpt.formats.native.cursor import Cursor
 from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, Schema, object_of, ref, rows
 from clpt.formats.native.spectra import find_file
 from clpt.lenses import Coat, Prescription, Surface
-from clpt.lenses.glasses import by_number
+from clpt.lenses.prescription import by_number
 from clpt.scene.roles import INDEX, Spectral
 from clpt.spectra import Constant, Sensor, Spectrum
 from clpt.spectra.sensors import OBSERVERS

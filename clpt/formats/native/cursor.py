@@ -17,7 +17,7 @@ from typing import Any
 from clpt.arrays import is_number
 from clpt.errors import SceneError, UnusedParameterError
 from clpt.files import budget
-from clpt.files import text as text_files
+from clpt.files import input_files as text_files
 from clpt.formats.reading import Located
 
 LARGEST_INTEGER = 2**31 - 1

@@ -14,10 +14,10 @@ from clpt.choices import Missing
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.files import budget
 from clpt.formats import materialx, volumes
-from clpt.formats.colours import EVEN, GREY, grey_for
 from clpt.formats.native import forms, shape_files
 from clpt.formats.native.cursor import Cursor, ReadCursor, parse
 from clpt.formats.native.spectra import find_file, kind_name
+from clpt.formats.reading import EVEN, GREY, grey_for
 from clpt.scene import Scene, checked_noise, integrators, kinds, lights, materials, media, shapes
 from clpt.scene.params import Kind, params, shorthands
 from clpt.scene.volumes import Volume

@@ -26,7 +26,7 @@ from clpt.formats.native.json_schema import (
 )
 from clpt.formats.native.shape_files import FILES
 from clpt.formats.native.spectra import RERADIATIONS, SPECTRA
-from clpt.images.transfer import HEX
+from clpt.images.colour import HEX
 from clpt.scene import KINDS, integrators, materials, roles
 from clpt.scene.params import Kind, defaults, params
 from clpt.scene.roles import Param, Role, Spectral

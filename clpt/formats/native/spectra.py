@@ -15,9 +15,9 @@ from clpt import spectra
 from clpt.arrays import is_number
 from clpt.errors import UnknownKindError
 from clpt.files import input_files
-from clpt.formats.colours import colour
 from clpt.formats.native.cursor import Cursor
-from clpt.images.transfer import from_hex
+from clpt.formats.reading import colour
+from clpt.images.colour import from_hex
 from clpt.scene.integrators import NO_AOV
 from clpt.scene.roles import COEFFICIENT, EMISSION, INDEX, REFLECTANCE, Spectral
 from clpt.spectra import Constant, Donaldson, Fluorophore, Reradiation, Spectrum

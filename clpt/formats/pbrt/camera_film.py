@@ -334,7 +334,9 @@ def sampler(definition: Definition | None) -> tuple[Sampler, int, int | None]:
     if definition is None:
         return integrators.Sobol(), 16, None
     params = definition.params
-    if definition.kind not in SAMPLERS:
+    if definition.kind not in SAMPLERS and definition.state.shared.old:
+        definition.state.warn(params, "is not known here: other random numbers are used")
+    elif definition.kind not in SAMPLERS:
         raise UnknownKindError("sampler", definition.kind, SAMPLERS, **params.location())
     if definition.kind == "stratified":
         params.ignore("jitter")

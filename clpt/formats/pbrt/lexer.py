@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.errors import SceneError, did_you_mean
-from clpt.files import budget, text
+from clpt.files import budget, input_files
 from clpt.formats.pbrt.params import ALIASES, TYPES, Parameter
 from clpt.formats.reading import read_bytes
 
@@ -31,7 +31,7 @@ class Lexer:
     """
 
     def __init__(self, path: Path):
-        self.path, self.data = path, text.plain(read_bytes(path))
+        self.path, self.data = path, input_files.plain(read_bytes(path))
         self.at = 0  # after the blanks before the next word
         self._ahead: bytes | None = None
         self._counted, self._line = 0, 1
@@ -78,7 +78,7 @@ class Lexer:
         word = self.next(label)
         if not word.startswith(b'"'):
             raise self.error(f"{label} must stand in quotes, not {_shown(word)}")
-        return text.decode(word[1:-1])
+        return input_files.decode(word[1:-1])
 
     def numbers(self, count: int, label: str) -> NDArray[np.float64]:
         """Take `count` finite numbers, which may stand in brackets."""
@@ -148,7 +148,7 @@ class Lexer:
         if words and words[0].startswith(b'"'):
             if not all(word.startswith(b'"') for word in words):
                 raise self.error("strings and other values are mixed")
-            return [text.decode(word[1:-1]) for word in words]
+            return [input_files.decode(word[1:-1]) for word in words]
         if words and all(word in (b"true", b"false") for word in words):
             return [word == b"true" for word in words]
         return np.array([self._number(word) for word in words], np.float64)
@@ -157,7 +157,7 @@ class Lexer:
         try:
             return float(word)
         except ValueError:
-            comma = text.comma_message(text.decode(word))
+            comma = input_files.comma_message(input_files.decode(word))
             raise self.error(comma or f"expected a number, found {_shown(word)}") from None
 
 
@@ -170,4 +170,4 @@ def _floats(inside: bytes) -> NDArray[np.float64] | None:
 
 
 def _shown(word: bytes) -> str:
-    return repr(text.decode(word[:40]))
+    return repr(input_files.decode(word[:40]))

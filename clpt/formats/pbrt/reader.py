@@ -8,7 +8,7 @@ import numpy as np
 
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError, did_you_mean
-from clpt.files import text
+from clpt.files import input_files
 from clpt.formats.pbrt import old_words
 from clpt.formats.pbrt.lexer import UPGRADE
 from clpt.formats.pbrt.params import Parameter, Parameters
@@ -48,7 +48,7 @@ class _Reader(TransformDirectives):
 
     def directive(self) -> None:
         """Take the next directive and do what it says."""
-        self.name = text.decode(self.lexer.next("a directive"))
+        self.name = input_files.decode(self.lexer.next("a directive"))
         if self.contents.shared.old:
             self._modernise()
         action = DIRECTIVES.get(self.name)
@@ -95,10 +95,15 @@ class _Reader(TransformDirectives):
             raise self._unknown()
 
     def option(self) -> None:
-        """Camera, Film and the like."""
-        self.only(False)
+        """Camera, Film and the like; versions 2 and 3 ignore them after WorldBegin."""
+        ignored = self.contents.shared.old and self.in_world
+        self.only(ignored)
         name = self.name
-        self.contents.options[name] = self._definition(f'{name} "{{}}"')
+        definition = self._definition(f'{name} "{{}}"')
+        if ignored:
+            self.warn("stands after WorldBegin and is left out")
+            return
+        self.contents.options[name] = definition
         if name == "Camera":
             ctm, end = self.state.ctm, self.state.end
             if transforms.is_singular(ctm) or (end is not None and transforms.is_singular(end)):
@@ -289,8 +294,13 @@ class _Reader(TransformDirectives):
             raise definition.params.error("is already defined")
 
     def named_material(self) -> None:
+        """Take a material for the shapes to come; version 3 keeps the former for unknown names."""
         self.only(True)
-        self.state.material = self.lexer.string("a name")
+        name, shared = self.lexer.string("a name"), self.contents.shared
+        if shared.old and name not in shared.materials:
+            self.warn(f"there is no material {name!r} so far: the material before it stays")
+            return
+        self.state.material = name
 
     def texture(self) -> None:
         self.only(True)

@@ -7,6 +7,7 @@ has luminance 1 here too, so no further factor stands between a file and a Scene
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -14,10 +15,10 @@ import numpy as np
 
 from clpt import spectra
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats.colours import colour
 from clpt.formats.pbrt.params import Parameter, Parameters
 from clpt.formats.pbrt.state import State
-from clpt.scene.roles import EMISSION, REFLECTANCE, Spectral
+from clpt.formats.reading import colour
+from clpt.scene.roles import EMISSION, REFLECTANCE, ROUNDING, Spectral
 from clpt.spectra import Blackbody, Spectrum, Tabulated, cie, scaled, spaces
 
 SPACES = {"srgb": "rec709", "rec2020": "rec2020", "dci-p3": "display_p3"}
@@ -60,14 +61,27 @@ def value_of(values: Parameter, role: Spectral, state: State) -> Any:
     if values.type == "rgb":
         return _rgb(values, role, state)
     if values.type == "blackbody" and state.shared.old:
-        return _peaked(values)
-    if values.type == "blackbody":
-        result: Spectrum = Blackbody(values.numbers(1)[0], normalised=True)
+        result: Spectrum = _peaked(values)
+    elif values.type == "blackbody":
+        result = Blackbody(values.numbers(1)[0], normalised=True)
     elif values.is_text:
         result = _named(values.text(), role, state)
     else:
         result = _pairs(values.numbers(), role)
+    if role is REFLECTANCE:
+        result = _limited(values, result, state)
     return _of_luminance_one(result) if role is EMISSION and not state.shared.old else result
+
+
+def _limited(values: Parameter, result: Spectrum, state: State) -> Spectrum:
+    """Return a reflectance that is cut off at 1, as in pbrt, with a warning."""
+    table = (
+        result if isinstance(result, Tabulated) else Tabulated(cie.GRID, result.sample(cie.GRID))
+    )
+    if max(table.values) <= 1.0 + ROUNDING:
+        return result
+    state.warn(values, "exceeds 1 and is cut off")
+    return replace(table, values=tuple(min(float(value), 1.0) for value in table.values))
 
 
 def _peaked(entries: Parameter) -> Spectrum:

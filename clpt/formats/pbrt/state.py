@@ -15,12 +15,11 @@ import numpy as np
 from clpt import transforms
 from clpt.choices import Missing
 from clpt.errors import SceneError, did_you_mean
-from clpt.files import budget, input_files, text
-from clpt.formats.colours import grey_for
+from clpt.files import budget, input_files
 from clpt.formats.pbrt import old_words
 from clpt.formats.pbrt.lexer import Lexer
 from clpt.formats.pbrt.params import Parameter, Parameters
-from clpt.formats.reading import Located
+from clpt.formats.reading import Located, grey_for
 from clpt.scene.materials import Material
 from clpt.scene.motion import Keys
 
@@ -335,7 +334,7 @@ class TransformDirectives(Files):
         self._set(*systems[name])
 
     def active_transform(self) -> None:
-        which = text.decode(self.lexer.next("All, StartTime or EndTime"))
+        which = input_files.decode(self.lexer.next("All, StartTime or EndTime"))
         if which not in ("All", "StartTime", "EndTime"):
             raise SceneError(f"{which[:40]!r} is none of All, StartTime, EndTime")
         self.state.active = which != "EndTime", which != "StartTime"

@@ -12,10 +12,10 @@ import numpy as np
 
 from clpt import images, transforms
 from clpt.errors import SceneError, UnknownKindError
-from clpt.formats.colours import EVEN, GREY
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.spectra import SPECTRUM_TYPES, TEXTURE, spectrum, value_of
 from clpt.formats.pbrt.state import Definition, State
+from clpt.formats.reading import EVEN, GREY
 from clpt.images import Stored
 from clpt.scene.params import fields_of
 from clpt.scene.roles import REAL, Role, Spectral
@@ -110,6 +110,10 @@ def textured(
         used = role if isinstance(role, Spectral) else TEXTURE  # a number is the same in all
         with values.locating():
             return value_of(values, used, state)
+    defined = state.latest(state.shared.textures.get((form, values.text()))) is not None
+    if state.shared.old and not defined:
+        state.warn(values, f"there is no {form} texture {values.text()!r}: the default counts")
+        return default
     definition = state.texture(form, values.text(), values)
     return state.shared.once(definition, values, lambda: _texture(form, definition))
 
@@ -199,6 +203,15 @@ def _bilerp(form: str, params: Parameters, state: State) -> Any:
         wrap="clamp",
         **_mapping(params, state, centres),
     )
+
+
+def _uv(form: str, params: Parameters, state: State) -> Any:
+    """Versions 2 and 3: u is red and v is green, each without its whole part."""
+    if form == "float":
+        raise params.error("has colours, no numbers")
+    image = np.array([[[0, 1, 0], [1, 1, 0]], [[0, 0, 0], [1, 0, 0]]], np.float32)
+    centres = np.array([[0.5, 0.0, 0.25], [0.0, 0.5, 0.25], [0.0, 0.0, 1.0]])
+    return Bitmap(image=image, raw=True, wrap="clamp", **_mapping(params, state, centres))
 
 
 def _checkerboard(form: str, params: Parameters, state: State) -> Any:
@@ -366,6 +379,7 @@ MAKERS = {
     "mix": _mix,
     "directionmix": _direction_mix,
     "bilerp": _bilerp,
+    "uv": _uv,
     "checkerboard": _checkerboard,
     "imagemap": _imagemap,
     "dots": _dots,

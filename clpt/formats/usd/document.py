@@ -1,18 +1,25 @@
-"""An open stage at a time code: values, placements, files, and what a reader leaves out."""
+"""An open stage at a time code: values, placements, prims by role, and what a reader leaves out.
+
+Files that a stage names lie beside it, or in a .usdz package. Prims that are invisible or of
+another purpose are not shown.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import tempfile
+from collections import defaultdict
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom, Vt
+from pxr import Ar, Sdf, Usd, UsdGeom, Vt
 
+from clpt import images
 from clpt.arrays import Matrix
 from clpt.errors import SceneError
-from clpt.files import budget
+from clpt.files import budget, input_files
 from clpt.scene.studio import Up
 
 MOST_TOLD = 4  # prims that a warning names
@@ -106,3 +113,97 @@ def rows(value: object, width: int, kind: type = np.float32) -> Any:
     """Return USD's array as numpy's, (n, width), or (n,) where width is 0."""
     array: NDArray[Any] = np.asarray(value, kind)
     return array.reshape(-1) if width == 0 else array.reshape(-1, width)
+
+
+def read_image(document: Document, asset: Sdf.AssetPath) -> images.Stored:
+    """Return the image that an asset names. Raises SceneError."""
+    if not Ar.IsPackageRelativePath(asset.resolvedPath):
+        return images.read_stored(file_of(document, asset))
+    name = Path(Ar.SplitPackageRelativePathInner(asset.resolvedPath)[1])
+    # Readers of images take files: OpenEXR has no other way in.
+    with tempfile.TemporaryDirectory(prefix="clpt-usdz-") as folder:
+        copy = Path(folder) / f"image{name.suffix.lower()}"
+        copy.write_bytes(packed(document, asset))
+        try:
+            return images.read_stored(copy)
+        except SceneError as error:
+            raise SceneError(error.message) from None
+
+
+def file_of(document: Document, asset: Sdf.AssetPath) -> Path:
+    """Return the file that an asset names. Raises SceneError where there is none to be read."""
+    if not asset.resolvedPath:
+        raise SceneError(f"there is no file {asset.path!r}")
+    return input_files.named("usd", document.file.parent, Path(asset.resolvedPath))
+
+
+def packed(document: Document, asset: Sdf.AssetPath) -> bytes:
+    """Return the bytes of a file in a package. Raises SceneError."""
+    outer = Path(Ar.SplitPackageRelativePathOuter(asset.resolvedPath)[0])
+    input_files.named("usd", document.file.parent, outer)
+    opened = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(asset.resolvedPath))
+    if opened is None:
+        raise SceneError(f"there is no file {asset.path!r}")
+    budget.take(opened.GetSize(), "files of the package", document.file)
+    return bytes(opened.GetBuffer())
+
+
+LIGHTS = frozenset(
+    (
+        "RectLight", "DiskLight", "SphereLight", "CylinderLight", "DistantLight", "DomeLight",
+        "DomeLight_1", "PortalLight", "GeometryLight", "PluginLight",
+    )
+)  # fmt: skip
+GPRIMS = frozenset(
+    ("Mesh", "Sphere", "Cube", "Cylinder", "Cylinder_1", "Cone", "Capsule", "Capsule_1", "Plane",
+     "BasisCurves", "Points")
+)  # fmt: skip
+UNREAD = frozenset(
+    ("NurbsPatch", "NurbsCurves", "HermiteCurves", "TetMesh", "LightFilter", "PluginLightFilter",
+     "ParticleField3DGaussianSplat", "ParticleField")
+)  # fmt: skip
+HIDDEN = ("proxy", "guide")  # purposes that no picture shows
+
+
+Shown = dict[str, list[Usd.Prim]]  # prims by role: see ROLES, and "instances"
+ROLES = {
+    **dict.fromkeys(GPRIMS, "gprims"), **dict.fromkeys(LIGHTS, "lights"), "Camera": "cameras",
+    "PointInstancer": "instancers", "Volume": "volumes", "RenderSettings": "settings",
+}  # fmt: skip
+
+
+def shown(document: Document, root: Usd.Prim, *, defined: bool = True) -> Shown:
+    """Return the prims that are shown below a prim, and that prim.
+
+    defined: leave out prims that only `over` speaks of, as a stage does; prototypes may be below
+    such prims.
+    """
+    prims: Shown = defaultdict(list)
+    for prim in _prims(document, root, defined):
+        name = prim.GetTypeName()
+        role = ROLES.get(name)
+        if role is not None:
+            prims[role].append(prim)
+        elif name in UNREAD:
+            document.warn(f"{name} is not read", prim.GetPath())
+        elif prim.IsInstance():
+            prims["instances"].append(prim)
+    return prims
+
+
+def _prims(document: Document, root: Usd.Prim, defined: bool) -> Iterator[Usd.Prim]:
+    """Yield a prim and those below it that are visible and of a purpose that is shown."""
+    anywhere = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
+    iterator = iter(Usd.PrimRange(root, Usd.PrimDefaultPredicate if defined else anywhere))
+    for prim in iterator:
+        visibility = prim.GetAttribute("visibility")
+        if visibility and visibility.Get(document.time) == "invisible":
+            iterator.PruneChildren()
+            if prim.GetTypeName() != "Camera":
+                continue
+        elif prim.GetAttribute("purpose").Get() in HIDDEN:
+            iterator.PruneChildren()
+            continue
+        elif prim.GetTypeName() == "PointInstancer":
+            iterator.PruneChildren()
+        yield prim

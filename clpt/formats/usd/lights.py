@@ -19,8 +19,8 @@ from clpt.arrays import Floats, Floats32, Matrix
 from clpt.errors import SceneError
 from clpt.files import budget
 from clpt.formats import ies
-from clpt.formats.usd import packages, textures
-from clpt.formats.usd.document import Document
+from clpt.formats.usd import textures
+from clpt.formats.usd.document import Document, file_of
 from clpt.scene.lights import Area, Constant, Directional, Envmap, Goniometric, Light, Point, Spot
 from clpt.scene.materials import Null
 from clpt.scene.shapes import Cylinder, Disk, Rectangle, Shape, Sphere
@@ -300,7 +300,7 @@ def _profile(document: Document, prim: Usd.Prim) -> Floats | None:
     if not isinstance(asset, Sdf.AssetPath) or not asset.path:
         return None
     try:
-        lamp = ies.read(packages.file_of(document, asset))
+        lamp = ies.read(file_of(document, asset))
     except SceneError as error:
         document.warn(f"profile {asset.path!r} is left out: {error.message}", prim.GetPath())
         return None

@@ -13,8 +13,7 @@ from pxr import Usd, UsdShade
 from clpt.formats import materialx
 from clpt.formats.usd import textures
 from clpt.formats.usd.document import Document
-from clpt.formats.usd.nodes import Node
-from clpt.formats.usd.textures import Uses
+from clpt.formats.usd.textures import Node, Uses
 from clpt.scene import gltf_material
 from clpt.scene.lights import Area
 from clpt.scene.materials import Blend, GltfSurface, Material, ThinDielectric, TwoSided

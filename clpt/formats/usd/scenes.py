@@ -16,7 +16,7 @@ from clpt.errors import SceneError, nearest
 from clpt.files import budget, input_files
 from clpt.formats import framing
 from clpt.formats.gltf import animation
-from clpt.formats.usd import cameras, gprims, lights, render_settings, volumes
+from clpt.formats.usd import cameras, gprims, lights
 from clpt.formats.usd.document import Document
 from clpt.scene import Scene
 from clpt.scene.lights import Constant, Light
@@ -183,8 +183,8 @@ def _scene(document: Document, variables: dict[str, Any]) -> Scene:
         own_lights += lit.lights
         shapes += lit.shapes
     for prim in world.volumes:
-        shapes += volumes.volume(document, prim, document.placement(prim))
-    settings = render_settings.settings(document, world.settings)
+        shapes += gprims.volume(document, prim, document.placement(prim))
+    settings = cameras.settings(document, world.settings)
     chosen = _chosen(document, world.cameras, variables.get("camera", settings.camera))
     if not shapes:
         document.warn("holds no shapes", "/")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from clpt import transforms
 from clpt.arrays import Balls, Points, on_device
 from clpt.bvh import Building
-from clpt.geometry import analytic, instancing, shapes, spheres
+from clpt.geometry import analytic, instancing, shapes
 from clpt.records import INSTANCE, SHAPE
 from clpt.render.records.tables import as_array
 from clpt.render.wavefront.device_scene import DeviceScene
@@ -164,10 +164,10 @@ class MovingSpheres:
         centers = as_array(shape.centers, "centers", queue, where)
         if len(centers) != count:
             raise CannotMove(f"{where} has {len(centers)} spheres, and had {count}")
-        common = spheres.common(dataclasses.replace(shape, to_world=matrix))
+        common = analytic.common(dataclasses.replace(shape, to_world=matrix))
         balls = None
         if not on_device(centers) and not on_device(shape.radii):
-            balls = spheres.balls(dataclasses.replace(shape, to_world=np.eye(4)))
+            balls = analytic.balls(dataclasses.replace(shape, to_world=np.eye(4)))
         elif not (on_device(centers) and _readable_in_place(centers)):
             raise CannotMove(
                 f"the centres of {where} are no (n, 3) or (n, 4) float32 on the device"

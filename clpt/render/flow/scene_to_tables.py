@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from clpt import transforms
 from clpt.files import budget
-from clpt.geometry import shape_records, shapes
+from clpt.geometry import shapes
 from clpt.geometry.instancing import Instances
 from clpt.geometry.refining import is_refined
 from clpt.records import SHAPE_BITS
@@ -392,7 +392,7 @@ class _Tables:
 
 def _zero_copy_tables(index: SceneIndex, geometry: Geometry) -> dict[str, Any]:
     """Buffers of a mesh that alone has triangles, which are tables as they are."""
-    meshes = [s for _, s, _, _ in geometry.owners if s.kind not in shape_records.ANALYTIC]
+    meshes = [s for _, s, _, _ in geometry.owners if s.kind not in shapes.ANALYTIC]
     if len(meshes) != 1 or index.prototypes or not isinstance(meshes[0], Mesh):
         return {}
     mesh = meshes[0]

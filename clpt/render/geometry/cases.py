@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from clpt.geometry.shape_records import ANALYTIC, ONE_OF, ROWS, VALUES
+from clpt.geometry.shapes import ANALYTIC, ONE_OF, ROWS, VALUES
 from clpt.render.records import Features
 from clpt.render.records.dispatch import Case, Function, active, function
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from clpt import spectra
 from clpt.arrays import Floats32
 from clpt.files import budget
-from clpt.geometry import analytic, shape_records, shapes, strands, triangles
+from clpt.geometry import analytic, shapes, strands, triangles
 from clpt.geometry.triangles import per_face
 from clpt.records import SHAPE, SHAPE_BITS
 from clpt.render.geometry.find import Geometry, Owner, Stored, spheres_move
@@ -55,7 +55,7 @@ def encode_geometry(
         front, back, two_sided = materials.sides(shape)
         row["front"], row["back"] = np.array([front, back], np.uint32).view(np.int32)
         row["flags"] |= SHAPE_BITS["two_sided"] if two_sided else 0
-        if shape.kind not in shape_records.ANALYTIC:
+        if shape.kind not in shapes.ANALYTIC:
             _store_corners(stored, store)
         elif shape.kind == "curves" and stored.many is not None:
             curves.append((row, shape, stored.many))
@@ -135,7 +135,7 @@ def encode_attributes(
             if name in names:
                 words = 1 if role is REAL else COLOUR_WORDS
                 first = first_face if per_face(name) else first_vertex
-                if shape.kind in shape_records.ONE_OF:
+                if shape.kind in shapes.ONE_OF:
                     first = int(row["prim"]) - single_count
                 how = (name, role, channel, textures.spectra.spectral)
                 by = (*shapes.geometry(shape), shape.attributes[name], *how)
@@ -164,7 +164,7 @@ def motion_features(index: SceneIndex, geometry: Geometry, row: int) -> MotionFe
     row: the first number of the table of motions in `distributions`.
     """
     motions = index.motions
-    analytic = {p.number for p in index.placed if p.shape.kind in shape_records.ANALYTIC}
+    analytic = {p.number for p in index.placed if p.shape.kind in shapes.ANALYTIC}
     placed = {int(number) for prototype in index.prototypes for number in prototype.numbers}
     lit = {int(geometry.rows[emitter.shape_row]["number"]) for emitter in geometry.emitters}
     numbers = motions.shapes.keys()
@@ -193,7 +193,7 @@ def geometry_features(
     instances = bool(index.prototypes)
     count = len(geometry.instances.rows)
     return GeometryFeatures(
-        analytic=tuple(kind for kind in shape_records.ANALYTIC if kind in geometry.analytic),
+        analytic=tuple(kind for kind in shapes.ANALYTIC if kind in geometry.analytic),
         instances=instances,
         only_instances=instances and not geometry.world_vertices,
         few_instances=count if geometry.keyed and count <= FEW_INSTANCES else 0,

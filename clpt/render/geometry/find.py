@@ -14,16 +14,7 @@ from clpt.arrays import Faces, Points, fits_single
 from clpt.bvh.build import MOST
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.geometry import (
-    analytic,
-    instancing,
-    motion,
-    shape_records,
-    shapes,
-    spheres,
-    strands,
-    triangles,
-)
+from clpt.geometry import analytic, instancing, motion, shapes, strands, triangles
 from clpt.geometry.instancing import Instances, Placed, Prototype
 from clpt.geometry.motion import Motions
 from clpt.records import SHAPE, SHAPE_BITS
@@ -133,9 +124,9 @@ def _divided(placed: Iterable[Placed]) -> tuple[list[Placed], list[Placed]]:
     """Return shapes of triangles, and analytic shapes with `spheres` and `curves` at the end."""
     meshes: list[Placed] = []
     others: list[Placed] = []
-    many = list(shape_records.ONE_OF)
+    many = list(shapes.ONE_OF)
     for each in placed:
-        (others if each.shape.kind in shape_records.ANALYTIC else meshes).append(each)
+        (others if each.shape.kind in shapes.ANALYTIC else meshes).append(each)
     others.sort(key=lambda each: each.shape.kind in many and 1 + many.index(each.shape.kind))
     return meshes, others
 
@@ -146,7 +137,7 @@ def assembled(index: SceneIndex, cache: LoweringCache) -> Geometry:
     Raises SceneError for an invalid shape, and for more triangles than a tree can hold.
     """
     meshes, others = _divided(index.placed)
-    single = [each for each in others if each.shape.kind not in shape_records.ONE_OF]
+    single = [each for each in others if each.shape.kind not in shapes.ONE_OF]
     builder = _Builder(cache, len(single), index.motions)
     for each in meshes:
         builder.add(each)
@@ -221,13 +212,13 @@ class _Builder:
         self.owners.append((row, shape, self.vertex_count, self.face_count))
         corners: tuple[Any, Any, Any] = (None, None, None)
         stored = Stored()
-        if shape.kind not in shape_records.ANALYTIC:
+        if shape.kind not in shapes.ANALYTIC:
             corners, stored = self._add_triangles(shape, row, times)
         else:
-            row["kind"] = 1 + shape_records.ANALYTIC.index(shape.kind)
+            row["kind"] = 1 + shapes.ANALYTIC.index(shape.kind)
             if shape.kind == "curves":
                 stored = self._add_curves(shape, row)
-            elif shape.kind in shape_records.ONE_OF:
+            elif shape.kind in shapes.ONE_OF:
                 times_of = self.motions.deforming.get(placed.number)
                 balls, stored = self._add_balls(shape, row, times_of)
                 corners = balls, None, None
@@ -252,12 +243,12 @@ class _Builder:
         row["flags"] |= SHAPE_BITS["many"]
         by = shapes.geometry(shape)
         if times:
-            keyed = self.cache(spheres.keyed, shape, times, by=(*by, times))
-            self.many.append(spheres.swept(keyed))
+            keyed = self.cache(analytic.keyed, shape, times, by=(*by, times))
+            self.many.append(analytic.swept(keyed))
             budget.take_arrays((keyed, self.many[-1]), shapes.where(shape))
             return keyed[:, 0], Stored(many=keyed)
-        balls = self.cache(spheres.balls, shape, by=by)
-        self.many.append(spheres.boxes([balls]))
+        balls = self.cache(analytic.balls, shape, by=by)
+        self.many.append(analytic.boxes([balls]))
         budget.take_arrays((balls, self.many[-1]), shapes.where(shape))
         return balls, Stored(many=balls)
 
@@ -339,4 +330,4 @@ class _Builder:
 
 def _in_triangles(shape: Shape) -> bool:
     """Return whether each triangle of an emitting shape becomes a light."""
-    return shape.kind not in (*shape_records.RECORDS, *shape_records.ANALYTIC)
+    return shape.kind not in (*shapes.RECORDS, *shapes.ANALYTIC)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats
-from clpt.geometry import shape_records
+from clpt.geometry import shapes
 from clpt.render.geometry.find import Geometry
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import materials as mt
@@ -85,7 +85,7 @@ def sharp_pieces(
         if not wanted(shape.material):
             continue
         if row["kind"]:
-            many = shape.kind in shape_records.ONE_OF
+            many = shape.kind in shapes.ONE_OF
             first = int(row["prim"]) if many else i - geometry.first_analytic
             behind = owners[i + 1][0]["prim"] if i + 1 < len(owners) else len(boxes)
             shape_boxes = boxes[first : int(behind) if many else first + 1]

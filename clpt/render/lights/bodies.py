@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, cast
 
@@ -102,14 +102,21 @@ def _bricks(medium: Grid, look: Look) -> BrickLights:
         table = black_bodies(medium, light.kelvin)
         brightness = np.stack([table[:, 0], table[:, 1:].mean(axis=1)], axis=1)
     else:
-        strength = _brightness(light, absorbs, look, lambda coefficient: coefficient)
+        strength = _brightness(light, absorbs, look)
     return brick_lights(medium, max(strength, 1e-30), brightness).brightest()
 
 
 def _brightness(
-    light: Spectrum, absorbs: Spectrum, look: Look, share: Callable[[Floats], Floats]
+    light: Spectrum, absorbs: Spectrum, look: Look, chord: float | None = None
 ) -> float:
-    """Return the brightness of light times a share that depends on a coefficient [1/m]."""
+    """Return the brightness of light times a coefficient [1/m], or the share that a chord absorbs.
+
+    chord: [m]
+    """
+
+    def share(coefficient: Floats) -> Floats:
+        return coefficient if chord is None else -np.expm1(-np.maximum(coefficient, 0.0) * chord)
+
     colour = np.asarray(light.to_rgb("emission"), float)
     seen = float((colour * share(np.asarray(absorbs.to_rgb("unbounded"), float))).mean())
     if not look.spectral:
@@ -183,7 +190,7 @@ def _power(medium: Medium, matrix: NDArray[np.float64], ball: bool, look: Look) 
     sides = [np.linalg.norm(np.cross(edges[:, i], edges[:, i - 1])) for i in range(3)]
     surface = 4.0 * (np.pi * float(np.mean(sides)) if ball else 2.0 * float(np.sum(sides)))
     chord = 4.0 * volume / surface
-    shown = _brightness(light, absorbs, look, lambda a: -np.expm1(-np.maximum(a, 0.0) * chord))
+    shown = _brightness(light, absorbs, look, chord)
     return max(np.pi * surface * shown, 1e-30)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from clpt.device.source import TWIN
-from clpt.geometry import shape_records
+from clpt.geometry import shapes
 from clpt.render.records import Features
 from clpt.render.records import lights as light_records
 from clpt.render.records.dispatch import Case, Function, function, masked
@@ -54,7 +54,7 @@ def kinds_of(features: Features) -> list[str]:
 
 def surfaces_of(features: Features) -> list[str]:
     """Return the kinds of the scene's lights that are shapes."""
-    return [kind for kind in kinds_of(features) if kind in shape_records.RECORDS]
+    return [kind for kind in kinds_of(features) if kind in shapes.RECORDS]
 
 
 def others_of(features: Features) -> list[str]:
@@ -95,7 +95,7 @@ def dispatch_text(features: Features, densities: str = "") -> str:
 def _numbers(features: Features, present: list[str]) -> list[str]:
     """Return the macros of constants."""
     modes = {"ALONG": ALONG, "BOTH": BOTH, "UNSEEN": UNSEEN}
-    words = shape_records.RECORDS["triangle"].words
+    words = shapes.RECORDS["triangle"].words
     return [
         *([f"#define TRIANGLE_ROW_WORDS {words}"] * features.motion.emitters),
         *(f"#define LIGHT_{kind.upper()} {KINDS.index(kind)}" for kind in present),
@@ -271,7 +271,7 @@ def _emission_includes(features: Features) -> list[str]:
     needed = {*present, *(BASES[kind] for kind in present if kind in BASES)}
     names = ["lights/emission.cl"]
     for kind in KINDS:
-        if kind in needed and (kind in PLACED or kind in shape_records.RECORDS):
+        if kind in needed and (kind in PLACED or kind in shapes.RECORDS):
             folder = "lights" if kind in PLACED else "shapes"
             names.append(f"{folder}/kinds/{kind}.cl#emission")
     return [
@@ -284,7 +284,7 @@ def _emission_includes(features: Features) -> list[str]:
 
 def _emit_pdf(kind: str, row: str) -> str:
     """The density of light_emit for a kind, without the probability of its row."""
-    if kind in shape_records.RECORDS:
+    if kind in shapes.RECORDS:
         point = f"{kind}_point({row}, (vec2){{0.5f, 0.5f}})"
         return f"INV_PI / surface_point_moved(view, {point}).area * area_sides_pdf(l)"
     if kind in PLACED:
@@ -296,7 +296,7 @@ def _emit_pdf(kind: str, row: str) -> str:
 
 def _nee_pdf(kind: str, row: str) -> str:
     """The density of next-event estimation for a kind, "" for delta lights."""
-    if kind in shape_records.RECORDS:
+    if kind in shapes.RECORDS:
         return f"{kind}_pdf({row}, view.p, view.wi, view.t, view.n)"
     return f"{kind}_pdf({row}, scene, view.hemisphere, view.wi)" if kind in INFINITE else ""
 
@@ -305,7 +305,7 @@ def _start_pdf(kind: str, row: str) -> str:
     """The density of a ray along d that aiming changes, see kernels/lights/aiming.cl."""
     if kind in PLACED:
         return f"{kind}_emit_pdf({row}, along)"
-    if kind in shape_records.RECORDS:
+    if kind in shapes.RECORDS:
         even = "!light_mode(l, EMISSION_ALONG) & (dot3(n, d) > 0.0f)"
         return f"sel({even}, max_r(dot3(n, d), (real)(1e-6f)) * INV_PI, (real)(0.0f))"
     return "(real)(1.0f / disk)"

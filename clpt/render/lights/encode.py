@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Faces, Points, fits_single
 from clpt.errors import SceneError
-from clpt.geometry import analytic, shape_records, shapes, spheres, triangles
+from clpt.geometry import analytic, shapes, triangles
 from clpt.records import LIGHT
 from clpt.render.geometry.find import Emitter
 from clpt.render.lights import bounds as light_bounds
@@ -248,8 +248,8 @@ def _emitter_rows(emitter: Emitter, encoder: Encoder) -> np.ndarray:
     kind = "triangle"
     if is_whole(shape):
         kind, geometry = shape.kind, analytic.row(shape)[None]
-    elif shape.kind in shape_records.ONE_OF and emitter.vertices is not None:
-        kind, geometry = "sphere", spheres.rows(shape, emitter.vertices)
+    elif shape.kind in shapes.ONE_OF and emitter.vertices is not None:
+        kind, geometry = "sphere", analytic.rows(shape, emitter.vertices)
     elif emitter.vertices is None or emitter.faces is None:
         raise SceneError("its triangles are missing", where=shapes.where(shape))
     else:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Faces, Floats, Points
 from clpt.errors import SceneError
-from clpt.geometry import analytic, shape_records, shapes, triangles
+from clpt.geometry import analytic, shapes, triangles
 from clpt.geometry.motion import corners, swept
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
@@ -140,7 +140,7 @@ def measured(
 
 def is_whole(shape: Shape) -> bool:
     """Return whether a shape is sampled as a single light; a mesh and a cube have many rows."""
-    return shape.kind in shape_records.RECORDS
+    return shape.kind in shapes.RECORDS
 
 
 def emissions_of(lamp: Light) -> dict[str, Any]:
@@ -194,7 +194,7 @@ def _of_emitter(emitter: Emitter, look: Look) -> Source:
         bright = mean(value, look)
         power = np.array([strength * analytic.area(shape) * bright])
         return Source(power, light_bounds.of_shape(shape, both), power, bright)
-    if shape.kind in shape_records.ONE_OF and emitter.vertices is not None:
+    if shape.kind in shapes.ONE_OF and emitter.vertices is not None:
         bright = mean(value, look)
         areas = 4.0 * np.pi * emitter.vertices[:, 3].astype(np.float64) ** 2
         power = strength * bright * areas

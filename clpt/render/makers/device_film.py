@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -45,7 +46,27 @@ TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
 WAY = tuple(f"chosen.{name}" for name in ("integrator", "light_paths", "guide_paths", "splatting"))
 TO_OUTPUT = ("to_first", "to_second", "to_third")
 
-Share = Callable[[object, Callable[[], Any]], Any]
+Value = TypeVar("Value")
+
+
+class Once:
+    """Values that several devices share: the first request for a key computes its value."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._values: dict[Any, Any] = {}
+
+    def __call__(self, key: object, make: Callable[[], Value]) -> Value:
+        """Return the value of a key. Repeats a SceneError of `make`."""
+        with self._lock:
+            if key not in self._values:
+                try:
+                    self._values[key] = make()
+                except SceneError as error:
+                    self._values[key] = error
+            if isinstance(self._values[key], SceneError):
+                raise self._values[key]
+            return self._values[key]
 
 
 class DeviceFilm:
@@ -54,7 +75,7 @@ class DeviceFilm:
     scene: as it is rendered; denoise: the denoiser for the film; warnings: of the lowered scene;
     start: of its construction [s of time.perf_counter]; built: numbers of programs that were built,
     and of programs from clpt's cache; seconds: of each part of the construction. options: see
-    `RenderOptions`. share: calls a function once for several devices, by a key; without it the
+    `RenderOptions`. share: values of several devices; without it the
     scene may have arrays in the memory of the device. former: a similar lowered scene. moving: the
     shapes that have moved on the device; blurred: whether the tables have keys of motion that
     `scene` does not have; successors: of the shapes and materials of the first scene.
@@ -67,7 +88,7 @@ class DeviceFilm:
         scene: Scene,
         device: dev.Device,
         options: RenderOptions,
-        share: Share | None = None,
+        share: Once | None = None,
         former: Lowered | None = None,
     ):
         self.start = start = time.perf_counter()
@@ -180,7 +201,7 @@ class DeviceFilm:
     # ---- another scene
 
     def lower(
-        self, scene: Scene, share: Share | None, former: Lowered | None = None, *,
+        self, scene: Scene, share: Once | None, former: Lowered | None = None, *,
         anew: bool = False,
     ) -> Lowered:  # fmt: skip
         """Return the tables of a scene for the best integrator; former: of the former scene.

@@ -34,7 +34,7 @@ from clpt.render.edit.scene_edit import (
 )
 from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.geometry.surroundings import bodies_around, media_around
-from clpt.render.makers.device_film import DeviceFilm, Share
+from clpt.render.makers.device_film import DeviceFilm, Once
 from clpt.render.media.bodies import matter_of
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
@@ -115,7 +115,7 @@ class SceneChange(Plan):
 
 
 def plan(
-    film: DeviceFilm, changes: Changes, events: dev.Events, share: Share | None = None
+    film: DeviceFilm, changes: Changes, events: dev.Events, share: Once | None = None
 ) -> Plan | None:
     """Return the plan of a changed scene for a film; None if nothing is to be written.
 
@@ -134,7 +134,7 @@ def plan(
     return SceneChange(film, (rebuilt,), scene, warnings, replaced, changes.motion, True)
 
 
-def _edited(film: DeviceFilm, changes: Changes, share: Share | None) -> tuple[Scene, Replacements]:
+def _edited(film: DeviceFilm, changes: Changes, share: Once | None) -> tuple[Scene, Replacements]:
     """Return the changed scene, and the replacements of its parts."""
     scene = film.scene if changes.scene is None else changes.scene
     replaced = {} if changes.scene is None else match_replacements(film.scene, scene)
@@ -153,7 +153,7 @@ def _edited(film: DeviceFilm, changes: Changes, share: Share | None) -> tuple[Sc
 
 
 def _quick_plans(
-    film: DeviceFilm, changes: Changes, scene: Scene, share: Share | None
+    film: DeviceFilm, changes: Changes, scene: Scene, share: Once | None
 ) -> list[Plan] | None:
     """Return plans that need no lowering; None if some change needs it."""
     plans: list[Plan] = []
@@ -171,7 +171,7 @@ def _quick_plans(
     return plans
 
 
-def _move(film: DeviceFilm, changes: Changes, share: Share | None) -> Move | None:
+def _move(film: DeviceFilm, changes: Changes, share: Once | None) -> Move | None:
     """Return the plan that moves shapes on the device; None if they cannot move there."""
     if film.moving is None:
         film.moving = Moving(film.wavefront.scene, film.scene)
@@ -210,7 +210,7 @@ def _enters_a_medium(film: DeviceFilm, scene: Scene) -> bool:
 
 
 def _rebuilt(
-    film: DeviceFilm, scene: Scene, events: dev.Events, changes: Changes, share: Share | None
+    film: DeviceFilm, scene: Scene, events: dev.Events, changes: Changes, share: Once | None
 ) -> tuple[Plan, list[str]]:
     """Lower a scene; return the plan of it, and its warnings.
 
@@ -229,7 +229,7 @@ def _rebuilt(
 
 
 def _another_integrator(
-    film: DeviceFilm, integrator: Integrator, share: Share | None
+    film: DeviceFilm, integrator: Integrator, share: Once | None
 ) -> Exchange | None:
     """Return the plan of another integrator; None if the form of the film stays."""
     former = film.wavefront.scene.lowered

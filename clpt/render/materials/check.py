@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from clpt.errors import SceneError
-from clpt.scene.indices import check_indices
+from clpt.scene.insides import check_indices
 from clpt.scene.integrators import Film
 from clpt.scene.materials import Layer, Material, parts
 from clpt.scene.params import fields_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from clpt.geometry import shape_records
+from clpt.geometry import shapes
 from clpt.layout import Record
 from clpt.render.records.macros import flag, macro
 from clpt.scene.lights import KINDS as LIGHTS
@@ -70,7 +70,7 @@ _PLACEMENT = {
 _CONE = {
     "cutoff": ("real", "half angle beyond which it is dark [rad]"),
     "beam_width": ("real", "half angle of full intensity [rad]"),
-    "smooth": ("integer", "1: it falls off smoothly in the cosine; 0: linearly in the angle"),
+    "edge": ("integer", "falls linearly in the angle: 0; in the cosine by a cubic: 1, x^4: 2"),
 }
 _RADIANCE = ("integer", "first word of the emission parameter in `light_params`")
 _SCALE = ("real", "what the image's values were divided by")
@@ -201,7 +201,7 @@ BASES = {
 }  # a kind uses the functions of its base
 
 # LightRow.kind is a position in this tuple
-KINDS = (*(kind for kind in RECORDS if kind not in VOLUMES), *shape_records.RECORDS, *VOLUMES)
+KINDS = (*(kind for kind in RECORDS if kind not in VOLUMES), *shapes.RECORDS, *VOLUMES)
 NODE = Record(
     "LightNode",
     "A node of the tree over lights; children of a node are a group, neighbours in the table.",

@@ -16,7 +16,7 @@ from textwrap import dedent
 
 from clpt import device
 from clpt.errors import SceneError
-from clpt.geometry import shape_records
+from clpt.geometry import shapes
 from clpt.records import INSTANCE, LIGHT, MATERIAL_KINDS, RERADIATION_SIZES, SETTINGS, SHAPE, SLABS
 from clpt.render.records import lights as light_records
 from clpt.render.records.macros import flag, macro
@@ -239,7 +239,7 @@ def _identifiers() -> frozenset[str]:
     files = device.kernels_folder().rglob("*.cl")
     kernels = "\n".join(path.read_text(encoding="utf-8") for path in files)
     records = [SETTINGS, *SLABS, SHAPE, INSTANCE, LIGHT]
-    records += [*shape_records.VALUES, *light_records.VALUES]
+    records += [*shapes.VALUES, *light_records.VALUES]
     return frozenset(
         [
             *(record.name for record in records),

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.geometry import analytic, shape_records, shapes, triangles
+from clpt.geometry import analytic, shapes, triangles
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
@@ -330,6 +330,6 @@ def _area_and_place(emitter: Emitter, cache: LoweringCache) -> tuple[float, NDAr
         low, high = analytic.bounds(emitter.shape)
         return analytic.area(emitter.shape), (low + high) / 2.0
     middle = (vertices[:, :3].min(axis=0) + vertices[:, :3].max(axis=0)) / 2.0
-    if emitter.shape.kind in shape_records.ONE_OF:
+    if emitter.shape.kind in shapes.ONE_OF:
         return float(4.0 * np.pi * (vertices[:, 3].astype(np.float64) ** 2).sum()), middle
     return float(cache(triangles.triangle_areas, vertices, faces).sum()), middle

@@ -2,7 +2,7 @@
  * right and y up (Mitsuba's spot with a texture). */
 inline Spot image_spot_bare(ImageSpot l)
 {
-    return (Spot){l.position, l.z, l.cutoff, l.beam_width, l.smooth, l.radiance};
+    return (Spot){l.position, l.z, l.cutoff, l.beam_width, l.edge, l.radiance};
 }
 
 /* What the image lets through along d, a direction in the cone. */

@@ -1,13 +1,14 @@
 /* A point that shines along `axis`: full intensity within the beam, then down to zero at the cutoff, linear
- * in the angle as Mitsuba's spot, or smooth, by a cubic in its cosine, as pbrt's. Irradiance falls with the
- * square of the distance. */
-inline real spot_smooth_edge(Spot l, real cos_t)
+ * in the angle as Mitsuba's spot, or in its cosine, by a cubic as pbrt-v4's or the 4th power as pbrt-v3's.
+ * Irradiance falls with the square of the distance. */
+inline real spot_cosine_edge(Spot l, real cos_t)
 {
     real sin_t, full, end;
     sincos_2pi(l.beam_width * INV_2PI, &sin_t, &full);
     sincos_2pi(l.cutoff * INV_2PI, &sin_t, &end);
     real x = clamp_r((cos_t - end) / max_r(full - end, (real)(1e-7f)), (real)(0.0f), (real)(1.0f));
-    return x * x * (3.0f - 2.0f * x);
+    real x2 = x * x;
+    return sel(l.edge == 2, x2 * x2, x2 * (3.0f - 2.0f * x));
 }
 
 /* What arrives of the full intensity, cos_t off the axis. */
@@ -15,8 +16,8 @@ inline real spot_edge(Spot l, real cos_t)
 {
     real angle = atan2_r(sqrt_r(1.0f - cos_t * cos_t), cos_t);
     real edge = clamp_r((l.cutoff - angle) / max_r(l.cutoff - l.beam_width, (real)(1e-7f)), (real)(0.0f), (real)(1.0f));
-    mask smooth = l.smooth != 0;
-    if (any(smooth)) edge = sel(smooth, spot_smooth_edge(l, cos_t), edge);
+    mask by_cosine = l.edge != 0;
+    if (any(by_cosine)) edge = sel(by_cosine, spot_cosine_edge(l, cos_t), edge);
     return edge;
 }
 

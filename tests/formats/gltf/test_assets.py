@@ -11,7 +11,7 @@ import trimesh
 
 from clpt.cli.files.scene_contents import summary
 from clpt.formats import gltf, load
-from clpt.scene import framing
+from clpt.scene import studio
 
 # Where expected.json has bounds before sparse values and morph targets; Fox there is without skin.
 KNOWN = {
@@ -38,7 +38,7 @@ def test_many_copies_are_instances(assets):
     placed = load(file).shapes
     assert len(placed) == 27 and len({id(shape.group) for shape in placed}) == 1
     copies = gltf.read_mesh(file).meshes
-    assert np.allclose(framing.world_bounds(placed), framing.world_bounds(copies), atol=1e-5)
+    assert np.allclose(studio.world_bounds(placed), studio.world_bounds(copies), atol=1e-5)
 
 
 def test_cameras_and_lights(assets):

@@ -124,9 +124,9 @@ def test_instances(read, build):
 
 def bounds(scene):
     """Least and largest corner of what the file itself holds."""
-    from clpt.scene import framing
+    from clpt.scene import studio
 
-    return framing.world_bounds(scene.shapes[: -scene.extra["studio"]["shapes"]])
+    return studio.world_bounds(scene.shapes[: -scene.extra["studio"]["shapes"]])
 
 
 def animated(build, path, times, values, **sampler):

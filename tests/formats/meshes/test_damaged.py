@@ -10,7 +10,7 @@ import pytest
 
 from clpt.errors import SceneError
 from clpt.formats.meshes import mesh
-from clpt.formats.meshes.ply_tables import TYPES
+from clpt.formats.meshes.ply import TYPES
 from tests.formats.fuzzing import check, damaged, hypothesis, settings, st
 
 SOME = settings(80)

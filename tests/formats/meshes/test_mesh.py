@@ -14,7 +14,7 @@ from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.formats.meshes import mesh
 from clpt.geometry.triangles import triangulate
-from clpt.scene import framing, materials, shapes
+from clpt.scene import materials, shapes, studio
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 PLY = """ply
@@ -207,7 +207,7 @@ def test_bounds_of_every_shape():
         np.array([[x, y, 0] for x in (-1, 1) for y in (-1, 1)]),
     ]
     for shape, sample in zip(made, points, strict=True):
-        low, high = framing.shape_bounds(shape)
+        low, high = studio.shape_bounds(shape)
         moved = transforms.transform_points(turn, sample)
         assert np.allclose(low, moved.min(axis=0), atol=3e-3), shape.kind
         assert np.allclose(high, moved.max(axis=0), atol=3e-3), shape.kind
@@ -220,7 +220,7 @@ def test_assets_have_the_expected_triangles_and_bounds(assets):
             continue
         made = mesh.read_mesh(assets / name).meshes
         assert sum(len(part.faces) for part in made) == known["triangles"], name
-        bounds = np.array(framing.world_bounds(made))
+        bounds = np.array(studio.world_bounds(made))
         assert np.allclose(bounds, known["bounds"], atol=2e-5 * np.abs(bounds).max()), name
 
 

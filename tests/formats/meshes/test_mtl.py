@@ -13,8 +13,8 @@ from PIL import Image
 
 from clpt.errors import SceneError
 from clpt.formats import load
-from clpt.formats.colours import EVEN, GREY
 from clpt.formats.meshes import mesh
+from clpt.formats.reading import EVEN, GREY
 from clpt.scene.textures import Bitmap, Product
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"

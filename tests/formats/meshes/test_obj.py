@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clpt.errors import SceneError
-from clpt.formats.meshes import corners, mesh, obj
+from clpt.formats.meshes import mesh, obj, triangles
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 UVS = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
@@ -31,13 +31,13 @@ def read(tmp_path):
     return of
 
 
-def triangles(made):
+def corners_of(made):
     """The corners of all triangles (t, 3, 3), float64."""
     return np.concatenate([part.vertices.astype(float)[part.faces] for part in made.meshes])
 
 
 def area(made):
-    a, b, c = triangles(made).transpose(1, 0, 2)
+    a, b, c = corners_of(made).transpose(1, 0, 2)
     return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
 
 
@@ -85,8 +85,8 @@ SAME = {
 @pytest.mark.parametrize("name", SAME)
 def test_ways_to_write_a_square(read, name):
     made = read(SAME[name])
-    assert triangles(made).shape == (2, 3, 3) and area(made) == 1.0
-    assert triangles(made).min() == 0.0 and triangles(made).max() == 1.0
+    assert corners_of(made).shape == (2, 3, 3) and area(made) == 1.0
+    assert corners_of(made).min() == 0.0 and corners_of(made).max() == 1.0
     assert made.warnings == []
 
 
@@ -304,7 +304,7 @@ def test_polygons_keep_their_shape(read, outline, size, reversed_):
     placed = np.column_stack([points, np.full(len(points), 5.0)]) @ turn
     rows = "".join(f"v {x:.9f} {y:.9f} {z:.9f}\n" for x, y, z in placed)
     made = read(rows + "f " + " ".join(str(i + 1) for i in range(len(points))) + "\n")
-    assert len(triangles(made)) == len(points) - 2
+    assert len(corners_of(made)) == len(points) - 2
     np.testing.assert_allclose(area(made), size, rtol=1e-5)
 
 
@@ -374,7 +374,7 @@ def test_a_random_mesh_in_any_style_is_read_back(tmp_path_factory, data):
     path = tmp_path_factory.mktemp("obj") / "a.obj"
     path.write_bytes(_written(draw, points, uvs, normals, faces))
     piece, dense = draw(st.sampled_from([2, 64, obj.PIECE])), draw(st.sampled_from([0, 8]))
-    with mock.patch.object(obj, "PIECE", piece), mock.patch.object(corners, "DENSE", dense):
+    with mock.patch.object(obj, "PIECE", piece), mock.patch.object(triangles, "DENSE", dense):
         made = mesh.read_mesh(path)
     (one,) = made.meshes
     assert made.warnings == []

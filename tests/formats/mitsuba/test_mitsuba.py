@@ -11,7 +11,7 @@ import pytest
 from clpt import images, spectra
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats import load
-from clpt.scene import framing, integrators, lights, materials, textures
+from clpt.scene import integrators, lights, materials, studio, textures
 from clpt.spectra import (
     RGB,
     Blackbody,
@@ -734,7 +734,7 @@ def test_shapes_and_film_agree_with_mitsuba(path):
 
 def _boxes(scene):
     return [
-        np.concatenate(framing.world_bounds([shape])).round(4).tolist() for shape in scene.shapes
+        np.concatenate(studio.world_bounds([shape])).round(4).tolist() for shape in scene.shapes
     ]
 
 
@@ -786,7 +786,7 @@ def test_the_assets_agree_with_what_mitsuba_found(assets):
     for name in ("cornell_box_picture/scene_picture.xml", *others):
         made = load(assets / "mitsuba" / name, integrator="path")
         known = expected[f"mitsuba/{name}"]
-        assert np.allclose(framing.world_bounds(made.shapes), known["bounds"], atol=1e-4)
+        assert np.allclose(studio.world_bounds(made.shapes), known["bounds"], atol=1e-4)
         emitters = [shape for shape in made.shapes if isinstance(shape.emission, lights.Area)]
         assert len(emitters) + len(made.lights) == known["emitters"]
         assert [made.film.width, made.film.height] == known["film"]

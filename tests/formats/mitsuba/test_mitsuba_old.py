@@ -387,3 +387,85 @@ def test_a_dipole_is_a_body_in_which_light_walks(read):
     assert made.interior.sigma_s == RGBUnbounded(738.0, 547.0, 315.0)
     with pytest.raises(SceneError, match="is not supported"):
         read(shape, "3.0.0")
+
+
+HAIR = np.array([[0, 0, 0], [0, 0, 1], [0, 1, 1], [2, 0, 0], [2, 0, 3]], "<f4")
+
+
+def binary_hair(strands: list[np.ndarray]) -> bytes:
+    """The count of points, and infinity before each strand but the first."""
+    values = [HAIR[:0].ravel()]
+    for number, strand in enumerate(strands):
+        values += [np.array([np.inf] * bool(number), "<f4"), strand.ravel()]
+    count = sum(map(len, strands))
+    return b"BINARY_HAIR" + count.to_bytes(4, "little") + np.concatenate(values).tobytes()
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_hair_is_curves_of_an_even_radius(read, tmp_path, binary):
+    """src/shapes/hair.cpp: the radius is scaled as (0, 0, 1) is."""
+    strands = [HAIR[:3], HAIR[3:]]
+    lines = ["\n".join(" ".join(map(str, point)) for point in strand) for strand in strands]
+    text = "\n\n".join(lines).encode()
+    (tmp_path / "a.hair").write_bytes(binary_hair(strands) if binary else text)
+    shape = read(
+        '<shape type="hair"><string name="filename" value="a.hair"/>'
+        '<float name="radius" value="0.1"/><transform name="toWorld"><scale value="2"/>'
+        "</transform></shape>"
+    ).shapes[0]
+    np.testing.assert_allclose(shape.points[:, :3], 2 * HAIR)
+    np.testing.assert_allclose(shape.points[:, 3], 0.2)
+    assert shape.basis == "linear" and list(shape.lengths) == [3, 2]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"BINARY_HAIR", "names 0 points"),
+        (b"BINARY_HAIR\xff\xff\xff\xff" + bytes(12), "names 4294967295 points, and holds 1"),
+        (b"1 2\n", "needs x, y and z"),
+        (b"1 2 a\n", "not all numbers"),
+    ],
+)
+def test_broken_hair(read, tmp_path, content, message):
+    (tmp_path / "a.hair").write_bytes(content)
+    with pytest.raises(SceneError, match=message):
+        read('<shape type="hair"><string name="filename" value="a.hair"/></shape>')
+
+
+def test_hair_is_no_shape_of_mitsuba_3(read):
+    with pytest.raises(SceneError, match="unknown shape 'hair'"):
+        read('<shape type="hair"/>', "3.0.0")
+
+
+def test_the_last_of_two_materials_counts(read):
+    """src/librender/shape.cpp, addChild."""
+    two = '<bsdf type="plastic"/><bsdf type="mask"><bsdf type="diffuse"/></bsdf>'
+    scene = read(f'<shape type="cube">{two}</shape>')
+    assert scene.shapes[0].material.kind == "mask"
+    assert any("more than one <bsdf>: the last counts" in text for text in scene.warnings)
+
+
+def test_the_texture_of_a_normal_map_needs_no_name(material, tmp_path):
+    Image.new("RGB", (2, 2), (128, 128, 255)).save(tmp_path / "n.png")
+    texture = '<texture type="bitmap"><string name="filename" value="n.png"/></texture>'
+    mapped = material(f'<bsdf type="normalmap">{texture}<bsdf type="diffuse"/></bsdf>')
+    assert isinstance(mapped, materials.NormalMap)
+
+
+@pytest.mark.parametrize(
+    ("body", "scattered", "absorbed"),
+    [
+        ('<spectrum name="sigmaS" value="2"/><spectrum name="sigmaA" value="1"/>', 1.0, 1.0),
+        ('<spectrum name="sigmaT" value="3"/><spectrum name="albedo" value="0.5"/>', 0.75, 1.5),
+    ],
+)
+def test_g_of_a_medium_reduces_its_scattering(read, body, scattered, absorbed):
+    medium = f'<medium name="interior" type="homogeneous">{body}<float name="g" value="0.5"/>'
+    inside = read(f'<shape type="cube">{medium}</medium></shape>').shapes[0].interior
+    if "sigmaS" in body:
+        assert (level(inside.sigma_s), level(inside.sigma_a)) == (scattered, absorbed)
+    else:
+        sigma_t, albedo = level(inside.sigma_t), level(inside.albedo)
+        assert (sigma_t * albedo, sigma_t * (1 - albedo)) == pytest.approx((scattered, absorbed))
+    assert inside.phase.kind == "isotropic"

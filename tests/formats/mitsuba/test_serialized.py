@@ -12,7 +12,7 @@ import pytest
 import clpt
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.formats.mitsuba import serialized
+from clpt.formats.mitsuba import shapes
 
 VERTICES = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0.5), (0, 1, 0)])
 FACES = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
@@ -102,4 +102,18 @@ def test_a_small_file_cannot_ask_for_much_memory(tmp_path: Path) -> None:
     path = file(tmp_path / "zeros.serialized", [mesh], 4)
     limits = budget.Budget(memory=1 << 16)
     with pytest.raises(SceneError, match="a mesh in it would take"), budget.opened(limits):
-        serialized.read(path, 0)
+        shapes.read(path, 0, {})
+
+
+def test_a_file_of_many_meshes_is_read_once(tmp_path: Path) -> None:
+    """Each reading of a file costs parts of the budget, which 40 of them would exceed."""
+    meshes = [packed(4, "<f8", uvs=True, normals=True)] * 40
+    path = file(tmp_path / "many.serialized", meshes, 4)
+    listing = "".join(
+        f'<shape type="serialized"><string name="filename" value="{path.name}"/>'
+        f'<integer name="shape_index" value="{index}"/></shape>'
+        for index in range(40)
+    )
+    listed = tmp_path / "many.xml"
+    listed.write_text(f'<scene version="3.0.0">{listing}</scene>')
+    assert len(clpt.load(listed, budget=budget.Budget(parts=400)).shapes) == 40

@@ -7,7 +7,7 @@ import pytest
 
 from clpt import images, transforms
 from clpt.errors import SceneError
-from clpt.formats.pbrt import octahedral
+from clpt.formats.pbrt import lights
 from clpt.formats.pbrt.lights import area_light, light
 from tests.formats.pbrt.directives import params, state
 from tests.kernels.light_probe import lit
@@ -85,7 +85,7 @@ def test_images_around(folder, ctm):
     found = np.array([made.image[8, column] for column in range(32)])
     d = [[np.sin(a), np.cos(b), -np.cos(a) * np.sin(b)] for b in [8 * np.pi / 15] for a in [0.1]]
     own = np.linalg.inv(ctm[:3, :3]) @ np.array(d[0])
-    u, v = octahedral.to_square(own / np.linalg.norm(own))
+    u, v = lights.to_square(own / np.linalg.norm(own))
     near = image[
         max(int(v * 16) - 1, 0) : int(v * 16) + 2, max(int(u * 16) - 1, 0) : int(u * 16) + 2
     ]
@@ -168,7 +168,7 @@ def around(count=64):
 
 def octahedral_file(folder):
     centres = (np.arange(128) + 0.5) / 128
-    image = smooth(octahedral.to_sphere(np.stack(np.meshgrid(centres, centres), axis=-1)))
+    image = smooth(lights.to_sphere(np.stack(np.meshgrid(centres, centres), axis=-1)))
     images.write(folder / "smooth.pfm", image)
     return {"filename": ("string", "smooth.pfm"), "scale": ("float", 2)}
 

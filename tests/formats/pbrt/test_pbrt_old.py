@@ -274,7 +274,8 @@ def test_parameters_given_twice(tmp_path):
     ('Shape "paraboloid" "float zmin" 1 "float zmax" 1', "must differ"),
     ('Shape "heightfield" "integer nu" 3 "integer nv" 3 "float Pz" [1 2]', "nu times nv"),
     ('LightSource "point" "blackbody I" [0 1]', "above 0"),
-    ('Texture "a" "color" "scale" "texture tex1" "b"\nMaterial "matte" "texture Kd" "a"', "'b'"),
+    ('Texture "a" "color" "uv"\nTexture "b" "float" "uv"\nMaterial "matte" "texture sigma" "b"',
+     "no numbers"),
 ])  # fmt: skip
 def test_errors_say_where(read, text, message):
     with pytest.raises(SceneError, match=message) as caught:
@@ -320,3 +321,61 @@ def test_definitions_end_with_their_scope(read, define, use, scope):
     found = [shape.material.front.reflectance.r for shape in shapes]
     first = [] if scope == "Object" else [0.25]
     assert found == [*first, 0.25 if scope == "Transform" else 0.5, 0.75]
+
+
+def test_what_version_3_reports_and_goes_on(read):
+    """src/core/api.cpp and paramset.cpp: options in the world, names that nothing defines."""
+    scene = read(
+        'Film "image" "integer xresolution" 7\nIntegrator "bdpt"\n'
+        'Material "matte" "rgb Kd" [.1 .2 .3]\nNamedMaterial "nobody"\n' + DISK
+        + '\nMaterial "matte" "texture Kd" "nothing"\n' + DISK,
+        'Sampler "poissondisk" "integer pixelsamples" 9',
+    )  # fmt: skip
+    assert (scene.film.width, scene.spp) == (640, 9)
+    first, second = (shape.material.front.reflectance for shape in scene.shapes)
+    assert (first.r, first.g, first.b) == (0.1, 0.2, 0.3)
+    assert level(second) == 0.5, "the default of Kd"
+    told = " ".join(scene.warnings)
+    words = ("poissondisk", "stands after WorldBegin", "no material 'nobody'", "'nothing'")
+    assert [word for word in words if word not in told] == []
+    with pytest.raises(SceneError, match="no material 'nobody'"):
+        read('Material "mix" "string namedmaterial1" "nobody"\n' + DISK)
+
+
+def test_uv_texture_is_red_by_u_and_green_by_v(read):
+    made = read('Texture "t" "color" "uv"\nMaterial "matte" "texture Kd" "t"\n' + DISK)
+    texture = made.shapes[0].material.front.reflectance
+    corners = texture.image.reshape(2, 2, 3)  # the top row is v = 1
+    np.testing.assert_array_equal(corners[:, :, 0], [[0, 1], [0, 1]])
+    np.testing.assert_array_equal(corners[:, :, 1], [[1, 1], [0, 0]])
+
+
+@pytest.mark.parametrize("end", ["", "WorldEnd"])
+@pytest.mark.parametrize(
+    ("kind", "value"),
+    [('"matte" "spectrum Kd"', "[400 0.5 700 18.4]"), ('"matte" "spectrum Kd"', '"stdillum-D65"')],
+)
+def test_a_spectrum_above_1_is_cut_off(tmp_path, end, kind, value):
+    path = tmp_path / "a.pbrt"
+    kind = kind if end else kind.replace("matte", "diffuse").replace("Kd", "reflectance")
+    path.write_text(f"WorldBegin\nMaterial {kind} {value}\n{DISK}\n{end}\n")
+    scene = load(path)
+    values = scene.shapes[0].material.front.reflectance.values
+    assert max(values) == 1.0 and min(values) < 1.0
+    assert any("exceeds 1 and is cut off" in text for text in scene.warnings)
+
+
+@pytest.mark.parametrize("kind", ["infinite", "goniometric", "projection"])
+def test_images_of_lights_are_linear_whatever_their_bits(read, tmp_path, kind):
+    """src/core/imageio.cpp divides the bytes of a PNG by 255."""
+    images.write(tmp_path / "map.png", np.full((4, 8, 3), 0.2, np.float32))
+    values = images.read_stored(tmp_path / "map.png").values
+    assert values.max() > 100, "encoded as sRGB"
+    images.write(tmp_path / "map.exr", values.astype(np.float32) / 255.0)
+    of_bytes, of_floats = (
+        read(f'LightSource "{kind}" "string mapname" "map.{end}"\n' + DISK).lights[0].image
+        for end in ("png", "exr")
+    )
+    if kind != "infinite":
+        of_bytes, of_floats = of_bytes.image, of_floats.image
+    np.testing.assert_allclose(of_bytes, of_floats, rtol=1e-3)
