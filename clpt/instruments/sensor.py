@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats
 from clpt.errors import SceneError
-from clpt.files import text as text_files
+from clpt.files import input_files
 from clpt.instruments.quantities import LIGHT, PLANCK
 
 PATTERNS = {"rggb": (0, 1, 1, 2), "bggr": (2, 1, 1, 0), "grbg": (1, 0, 2, 1), "gbrg": (1, 2, 0, 1)}
@@ -146,7 +146,7 @@ class Sensor:
         wavelength; a first row of titles and comments after `#` are allowed. Raises SceneError.
         """
         rows = []
-        for number, line in enumerate(text_files.read(path).splitlines(), 1):
+        for number, line in enumerate(input_files.read(path).splitlines(), 1):
             fields = [field.strip() for field in line.split("#")[0].split(",")]
             if fields == [""]:
                 continue
