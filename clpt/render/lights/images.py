@@ -150,8 +150,10 @@ def _sphere(
     where = "envmap.image"
     spectra = spectral_exr.find(source, emissive=True, where=where)
     notes: list[str] = []
-    plain = spectra is None  # the colour of a spectrum may be negative
-    image = _loaded(source if plain else spectra.to_rgb(), where, notes, tells=plain)
+    if spectra is None:
+        image = _loaded(source, where, notes)
+    else:  # the colour of a spectrum may be negative
+        image = _loaded(spectra.to_rgb(), where, notes, tells=False)
     image = _at_least_two_rows(image * np.float32(scale))
     height, width, _ = image.shape
     if spectra is None or not spectral:
