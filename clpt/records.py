@@ -407,7 +407,6 @@ TREE_REACHES = Constants(
 CURVE_KEYS = Constants(
     "CURVE_",
     "Keys of items on a curve through space.",
-    bits=(11, "of a digit"),
     index=(31, "bits of the index of an item, below its code"),
 )
 CURVE_SIZES = Constants("CURVE_", "Sizes of tables of strands.", words=(24, "of a piece"))

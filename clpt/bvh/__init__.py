@@ -11,9 +11,9 @@ from .build import (
     choose_tree,
     outgrows_caches,
 )
+from .building import Building
 from .layouts import ALONE, LAYOUTS, TREES, shapes_layout, traversal_text
 from .refit import rebuild_boxes, refit, refit_boxes
-from .tree import Building
 
 __all__ = [
     "ALONE",

@@ -22,8 +22,8 @@ from ..choices import Quality
 from ..device import Device
 from ..errors import SceneError
 from ..records import TREE_BITS, TREE_REACHES
+from .building import Array, Building
 from .layouts import BOX_LAYOUTS, LAYOUTS, Mesh, Packed, Part, refit_nodes
-from .tree import Array, Building
 
 WORDS = {
     "binary": (8, 16),
@@ -187,11 +187,12 @@ def build(
     vertices: (n, 3) float32; faces: (m, 3) uint32; tags: (m,) uint32, a word for each triangle that
     its hits return (zeros if None). Buffers of these types are read in place, without checks.
     layout: a key of LAYOUTS; None calls `choose_layout`. quality: "fast" cuts leaves from a
-    space-filling curve, and builds the nodes above them like "high"; brute has no tree.
+    space-filling curve, and builds the nodes above them like "high"; brute has no tree. Other
+    devices than CPUs build trees from the leaves up, and consider fewer neighbours for "fast".
 
-    The build takes up to 250 bytes a triangle and .25 MiB on the device, in addition to its input.
-    About 60 bytes a triangle stay (binary: 130); no buffer has more than 64 bytes a triangle. Other
-    devices than CPUs take 45 kB more for each compute unit, for counters.
+    The build takes up to 270 bytes a triangle and .25 MiB on the device, in addition to its input.
+    About 60 bytes a triangle stay (binary, or wide8 from the leaves up where triangles lie far
+    apart: 130); no other buffer has more than 64 bytes a triangle.
     Trees are never deeper than BVH_DEPTH of kernels/bvh/node.cl: traversals cannot overflow.
 
     Raises SceneError for vertices that are not finite or beyond 1e12, for indices out of range and

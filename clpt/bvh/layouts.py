@@ -12,7 +12,7 @@ import pyopencl as cl
 from ..choices import Quality
 from ..records import TREE_BITS, TREE_SIZES
 from . import tree
-from .tree import Building
+from .building import Building
 
 REINSERT_LIMIT = 10_000  # triangles; below, the program takes longer to load than it saves
 
@@ -22,6 +22,7 @@ _BLOCK = 8
 _COMPACT_LEAF = 3  # triangles of a leaf, at most; kernels/bvh/compact.cl counts them in 3 bits
 SHAPES_LEAF = 2  # boxes of a leaf of "shapes_binary", at most
 SHAPES_DEPTH = TREE_SIZES["shapes_depth"]
+_RADIUS: dict[Quality, int] = {"high": 16, "fast": 6}  # of clusters
 _LEAF = TREE_BITS["leaf"]
 
 
@@ -44,15 +45,16 @@ class Part:
     """A tree in perhaps shared buffers, for refitting.
 
     count: triangles or boxes; reach: the largest coordinate at the build; steps: (begin, count) of
-    each launch of a kernel, from the leaves up: of wide nodes, or of ranges in the heap `ranges` of
-    a binary tree; bounds: of the nodes of a compressed tree, in full precision; nodes, leaves:
-    offsets in the buffers [32 bytes]; first: its first triangle; binary, totals: for a wide tree
-    that follows a binary tree: its nodes, and the number of wide nodes on the device.
+    each launch of a kernel, from the leaves up: of nodes, or of ranges in the heap `ranges` of a
+    binary tree; kernel: for nodes; bounds: of the nodes of a compressed tree, in full precision;
+    nodes, leaves: offsets in the buffers [32 bytes]; first: its first triangle; binary, totals: for
+    a wide tree that follows a binary tree: its nodes, and the number of wide nodes on the device.
     """
 
     count: int
     reach: float = 0.0
     steps: tuple[tuple[int, int], ...] = ()
+    kernel: str = "refit_wide8"
     ranges: cl.Buffer | None = None
     bounds: cl.Buffer | None = None
     nodes: int = 0
@@ -99,7 +101,7 @@ def brute(building: Building, mesh: Mesh) -> Packed:
 
 def binary(building: Building, mesh: Mesh) -> Packed:
     """Build a binary tree, and records in the order of its leaves."""
-    built = _binary_tree(building, mesh, _BINARY_LEAF)
+    built = _binary_tree(building, mesh, _BINARY_LEAF, collapses=False)
     records = building.allocate(64 * mesh.count)
     source = {"vertices": mesh.vertices, "faces": mesh.faces, "tags": mesh.tags}
     packing = {"items": built.items, "records": records}
@@ -110,7 +112,7 @@ def binary(building: Building, mesh: Mesh) -> Packed:
 def wide8(building: Building, mesh: Mesh) -> Packed:
     """Build a binary tree, collapse it to 8-wide nodes, and pack blocks of 8 triangles."""
     built = _binary_tree(building, mesh, _BLOCK, at_once=_BLOCK)
-    if mesh.quality == "high" and mesh.count >= REINSERT_LIMIT:
+    if built.ranges and mesh.quality == "high" and mesh.count >= REINSERT_LIMIT:
         built = tree.reinserted(building, built)
     chosen = tree.collapse(building, built)
     figures = tree.figures(building, chosen)
@@ -204,7 +206,7 @@ def _compact_nodes(
     for begin, count in reversed(figures.steps):
         building.run_each("bvh/collapse.cl#compact", "compact_nodes", count, begin=begin, **common)
     bounds = building.allocate(32 * figures.nodes)
-    part = Part(built.count, built.reach(building), figures.steps, bounds=bounds)
+    part = Part(built.count, built.reach(building), figures.steps, "refit_compact", bounds=bounds)
     return nodes, part, figures.stats
 
 
@@ -220,12 +222,10 @@ def refit_nodes(building: Building, part: Part, **buffers: cl.Buffer | None) -> 
         "reach": part.reach,
         **buffers,
     }
-    kernel, extra = "refit_wide8", {}
-    if part.bounds is not None:
-        kernel, extra = "refit_compact", {"bounds": part.bounds}
+    extra = {} if part.bounds is None else {"bounds": part.bounds}
     for i, (begin, count) in enumerate(part.steps):
         if part.ranges is None:
-            building.run_each(_REFIT, kernel, count, begin=begin, **extra, **common)
+            building.run_each(_REFIT, part.kernel, count, begin=begin, **extra, **common)
         else:
             kernel = "refit_level" if i else "refit_subtree"
             building.run(_REFIT, kernel, count, begin=begin, ranges=part.ranges, **common)
@@ -269,13 +269,20 @@ def traversal_text(layout: str, all_hits: bool = False) -> str:
 
 
 def _binary_part(building: Building, built: tree.Tree) -> Part:
-    """The refitting of a binary tree: all subtrees at once, then the levels above them."""
-    steps = tuple(((1 << level) - 1, 1 << level) for level in reversed(range(built.levels + 1)))
-    return Part(built.count, built.reach(building), steps, built.ranges)
+    """The refitting of a binary tree."""
+    reach, kernel = built.reach(building), "refit_pairs"
+    return Part(built.count, reach, built.steps, kernel=kernel, ranges=built.ranges)
 
 
-def _binary_tree(building: Building, mesh: Mesh, leaf_size: int, at_once: int = 1) -> tree.Tree:
+def _binary_tree(
+    building: Building, mesh: Mesh, leaf_size: int, at_once: int = 1, *, collapses: bool = True
+) -> tree.Tree:
     items, parts = tree.items_of_triangles(building, mesh.count, mesh.vertices, mesh.faces)
+    if building.grain.upward:
+        radius = _RADIUS[mesh.quality]
+        return tree.upward(
+            building, mesh.count, items, parts, leaf_size, radius, collapses=collapses
+        )
     if mesh.quality == "fast":
         return tree.over_runs(building, mesh.count, items, parts, leaf_size)
     return tree.over(building, mesh.count, items, parts, leaf_size, at_once)

@@ -13,8 +13,8 @@ import pyopencl as cl
 
 from . import tree as trees
 from .build import Bvh
+from .building import Building
 from .layouts import SHAPES_DEPTH, SHAPES_LEAF, refit_nodes
-from .tree import Building
 
 _ROOT = "bvh/refit.cl"
 _NO_TRIANGLES = {"vertices": None, "faces": None, "leaves": None}

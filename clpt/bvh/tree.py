@@ -1,99 +1,26 @@
 """The binary tree of all layouts, built on the device by kernels/bvh/build.cl.
 
 For fast builds kernels/bvh/curve.cl cuts leaves from a space-filling curve. kernels/bvh/collapse.cl
-collapses a tree to 8-wide nodes. `Building` is the state of a build: device, memory, kernels.
+collapses a tree to 8-wide nodes.
 """
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, TypeAlias
 
 import numpy as np
 import pyopencl as cl
-from numpy.typing import DTypeLike, NDArray
 
-from ..device import Buffers, Device, Program, Source, Stream, assemble, host_buffer
-from ..device import build as build_program
-from ..records import CURVE_KEYS, TREE_SIZES
-
-Array: TypeAlias = NDArray | cl.Buffer
-
-_ZERO_COPY = 1 << 16  # [bytes] arrays from this size on are read in place
-_GROUP = 8  # work-items of a group, each with a triangle or node
-_ADVICE = "use fewer triangles, or a device with more memory"
-
-
-@functools.cache
-def _source(root: str) -> Source:
-    return assemble(root)
-
-
-class Building:
-    """A build on a device. Programs and kernels are created once a context.
-
-    stream: for all commands, by default a new stream of the device's queue.
-    """
-
-    def __init__(self, device: Device, stream: Stream | None = None):
-        self.device = device
-        self.buffers = Buffers(device)
-        self.stream: Stream = stream or Stream(device.queue)
-        self._programs: dict[str, Program] = {}
-
-    def run(self, root: str, kernel: str, n: int, **arguments: object) -> None:
-        """Enqueue n work-items of a kernel of the program at `root`, in groups of 1."""
-        self._enqueue(root, kernel, n, 1, arguments)
-
-    def run_each(self, root: str, kernel: str, n: int, **arguments: object) -> None:
-        """Enqueue like `run`, in larger groups, for kernels with an argument `count`, set to n."""
-        self._enqueue(root, kernel, n, _GROUP, {"count": n, **arguments})
-
-    def allocate(self, nbytes: int) -> cl.Buffer:
-        """Return a buffer. Raises MemoryBudgetError."""
-        return self.buffers.allocate("building the scene's tree", nbytes, _ADVICE)
-
-    def upload(self, array: Array, dtype: DTypeLike) -> cl.Buffer:
-        """Return a buffer with an array; a buffer is returned unchanged. Raises like `allocate`."""
-        if isinstance(array, cl.Buffer):
-            return array
-        return self.buffers.upload("the scene's triangles", array, dtype, _ADVICE)
-
-    def wrap_host(self, array: Array, dtype: DTypeLike) -> cl.Buffer:
-        """Return a buffer like `upload` for the time of the build; CPUs read arrays in place.
-
-        The caller keeps the array until the stream has ended.
-        """
-        if isinstance(array, cl.Buffer):
-            return array
-        host = np.ascontiguousarray(array, dtype)
-        if not (self.device.info.is_cpu and host.nbytes >= _ZERO_COPY):
-            return self.upload(host, dtype)
-        flags = cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR
-        return host_buffer(self.device.context, flags, host)
-
-    def read(self, buffer: cl.Buffer, n: int, dtype: DTypeLike) -> NDArray:
-        """Wait and return the first n values of a buffer."""
-        return self.stream.read(buffer, np.empty(n, dtype))
-
-    def _enqueue(self, root: str, kernel: str, n: int, group: int, arguments: dict) -> None:
-        program = self._programs.get(root)
-        if program is None:
-            program = self._programs[root] = build_program(self.device, _source(root))
-        size = (-(-n // group) * group,)
-        program.lend_kernel(kernel, arguments, lambda bound: self.stream.run(bound, size, (group,)))
-
+from ..records import TREE_SIZES
+from . import curve
+from .building import Building
 
 _BUILD, _PACK, _REINSERT = "bvh/build.cl", "bvh/pack.cl", "bvh/reinsert.cl"
-_COLLAPSE, _CURVE = "bvh/collapse.cl", "bvh/curve.cl"
-_DEPTH = TREE_SIZES["depth"]
-_RUN = 2048  # items that a work-item bounds; of a curve it also cuts them
-_DIGIT, _INDEX = CURVE_KEYS["bits"], CURVE_KEYS["index"]
-_CODE = 33  # bits of a key above the index
-_CHUNKS = 4  # of a compute unit, for the sort
+_COLLAPSE = "bvh/collapse.cl"
+_NUMBERS = "bvh/collapse.cl#levels"
+_DEPTH, _LEVELS = TREE_SIZES["depth"], TREE_SIZES["levels"]
 _SUBTREES = 64  # of a compute unit, for an even load
 _CPU_UNITS = 16  # of any CPU: the tree depends on this number by the order of reinsertion
 _PASSES = 4  # of reinsertion; each further pass costs a build 2 % and saves rays less
@@ -103,16 +30,27 @@ _PASSES = 4  # of reinsertion; each further pass costs a build 2 % and saves ray
 class Tree:
     """A binary tree over items.
 
-    items: float8, in the order of the leaves; nodes: 2 count float8; ranges: a heap of the top
-    `levels` levels, whose leaves are subtrees; extents: of the ranges.
+    items: float8, in the order of the leaves; nodes: 2 count float8; extents: of the root first;
+    steps: (begin, count) of each launch of a kernel, from the leaves up, of nodes or, if there is
+    a heap of ranges, of its members; ranges: the heap of the top levels, whose leaves are subtrees;
+    firsts: the first item of each node, if `collapse` chooses leaves of at most `leaf_size` items.
     """
 
     count: int
     items: cl.Buffer
     nodes: cl.Buffer
-    ranges: cl.Buffer
     extents: cl.Buffer
-    levels: int
+    steps: tuple[tuple[int, int], ...]
+    ranges: cl.Buffer | None = None
+    firsts: cl.Buffer | None = None
+    leaf_size: int = 0
+
+    @property
+    def heap(self) -> tuple[cl.Buffer, int]:
+        """The heap of ranges, and the number of its levels."""
+        if self.ranges is None:
+            raise ValueError("a tree from the leaves up has no ranges")
+        return self.ranges, len(self.steps) - 1
 
     def reach(self, building: Building) -> float:
         """Wait and return the largest coordinate of all items."""
@@ -135,12 +73,13 @@ def items_of_boxes(building: Building, count: int, boxes: cl.Buffer) -> tuple[cl
 def _items(
     building: Building, kernel: str, count: int, **source: cl.Buffer
 ) -> tuple[cl.Buffer, cl.Buffer]:
-    n_parts = -(-count // _RUN)
+    run = building.grain.stretch
+    n_parts = -(-count // run)
     items, parts = building.allocate(32 * count), building.allocate(64 * n_parts)
-    building.run(
-        _PACK, kernel, n_parts, count=count, run=_RUN, items=items, extents=parts, **source
+    building.run_stretches(
+        _PACK, kernel, n_parts, count=count, run=run, items=items, extents=parts, **source
     )
-    return items, parts
+    return items, building.few_extents(parts)
 
 
 def over(
@@ -167,13 +106,14 @@ def reinserted(building: Building, tree: Tree) -> Tree:
     The result shares all buffers except `ranges`. It is for kernels/bvh/collapse.cl: an inner
     node's count is the number of levels below it.
     """
-    subtrees = 1 << tree.levels
+    heap, levels = tree.heap
+    subtrees = 1 << levels
     begin = subtrees - 1
     parents, targets = (building.allocate(size * tree.count) for size in (4, 8))
     ends, areas = (building.allocate(size * subtrees) for size in (4, 8))
-    ranges = building.allocate(tree.ranges.size)
-    building.stream.copy(ranges, tree.ranges)
-    shared = {"nodes": tree.nodes, "ranges": tree.ranges, "begin": begin, "parents": parents}
+    ranges = building.allocate(heap.size)
+    building.stream.copy(ranges, heap)
+    shared = {"nodes": tree.nodes, "ranges": heap, "begin": begin, "parents": parents}
     moves = {**shared, "ends": ends, "targets": targets}
     building.run(_REINSERT, "reinsert_subtree", subtrees, ends=ends, areas=areas, **shared)
     building.run(_REINSERT, "reinsert_top", 1, areas=areas, **shared)
@@ -188,7 +128,7 @@ def over_runs(
     building: Building, count: int, items: cl.Buffer, parts: cl.Buffer, leaf_size: int
 ) -> Tree:
     """Build like `over`, with runs of a space-filling curve as leaves."""
-    n, ordered, leaves, parts = runs(building, count, items, parts, leaf_size)
+    n, ordered, leaves, parts = curve.runs(building, count, items, parts, leaf_size)
     cut = {"leaf_size": 1, "at_once": 0, "runs": 1, "depth": _DEPTH}
     tree = _divided(building, n, leaves, parts, cut)
     return replace(tree, items=ordered)
@@ -211,7 +151,31 @@ def _divided(
     for level in range(levels):
         building.run(_BUILD, "build_level", 1 << level, begin=(1 << level) - 1, **shared)
     building.run(_BUILD, "build_subtree", 1 << levels, begin=(1 << levels) - 1, **shared)
-    return Tree(count, items, nodes, ranges, extents, levels)
+    steps = tuple(((1 << level) - 1, 1 << level) for level in reversed(range(levels + 1)))
+    return Tree(count, items, nodes, extents, steps, ranges)
+
+
+def upward(
+    building: Building,
+    count: int,
+    items: cl.Buffer,
+    parts: cl.Buffer,
+    leaf_size: int,
+    radius: int,
+    *,
+    collapses: bool,
+) -> Tree:
+    """Build from the leaves up: many work-items are busy in every step.
+
+    leaf_size: the most items of a leaf; collapses: whether `collapse` chooses the leaves; radius:
+    neighbours on each side of a cluster, in the order of a space-filling curve, that it may unite
+    with.
+    """
+    extents = curve.whole(building, count, parts)
+    nodes, steps = curve.united(building, count, items, extents, radius)
+    least = 1 if collapses else leaf_size
+    ordered, firsts = curve.ordered(building, count, items, nodes, steps, least)
+    return Tree(count, ordered, nodes, extents, steps, firsts=firsts, leaf_size=leaf_size)
 
 
 @dataclass(frozen=True)
@@ -249,20 +213,68 @@ def collapse(building: Building, built: Tree) -> Collapse:
     """Enqueue the choice and numbering of wide nodes; the host does not wait."""
     n = built.count
     costs, occlusion = building.allocate(64 * n), building.allocate(8 * n)
-    below = {"nodes": built.nodes, "costs": costs, "occlusion": occlusion}
-    parts = {"items": built.items, "ranges": built.ranges, **below}
-    begin = (1 << built.levels) - 1
-    building.run(_COLLAPSE, "collapse_subtree", 1 << built.levels, begin=begin, **parts)
-    for level in reversed(range(built.levels)):
-        begin = (1 << level) - 1
-        building.run(_COLLAPSE, "collapse_level", 1 << level, begin=begin, **parts)
+    below = {"nodes": built.nodes, "items": built.items, "costs": costs, "occlusion": occlusion}
+    for i, (begin, size) in enumerate(built.steps):
+        if built.ranges is None:
+            few = {"leaf_size": built.leaf_size}
+            building.run_each(_COLLAPSE, "collapse_pairs", size, begin=begin, **few, **below)
+        else:
+            kernel = "collapse_level" if i else "collapse_subtree"
+            building.run(_COLLAPSE, kernel, size, begin=begin, ranges=built.ranges, **below)
 
     roots, firsts = building.allocate(4 * n), building.allocate(8 * n)
     leaf_roots, totals = building.allocate(4 * n), building.allocate(4 * (4 + _DEPTH))
     numbers = {"roots": roots, "firsts": firsts, "leaf_roots": leaf_roots, "totals": totals}
-    binary = {"nodes": built.nodes, "costs": costs, "count": 2 * n}
-    building.run(_COLLAPSE, "collapse_number", 1, **binary, **numbers)
-    return Collapse(built, costs, occlusion, roots, firsts, leaf_roots, totals)
+    chosen = Collapse(built, costs, occlusion, roots, firsts, leaf_roots, totals)
+    if built.ranges is None:
+        _number_levels(building, chosen)
+    else:
+        binary = {"nodes": built.nodes, "costs": costs, "count": 2 * n}
+        building.run(_COLLAPSE, "collapse_number", 1, **binary, **numbers)
+    return chosen
+
+
+def _number_levels(building: Building, chosen: Collapse) -> None:
+    """Number wide nodes and leaves, a level at a time; wait for the size of each level."""
+    built, costs = chosen.built, chosen.costs
+    starts, sizes = _levels(building, chosen)
+    if len(starts) > _LEVELS:
+        building.run_each(_NUMBERS, "collapse_evenly", 2 * built.count, costs=costs)
+        starts, sizes = _levels(building, chosen)
+    size = building.read(built.nodes, 8, np.float32).astype(float)
+    x, y, z = size[4:7] - size[:3]
+    area = x * y + y * z + z * x
+    cost = float(building.read(costs, 1, np.float32)[0]) / area if area > 0 else 0.0
+    words = np.zeros(4 + _DEPTH, np.uint32)
+    words[:3] = *sizes, len(starts)
+    words[3:4].view(np.float32)[0] = cost
+    words[4 : 4 + len(starts)] = starts
+    building.stream.write(chosen.totals, words)
+
+
+def _levels(building: Building, chosen: Collapse) -> tuple[list[int], tuple[int, int]]:
+    """Number wide nodes and leaves; return the first node of each level, and both totals."""
+    tile = building.grain.tile
+    numbers = building.allocate(8 * -(-chosen.built.count // tile) + 4)
+    building.stream.fill(chosen.roots, 0, 0, 4)
+    built, tree = chosen.built, {"firsts": chosen.firsts, "leaf_roots": chosen.leaf_roots}
+    binary = {"nodes": built.nodes, "leaf_size": built.leaf_size}
+    binary |= {"costs": chosen.costs, "roots": chosen.roots}
+    tree["positions"] = built.firsts
+    starts, begin, end, n_leaves = [], 0, 1, 0
+    while begin < end:
+        starts.append(begin)
+        tiles = -(-(end - begin) // tile)
+        level = {"begin": begin, "end": end, "tile": tile, "tiles": tiles, "numbers": numbers}
+        level["sums"] = building.local(2)
+        building.run_tiles(_NUMBERS, "collapse_count", tiles, **binary, **level)
+        building.sums_before(numbers, 2 * tiles)
+        first = {"first": (end, n_leaves)}
+        building.run_tiles(_NUMBERS, "collapse_place", tiles, **first, **tree, **binary, **level)
+        sums = building.read(numbers, 2 * tiles + 1, np.uint32)
+        below, leaves = int(sums[tiles]), int(sums[-1] - sums[tiles])
+        begin, end, n_leaves = end, end + below, n_leaves + leaves
+    return starts, (end, n_leaves)
 
 
 def figures(building: Building, chosen: Collapse) -> Figures:
@@ -290,71 +302,3 @@ def write_indices(building: Building, chosen: Collapse, indices: cl.Buffer) -> N
     built = chosen.built
     leaves = {"nodes": built.nodes, "items": built.items, "leaf_roots": chosen.leaf_roots}
     building.run_each(_COLLAPSE, "collapse_indices", built.count, indices=indices, **leaves)
-
-
-def runs(
-    building: Building, count: int, items: cl.Buffer, parts: cl.Buffer, leaf_size: int
-) -> tuple[int, cl.Buffer, cl.Buffer, cl.Buffer]:
-    """Cut items into leaves of at most `leaf_size` <= 8; wait for the number of leaves.
-
-    Returns it, the items in the leaves' order, an item for each leaf, and their extents.
-    """
-    keys = _sorted(building, count, items, parts)
-    stretches = -(-count // _RUN)
-    ordered, lengths = building.allocate(32 * count), building.allocate(count)
-    numbers = building.allocate(4 * (stretches + 1))
-    curve = {"count": count, "run": _RUN, "sorted": ordered, "lengths": lengths}
-    cut = {"items": items, "keys": keys, "leaf_size": leaf_size, "numbers": numbers}
-    building.run(_CURVE, "curve_cut", stretches, **curve, **cut)
-    building.run(_CURVE, "curve_scan", 1, numbers=numbers, rows=stretches, columns=1)
-    n = int(building.read(numbers, stretches + 1, np.uint32)[-1])
-    leaves, extents = building.allocate(32 * n), building.allocate(64 * stretches)
-    output = {"numbers": numbers, "runs": leaves, "extents": extents}
-    building.run(_CURVE, "curve_runs", stretches, **curve, **output)
-    return n, ordered, leaves, extents
-
-
-def _sorted(building: Building, count: int, items: cl.Buffer, parts: cl.Buffer) -> cl.Buffer:
-    """Return the items' keys in ascending order."""
-    whole, unused = building.allocate(64), building.allocate(16)
-    root = {"parts": parts, "n_parts": parts.size // 64, "ranges": unused, "extents": whole}
-    building.run(_BUILD, "build_root", 1, count=count, **root)
-    keys, others = building.allocate(8 * count), building.allocate(8 * count)
-    cells = _cells(building.read(whole, 16, np.float32)[8:])
-    cells["tables"] = building.upload(cells["tables"], np.uint64)
-    building.run_each(_CURVE, "curve_keys", count, items=items, keys=keys, **cells)
-    chunk = -(-count // (_CHUNKS * building.device.info.compute_units))
-    chunks = -(-count // chunk)
-    numbers = building.allocate(4 * ((chunks << _DIGIT) + 1))
-    chunked = {"count": count, "run": chunk, "numbers": numbers}
-    for shift in range(_INDEX, _INDEX + _CODE, _DIGIT):
-        building.run(_CURVE, "curve_count", chunks, keys=keys, shift=shift, **chunked)
-        building.run(_CURVE, "curve_scan", 1, numbers=numbers, rows=chunks, columns=1 << _DIGIT)
-        moved = {"keys": keys, "sorted": others}
-        building.run(_CURVE, "curve_move", chunks, shift=shift, **moved, **chunked)
-        keys, others = others, keys
-    return keys
-
-
-def _cells(span: NDArray[np.float32]) -> dict[str, Any]:
-    """Return the arguments of `curve_keys`, which encodes doubled centroids.
-
-    span: low corner and negated high corner of the doubled centroids, (8,). Each step halves a
-    cell's longest side; the first step is the code's highest bit (Vinkler, Bittner and Havran 2017,
-    "Extended Morton codes").
-    """
-    low = span[:3].astype(float)
-    size = np.maximum(-span[4:7].astype(float) - low, 0.0)
-    left, bits = size.copy(), np.zeros(3, int)
-    tables = np.zeros((3, 2, 256), np.uint64)
-    halved = []
-    for _ in range(_CODE):
-        axis = int(np.argmax(np.where(bits < 16, left, -1.0)))
-        left[axis] /= 2
-        bits[axis] += 1
-        halved.append((axis, bits[axis]))
-    for position, (axis, nth) in enumerate(reversed(halved)):
-        byte, bit = divmod(int(bits[axis] - nth), 8)
-        tables[axis, byte] |= (np.arange(256, dtype=np.uint64) >> bit & 1) << position
-    scale = 0.999999 * 2.0**bits / np.maximum(size, 1e-30)  # finite as a float32
-    return {"low": (*low, 0.0), "scale": (*scale, 0.0), "tables": tables}

@@ -12,6 +12,8 @@
 #include "bvh/hints.cl"
 #include "bvh/node.cl"
 
+#define COLLAPSE_EVENLY (4 << 18 | 3 << 15 | 3 << 12 | 2 << 9 | 2 << 6 | 1 << 3 | 1) /* choices: half to each child */
+
 /* The number of trees for the left child, of the trees below a node. */
 inline uint collapse_share(global const float8 *costs, uint node, uint trees)
 {
@@ -52,7 +54,6 @@ inline uint collapse_children(global const float8 *nodes, global const float8 *c
 #define COLLAPSE_AHEAD 4 /* blocks */
 #define COLLAPSE_NODE_COST 1.0f
 #define COLLAPSE_BLOCK_COST 1.0f
-#define COLLAPSE_EVENLY (4 << 18 | 3 << 15 | 3 << 12 | 2 << 9 | 2 << 6 | 1 << 3 | 1) /* choices: half to each child */
 
 /* The probability that a random line through the node's box hits a triangle in it: half of a triangle's area over a
  * quarter of the box's surface (Cauchy), as if triangles were independent. */
@@ -64,9 +65,10 @@ inline float collapse_leaf_occlusion(global const float8 *items, float8 node)
     return half_area > 0.0f ? 1.0f - through : 0.0f;
 }
 
-/* Costs of a node after its children. Its count becomes the children's sum: a tree over runs has counted runs. */
+/* Costs of a node after its children. With at most leaf_size items it is a block. Its count becomes the children's sum:
+ * a tree over runs has counted runs. */
 inline void collapse_node(global float8 *nodes, global const float8 *items, global float8 *costs,
-                          global float *occlusion, uint at)
+                          global float *occlusion, uint at, uint leaf_size)
 {
     float8 node = nodes[at];
     float area = node_half_area(node), block = area * COLLAPSE_BLOCK_COST;
@@ -92,7 +94,7 @@ inline void collapse_node(global float8 *nodes, global const float8 *items, glob
         c.at[trees - 1] = least;
         choices |= share << 3 * (trees - 2);
     }
-    c.at[0] = c.at[7] + area * COLLAPSE_NODE_COST;
+    c.at[0] = node_count(node) <= leaf_size ? block : c.at[7] + area * COLLAPSE_NODE_COST;
     for (uint trees = 2; trees <= 7; trees++)
         if (c.at[trees - 2] <= c.at[trees - 1]) {
             c.at[trees - 1] = c.at[trees - 2];
@@ -119,7 +121,7 @@ kernel NO_VECTORIZE void collapse_subtree(global float8 *restrict nodes,
         uint at = waiting[n - 1];
         float8 node = nodes[at & ~BVH_LEAF];
         if (at & BVH_LEAF || node_is_leaf(node)) {
-            collapse_node(nodes, items, costs, occlusion, at & ~BVH_LEAF);
+            collapse_node(nodes, items, costs, occlusion, at & ~BVH_LEAF, 0);
             n--;
         } else {
             waiting[n - 1] |= BVH_LEAF;
@@ -136,7 +138,15 @@ kernel NO_VECTORIZE void collapse_level(global float8 *restrict nodes,
                                         global float8 *restrict costs, global float *restrict occlusion)
 {
     Range r = ranges[begin + get_global_id(0)];
-    if (r.count) collapse_node(nodes, items, costs, occlusion, r.node);
+    if (r.count) collapse_node(nodes, items, costs, occlusion, r.node, 0);
+}
+
+/* Costs of nodes of bvh/clusters.cl, from `begin` on, after the rounds before. */
+kernel NO_VECTORIZE void collapse_pairs(global float8 *restrict nodes, global const float8 *restrict items,
+                                        uint begin, uint count, uint leaf_size, global float8 *restrict costs,
+                                        global float *restrict occlusion)
+{
+    if (get_global_id(0) < count) collapse_node(nodes, items, costs, occlusion, begin + get_global_id(0), leaf_size);
 }
 
 /* Numbers the wide nodes and blocks, level by level: a node's child nodes, and its blocks, have
@@ -279,6 +289,74 @@ kernel NO_VECTORIZE void collapse_indices(global float8 *restrict nodes,
     global float8 *leaf = nodes + leaf_roots[b];
     indices[b] = item_index(items[node_link(*leaf)]);
     ((global uint *)leaf)[3] = BVH_LEAF | b;
+}
+
+/* Step levels: the numbers of collapse_number, a level a launch. */
+#include "bvh/scan.cl"
+
+inline int collapse_is_leaf(float8 node, uint leaf_size)
+{
+    return node_is_leaf(node) || node_count(node) <= leaf_size;
+}
+
+/* The child nodes in x, and the leaves in y, of a share of wide nodes. */
+inline uint2 collapse_tally(global const float8 *nodes, global const float8 *costs, global const uint *roots,
+                            uint2 share, uint leaf_size)
+{
+    uint2 sum = (uint2)(0);
+    for (uint w = share.x; w < share.y; w++) {
+        uint children[8], n = collapse_children(nodes, costs, roots[w], children), leaves = 0;
+        for (uint i = 0; i < n; i++) leaves += collapse_is_leaf(nodes[children[i]], leaf_size);
+        sum += (uint2)(n - leaves, leaves);
+    }
+    return sum;
+}
+
+/* Counts the children of a level's nodes, tile by tile. */
+kernel NO_VECTORIZE void collapse_count(global const float8 *restrict nodes, global const float8 *restrict costs,
+                                        global const uint *restrict roots, uint begin, uint end, uint leaf_size,
+                                        uint tile, uint tiles, global uint *restrict numbers, local uint2 *sums)
+{
+    uint2 share = scan_tile(tile, end - begin) + (uint2)(begin);
+    uint2 sum = collapse_tally(nodes, costs, roots, share, leaf_size), all = scan_group(sums, &sum);
+    if (get_local_id(0) == 0 && get_group_id(0) < tiles) {
+        numbers[get_group_id(0)] = all.x;
+        numbers[tiles + get_group_id(0)] = all.y;
+    }
+}
+
+/* Numbers the children of a level's nodes from `first` on, nodes in x and leaves in y. Binary nodes with at most
+ * leaf_size items become leaves; positions: their first items. */
+kernel NO_VECTORIZE void collapse_place(global float8 *restrict nodes, global const float8 *restrict costs,
+                                        global uint *restrict roots, uint begin, uint end, uint leaf_size,
+                                        uint tile, uint tiles, global const uint *restrict numbers, uint2 first,
+                                        global const uint *restrict positions, global uint2 *restrict firsts,
+                                        global uint *restrict leaf_roots, local uint2 *sums)
+{
+    uint2 share = scan_tile(tile, end - begin) + (uint2)(begin);
+    uint2 next = collapse_tally(nodes, costs, roots, share, leaf_size);
+    scan_group(sums, &next);
+    if (get_group_id(0) >= tiles) return;
+    next += first + (uint2)(numbers[get_group_id(0)], numbers[tiles + get_group_id(0)] - numbers[tiles]);
+    for (uint w = share.x; w < share.y; w++) {
+        uint children[8], n = collapse_children(nodes, costs, roots[w], children);
+        firsts[w] = next;
+        for (uint i = 0; i < n; i++) {
+            uint child = children[i];
+            if (collapse_is_leaf(nodes[child], leaf_size)) {
+                leaf_roots[next.y++] = child;
+                if (!node_is_leaf(nodes[child])) nodes[child].s3 = as_float(positions[child] | BVH_LEAF);
+            } else {
+                roots[next.x++] = child;
+            }
+        }
+    }
+}
+
+/* Lets every node take its descendants three levels below as children. */
+kernel NO_VECTORIZE void collapse_evenly(global float8 *restrict costs, uint count)
+{
+    if (get_global_id(0) < count) ((global uint *)(costs + get_global_id(0)))[7] = COLLAPSE_EVENLY;
 }
 
 /* Step compact: compressed nodes (bvh/compact.cl) from the collapse of a binary tree, without boxes and corners of

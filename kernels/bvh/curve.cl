@@ -1,13 +1,12 @@
 /* Leaves without a search for planes: items in the order of a space-filling curve, cut into runs as leaves.
  *
- * It is Morton's curve through nearly cubic cells, from 33 halvings of the longest side. Keys are sorted stably
- * by digits of 11 bits, so that two builds give the same tree. Dynamic programming finds the cut of a stretch
+ * It is Morton's curve through nearly cubic cells, from 33 halvings of the longest side. bvh/sort.cl sorts the
+ * keys stably, so that two builds give the same tree. Dynamic programming finds the cut of a stretch
  * into runs of at most `leaf_size` items with the least sum of the boxes' areas.
  *
  * A key is Morton's code above the item's index. An item represents a run for the build of a tree: its name is
  * the run's first item, and its area is replaced by the number of items.
  */
-#include "bvh/hints.cl"
 #include "bvh/hints.cl"
 #include "bvh/node.cl"
 
@@ -33,39 +32,6 @@ kernel NO_VECTORIZE void curve_keys(global const float8 *restrict items, uint co
 }
 
 inline uint curve_item(ulong key) { return key & (1ul << CURVE_INDEX) - 1; }
-inline uint curve_digit(ulong key, uint shift) { return key >> shift & ((1 << CURVE_BITS) - 1); }
-
-/* Counts each digit among the `run` neighbours of a work-item. */
-kernel NO_VECTORIZE void curve_count(global const ulong *restrict keys, uint count, uint run, uint shift,
-                                     global uint *restrict numbers)
-{
-    uint begin = get_global_id(0) * run, end = min(begin + run, count);
-    numbers += get_global_id(0) << CURVE_BITS;
-    for (uint k = 0; k < 1 << CURVE_BITS; k++) numbers[k] = 0;
-    for (uint i = begin; i < end; i++) numbers[curve_digit(keys[i], shift)]++;
-}
-
-/* Turns counts of `columns` digits into positions, digit by digit and row by row; the sum of all follows the last. */
-kernel NO_VECTORIZE void curve_scan(global uint *restrict numbers, uint rows, uint columns)
-{
-    uint sum = 0;
-    for (uint k = 0; k < columns; k++)
-        for (uint row = 0; row < rows; row++) {
-            uint number = numbers[row * columns + k];
-            numbers[row * columns + k] = sum;
-            sum += number;
-        }
-    numbers[rows * columns] = sum;
-}
-
-/* Moves the keys that curve_count has counted to their positions. */
-kernel NO_VECTORIZE void curve_move(global const ulong *restrict keys, uint count, uint run, uint shift,
-                                    global uint *restrict numbers, global ulong *restrict sorted)
-{
-    uint begin = get_global_id(0) * run, end = min(begin + run, count);
-    numbers += get_global_id(0) << CURVE_BITS;
-    for (uint i = begin; i < end; i++) sorted[numbers[curve_digit(keys[i], shift)]++] = keys[i];
-}
 
 /* Lanes moved up by a lane, with another value in the first. */
 inline float8 curve_shift(float8 v, float first)
@@ -85,6 +51,7 @@ kernel NO_VECTORIZE void curve_cut(global const float8 *restrict items, global c
                                    global uchar *restrict lengths, global uint *restrict numbers)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
+    if (begin >= count) return;
     const int8 lanes = (int8)(0, 1, 2, 3, 4, 5, 6, 7); /* lane k: the cost with a last run of k + 1 items */
     const float8 limit = lanes < (int8)(leaf_size) ? (float8)(0.0f) : (float8)(CURVE_FAR);
     float8 x = (float8)(INFINITY), y = x, z = x, to_x = x, to_y = x, to_z = x;
@@ -121,6 +88,7 @@ kernel NO_VECTORIZE void curve_runs(global const float8 *restrict sorted, uint c
                                     global float8 *restrict runs, global Extent *restrict extents)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
+    if (begin >= count) return;
     uint at = numbers[get_global_id(0) + 1];
     Extent h = extent_empty();
     for (uint i = end; i > begin;) {

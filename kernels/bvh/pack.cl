@@ -9,6 +9,7 @@ kernel NO_VECTORIZE void items_of_triangles(global const float *restrict vertice
                                   global float8 *restrict items, global Extent *restrict extents)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
+    if (begin >= count) return;
     Extent h = extent_empty();
     for (uint i = begin; i < end; i++) {
         float4 v[3];
@@ -27,6 +28,7 @@ kernel NO_VECTORIZE void items_of_boxes(global const float *restrict boxes, uint
                               global float8 *restrict items, global Extent *restrict extents)
 {
     uint begin = get_global_id(0) * run, end = min(begin + run, count);
+    if (begin >= count) return;
     Extent h = extent_empty();
     for (uint i = begin; i < end; i++) {
         float4 lo = (float4)(vload3(2 * i, boxes), 0.0f), hi = (float4)(vload3(2 * i + 1, boxes), 0.0f);

@@ -125,6 +125,14 @@ kernel NO_VECTORIZE void refit_level(global float8 *nodes, uint nodes_begin, glo
     if (r.count) refit_node(nodes + nodes_begin, REFIT, r.node);
 }
 
+/* Nodes of a tree of bvh/clusters.cl, from `begin` on, after the rounds before. Empty nodes are unused. */
+kernel NO_VECTORIZE void refit_pairs(global float8 *nodes, uint nodes_begin, uint begin, uint count, REFIT_ARGS)
+{
+    uint at = begin + get_global_id(0);
+    nodes += nodes_begin;
+    if (get_global_id(0) < count && node_count(nodes[at])) refit_node(nodes, REFIT, at);
+}
+
 /* A level of wide nodes, from `begin` on, after the levels below. */
 kernel NO_VECTORIZE void refit_wide8(global float8 *nodes, uint nodes_begin, uint begin, uint count, REFIT_ARGS)
 {
