@@ -137,9 +137,14 @@ def real(
     *,
     textured: bool = False,
     lobe: bool = False,
+    member: bool = False,
 ) -> Any:
-    """Declare a number with its limits; may be a texture where `textured`. `lobe`: see `Param`."""
-    return _field(default, Param(roles.REAL, doc, unit, low, high, textured=textured, lobe=lobe))
+    """Declare a number with its limits; may be a texture where `textured`.
+
+    lobe, member: see `Param`.
+    """
+    declared = Param(roles.REAL, doc, unit, low, high, textured=textured, lobe=lobe, member=member)
+    return _field(default, declared)
 
 
 def flag(default: bool, doc: str) -> Any:
