@@ -1,4 +1,7 @@
-"""`python -m bench.report` makes bench/results/README.md from the JSON lines beside it."""
+"""`python -m bench.report` makes bench/results/README.md from the JSON lines beside it.
+
+It makes a section of gpus.md too, see `bench.gpu_page`.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+
+from bench import gpu_page
 
 RESULTS = Path(__file__).parent / "results"
 POCL = "Portable Computing Language"  # its platform's name
@@ -361,3 +366,4 @@ def write() -> Path:
 
 if __name__ == "__main__":
     print(write())
+    gpu_page.write()

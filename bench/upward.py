@@ -94,9 +94,9 @@ kernel NO_VECTORIZE void count_visits(global const float *nodes, global const fl
 def rows(on: dev.Device, scene: str, count: int) -> Iterator[dict[str, object]]:
     """Yield a row for each layout of a scene; count: of the rays, a multiple of 64."""
     vertices, faces = world(lower(clpt.load(scene)))
-    rays = _rays(vertices[faces], count)
+    rays = crossing_rays(vertices[faces], count)
     for layout in COUNTING:
-        trees = [_built(on, vertices, faces, layout, upward) for upward in (False, True)]
+        trees = [built(on, vertices, faces, layout, upward) for upward in (False, True)]
         visits = [_visits(on, tree, rays) for tree in trees]
         planes, upward = (Tracer(on, tree).run("closest", rays, 1)[0] for tree in trees)
         same = planes["t"] == upward["t"]
@@ -112,8 +112,8 @@ def rows(on: dev.Device, scene: str, count: int) -> Iterator[dict[str, object]]:
         }
 
 
-def _rays(triangles: np.ndarray, count: int) -> np.ndarray:
-    """Rays with near and far ends, (count, 8) float32."""
+def crossing_rays(triangles: np.ndarray, count: int) -> np.ndarray:
+    """Return rays with near and far ends, (count, 8) float32; half of them leave surfaces."""
     rng = np.random.default_rng(1)
     low, high = triangles.min((0, 1)), triangles.max((0, 1))
     areas = np.linalg.norm(
@@ -127,9 +127,10 @@ def _rays(triangles: np.ndarray, count: int) -> np.ndarray:
     return np.concatenate([origins, ends[0], rng.normal(0, 1, (count, 3)), ends[1]], 1).astype("f4")
 
 
-def _built(
+def built(
     on: dev.Device, vertices: np.ndarray, faces: np.ndarray, layout: str, upward: bool
 ) -> bvh.Bvh:
+    """Return a tree from the leaves up, or by planes without reinsertion."""
     grain = replace(building.FEW, upward=upward)
     with (
         mock.patch.multiple(building, FEW=grain, MANY=grain),

@@ -25,9 +25,8 @@ def scenes(as_json: bool, schema: bool) -> None:
     if schema:
         terminal.write((own_scenes.scenes_folder() / "schema.json").as_uri())
         return
-    listed = list(own_scenes.every())
+    rows = list(own_scenes.rows())
     if as_json:
-        rows = [{"path": entry.path, "size": entry.size, "text": entry.text} for entry in listed]
         terminal.write(json.dumps(rows, indent=2))
         return
     from rich.table import Table
@@ -35,7 +34,7 @@ def scenes(as_json: bool, schema: bool) -> None:
     from .console import output_console, shown
 
     table = Table("scene", "size", "what it shows")
-    for entry in listed:
-        size = "" if entry.size is None else "x".join(map(str, entry.size))
-        table.add_row(shown(entry.path), shown(size), shown(entry.text))
+    for row in rows:
+        size = "" if row["size"] is None else "x".join(map(str, row["size"]))
+        table.add_row(*map(shown, (row["path"], size, row["text"])))
     output_console().print(table)

@@ -6,26 +6,13 @@ import difflib
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 SCENES = "scenes"  # the first part of their paths
 _ROW = re.compile(r"^\| \[(\w+)\]\(\1\) \| (.+) \|$", re.M)  # of the table in scenes/README.md
 _LINK = re.compile(r"\[([^\]]+)\]\([^)]*\)")
 CLOSE = 0.7  # how near a name is that is meant
-
-
-@dataclass(frozen=True)
-class OwnScene:
-    """A scene that comes with clpt.
-
-    path: from any folder, as "scenes/prism"; text: its subject; size: (width, height) of its
-    picture [pixels], None if its file does not say.
-    """
-
-    path: str
-    text: str
-    size: tuple[int, int] | None
 
 
 def scenes_folder() -> Path:
@@ -44,14 +31,18 @@ def paths() -> list[str]:
     return [f"{SCENES}/{folder.name}" for folder in folders if _main_file(folder) is not None]
 
 
-def every() -> Iterator[OwnScene]:
-    """Yield all that are there, in the order of their table."""
+def rows() -> Iterator[dict[str, Any]]:
+    """Yield a row for each that is there, in the order of their table.
+
+    path: from any folder, as "scenes/prism"; size: (width, height) of its picture [pixels], None if
+    its file does not say; text: its subject.
+    """
     folder = scenes_folder()
     there = set(paths())
     for name, text in _ROW.findall((folder / "README.md").read_text(encoding="utf-8")):
         if f"{SCENES}/{name}" in there:
             plain = _LINK.sub(r"\1", text).replace("`", "")
-            yield OwnScene(f"{SCENES}/{name}", plain, _size(folder / name))
+            yield {"path": f"{SCENES}/{name}", "size": _size(folder / name), "text": plain}
 
 
 def nearest_paths(path: Path) -> list[str]:

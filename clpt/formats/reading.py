@@ -51,6 +51,22 @@ class Located(ABC):
 
 
 T = TypeVar("T")
+
+
+class Once:
+    """A document whose parts are made once."""
+
+    def __init__(self) -> None:
+        self._parts: dict[object, Any] = {}
+
+    def once(self, key: object, make: Callable[[], T]) -> T:
+        """Return make(), called once for each key."""
+        if key not in self._parts:
+            self._parts[key] = make()
+        part: T = self._parts[key]
+        return part
+
+
 Progress = Callable[[float, str], None]  # called with the share that is read, and a text
 MOST = 200  # errors that are kept
 _found: ContextVar[list[SceneError] | None] = ContextVar("blockers", default=None)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 
 from clpt import device
 from clpt.arrays import Floats
-from clpt.render.flow.scene_to_tables import Lowered
+from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.render.wavefront.device_scene import DeviceScene
 from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.wavefront import Wavefront
+from clpt.scene import Scene
 from clpt.scene.integrators import Integrator
 
 log = logging.getLogger(__name__)
@@ -35,27 +36,21 @@ LESSON = 8  # a trial trains its guide with at least 1/LESSON of the light paths
 FEWEST_LESSONS = 1 << 18
 
 
-@dataclass(frozen=True)
-class Ground:
-    """The device of trials, and its tuning, see `Wavefront.create`."""
-
-    device: device.Device
-    tuning: Tuning
-    looped: bool | None
-
-
 class Tries:
-    """Integrators that have been tried; the first is the choice of the scene."""
+    """Integrators that have been tried; the first is the choice of the scene.
 
-    def __init__(self, ground: Ground, samples: int):
-        self._ground, self._samples = ground, samples
+    on: the device of the trials; tuning: see `Wavefront.create`; samples: of the whole film.
+    """
+
+    def __init__(self, on: device.Device, tuning: Tuning, samples: int):
+        self._device, self._tuning, self._samples = on, tuning, samples
         self._scene: DeviceScene | None = None  # of the first trial; later trials share its trees
         self.ways: list[Lowered] = []
         self._trials: list[Trial] = []
 
     def add(self, way: Lowered) -> None:
         """Try an integrator. Raises as `Wavefront.create` does."""
-        trial, self._scene = tried(self._ground, way, self._samples, self._scene)
+        trial, self._scene = tried(self._device, self._tuning, way, self._samples, self._scene)
         self.ways.append(way)
         self._trials.append(trial)
 
@@ -81,20 +76,22 @@ class Tries:
         return trial.rays / (trial.pictures[..., 0].size * SAMPLES) * self._samples
 
 
-def decided(ground: Ground, lowered: Lowered, lower_as: Callable[[Integrator], Lowered]) -> Lowered:
+def decided(
+    on: device.Device, tuning: Tuning, scene: Scene, lowered: Lowered, texture_budget: int | None
+) -> Lowered:
     """Return a scene lowered for the cheapest of its candidates, with the costs in its reason.
 
-    lowered: for the first candidate; lower_as: lowers the scene for another. A candidate that must
-    be compiled is tried if the best so far has many rays to trace, and a guide only if that leaves
+    lowered: for the first candidate; texture_budget: as of `lower`. A candidate that must be
+    compiled is tried if the best so far has many rays to trace, and a guide only if that leaves
     noise.
 
     Raises as `Wavefront.create` does.
     """
-    tries = Tries(ground, lowered.samples)
+    tries = Tries(on, tuning, lowered.samples)
     tries.add(lowered)
     for way in lowered.candidates[1:]:
         if is_worth(way, tries.rays) and (not way.guiding or tries.noise > QUIET):
-            tries.add(lower_as(way))
+            tries.add(lower(scene, texture_budget, replace(lowered, integrator=way)))
     costs, best = tries.costs, tries.ways[tries.best]
     named = zip(tries.ways, costs, strict=True)
     text = ", ".join(f"{name_of(way.integrator)} {figure:.2f}" for way, figure in named)
@@ -118,7 +115,7 @@ def name_of(way: Integrator) -> str:
 
 
 def tried(
-    ground: Ground, lowered: Lowered, samples: int, like: DeviceScene | None
+    on: device.Device, tuning: Tuning, lowered: Lowered, samples: int, like: DeviceScene | None
 ) -> tuple[Trial, DeviceScene]:
     """Return the trial of a lowered scene, and the scene on the device.
 
@@ -127,9 +124,7 @@ def tried(
     settings = small_settings(lowered.settings, pixels_for(samples))
     settings["guide_paths"] = lessons(int(settings["guide_paths"]), samples)
     small = replace(lowered, settings=settings)
-    wavefront = Wavefront.create(
-        ground.device, small, ground.tuning, looped=ground.looped, trees=like or "fast"
-    )
+    wavefront = Wavefront.create(on, small, tuning, trees=like or "fast")
     seed, rays, pictures = int(lowered.settings["seed"]) ^ SEED, 0, []
     wavefront.paths.set_seed(seed)
     wavefront.learn(looped=wavefront.looped)

@@ -7,9 +7,9 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Protocol
 
 from clpt.denoise import oidn
 from clpt.device import Device
@@ -33,12 +33,14 @@ MOVES = ("orbit", "look", "pan", "dolly", "fly")
 WATCH_SECONDS = 1.0  # between looks at the scene's file
 
 
-@dataclasses.dataclass(frozen=True)
-class Source:
-    """Where the scene comes from, to be read again: `stamp` differs when it has changed."""
+class Source(Protocol):
+    """Where the scene comes from, to be read again."""
 
-    stamp: Callable[[], Any]
-    load: Callable[[], Scene]
+    def stamp(self) -> Any:
+        """Return what differs when the scene has changed."""
+
+    def load(self) -> Scene:
+        """Return the present scene."""
 
 
 class Session(CameraWork):

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from clpt.view import panels, probe, saving
 from clpt.view.look import Look
 from clpt.view.messages import COMMANDS, CommandError, Request, parse
 from clpt.view.saving import Folder
-from clpt.view.session import Session, Source, merged
+from clpt.view.session import Session, merged
 from clpt.view.target import Change
 from tests.view.test_commands import message, valid
 
@@ -481,7 +482,7 @@ def test_pause_and_where_it_stops(opened, audience) -> None:
 def test_the_file_is_watched(opened, audience) -> None:
     """The viewer's camera stays, unless the file's is another."""
     current, stamp = [small()], [1]
-    source = Source(lambda: stamp[0], lambda: current[0])
+    source = SimpleNamespace(stamp=lambda: stamp[0], load=lambda: current[0])
     session = opened(small(), source=source)
     audience.rest()
     ask(session, audience, "orbit", dx=0.1, dy=0.0)

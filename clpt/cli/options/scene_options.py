@@ -112,7 +112,6 @@ def loading_options(command: Command) -> Command:
     return with_options(command, _LOADING)
 
 
-
 LOCAL = "local:"
 
 

@@ -21,7 +21,7 @@ from ...view.messages import OF_VIEW
 from ...view.pictures import Display
 from ...view.saving import Folder
 from ...view.saving import load as load_view
-from ...view.session import Session, Source
+from ...view.session import Session
 from ..display import Display as Progress
 from ..display import display
 from ..files import outputs, targets
@@ -55,7 +55,7 @@ def show(scene: Path, settings: Settings) -> int:
             devices[0],
             server,
             folder=_folder(file, settings),
-            source=_source(file, settings.options),
+            source=_SceneFile(file, settings.options),
             display=looked_at,
             where=where,
             make=make,
@@ -121,20 +121,21 @@ def _folder(file: Path, settings: Settings) -> Folder:
     return Folder(settings.folder, targets.name_of(file), write_exr)
 
 
-def _source(file: Path, options: SceneOptions) -> Source:
-    """Return the scene's file, which is read again after changes."""
+class _SceneFile:
+    """The scene's file, which is read again after changes."""
 
-    def stamp() -> Any:
+    def __init__(self, file: Path, options: SceneOptions):
+        self.file, self.options = file, options
+
+    def stamp(self) -> Any:
         try:
-            status = file.stat()
+            status = self.file.stat()
         except OSError:  # it is being replaced
             return None
         return status.st_mtime_ns, status.st_size
 
-    def read() -> Scene:
-        return options.scene(file)
-
-    return Source(stamp, read)
+    def load(self) -> Scene:
+        return self.options.scene(self.file)
 
 
 def _attend(session: Session) -> int:

@@ -11,18 +11,18 @@ import binascii
 import json
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn
 from urllib.parse import unquote, unquote_to_bytes
 
 from clpt.arrays import is_flag, is_number, is_whole
 from clpt.choices import Missing
 from clpt.errors import SceneError
 from clpt.files import budget, input_files
+from clpt.formats.reading import Once
 
-T = TypeVar("T")
 REQUIRED: Any = object()
 ROUNDING = 1e-6  # by how much a number may exceed its limits, relative to them or to 1
 LARGEST = 2**53  # whole numbers that JSON's readers agree upon
@@ -210,17 +210,17 @@ class Scale:
         return math.log2(1.0 / self.emission)
 
 
-class Document:
+class Document(Once):
     """A parsed file: `root` is its JSON; `warnings` say what was left out."""
 
     def __init__(self, file: Path, missing: Missing = "error"):
+        super().__init__()
         self.file, self.missing = file, missing
         self.warnings: list[str] = []
         self.uv_sets: list[int] = []  # of the textures that were made since it was cleared
         self.multiple_scattering = 0.0  # see clpt.formats.gltf.load
         self.scale = Scale()
         self.variant: int | None = None
-        self._made: dict[Any, Any] = {}
         data = input_files.read_bytes(file)
         budget.check(PER_BYTE * len(data), "reading it", file)
         text, self.chunk = _split(file, data) if data[:4] == b"glTF" else (data, None)
@@ -235,12 +235,6 @@ class Document:
     def entry(self, table: str, index: int) -> Element:
         """Return an object of a list at the top, such as meshes[2]."""
         return Element(self, f"{table}[{index}]", self.root.value[table][index])
-
-    def once(self, key: object, make: Callable[[], T]) -> T:
-        """Return make(), called once for each key."""
-        if key not in self._made:
-            self._made[key] = make()
-        return self._made[key]
 
     def buffer(self, index: int) -> bytes:
         """Return the bytes of buffers[index], of its declared length."""

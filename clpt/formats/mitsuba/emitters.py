@@ -21,7 +21,7 @@ from clpt.formats.mitsuba.xml import Element
 from clpt.scene import lights
 from clpt.scene.lights import Light
 from clpt.scene.textures import Bitmap, Placed, Texture
-from clpt.spectra import RGBIlluminant
+from clpt.spectra import RGBIlluminant, scaled
 
 # parameters and their defaults: Tokyo, in its summer
 DATE = {"year": 2010.0, "month": 7.0, "day": 10.0, "hour": 15.0, "minute": 0.0, "second": 0.0}
@@ -151,7 +151,7 @@ def _projector(props: Properties) -> Parameters:
     if isinstance(shown, RGBIlluminant):
         light = {"irradiance": tuple(scale * np.pi * v for v in (shown.r, shown.g, shown.b))}
     elif not isinstance(shown, Texture):
-        raise props.element.error("'irradiance' must be a texture or a colour")
+        light = {"irradiance": scaled(shown, scale * np.pi)}
     share = {"y": wide, "diagonal": wide / np.hypot(wide, 1.0), "smaller": max(wide, 1.0)}
     share["larger"] = min(wide, 1.0)
     half = np.tan(np.radians(fov) / 2.0) * share.get(axis, 1.0)

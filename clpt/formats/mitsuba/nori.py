@@ -27,11 +27,7 @@ PARAMETERS = (
 # Integrators that count only light straight from lamps, where nothing is specular.
 DIRECT = ("direct", "direct_ems", "direct_mats", "direct_mis", "whitted")
 SPECULAR = ("mirror", "dielectric")
-# integrator, advice
-NO_LIGHT = {
-    "normals": "shows normals and no light: render another integrator with --layers shading_normal",
-    "av": "shows how much of a point is in the open, within a length, and no light",
-}
+UNOCCLUDED = "shows which share of directions is open within a length, and no light"
 FOV = 30.0  # defaults of src/perspective.cpp
 SIZE = {"width": 1280, "height": 720}
 ALPHA, INNER, OUTER, DIFFUSE = 0.1, 1.5046, 1.000277, 0.5  # defaults of src/microfacet.cpp
@@ -145,10 +141,13 @@ def _integrator(root: Element) -> None:
     for element in root.children:
         if element.tag != "integrator":
             continue
-        if element.type in NO_LIGHT:
-            raise element.error(NO_LIGHT[element.type])
+        if element.type == "av":
+            raise element.error(UNOCCLUDED)
         specular = any(e.tag == "bsdf" and e.type in SPECULAR for e in root.walk())
-        if element.type in ("simple", "ao"):
+        if element.type == "normals":
+            element.attributes["type"] = "aov"
+            element.children = [_new(element, "string", "aovs", "normal:sh_normal")]
+        elif element.type in ("simple", "ao"):
             root.children.append(_implied_lamp(element))
             _whiten(root)
         elif element.type.startswith("path"):

@@ -65,6 +65,10 @@ class Lexer:
             self._ahead = word or b""
         return self._ahead
 
+    def skip(self) -> None:
+        """Go to the end of the file."""
+        self.at, self._ahead = len(self.data), None
+
     def next(self, label: str) -> bytes:
         """Take the next word; `what` says what is missing at the end of the file."""
         word = self.peek()

@@ -342,9 +342,7 @@ def _goniometric(params: Parameters, state: State) -> Light:
         return _old_goniometric(image, params, state)
     intensity = _intensity(params, state, 4.0 * np.pi * float(image.mean()))
     position = transforms.transform_points(state.ctm, np.zeros(3))
-    around = lat_long(
-        image, SWAP @ transforms.inverse(state.ctm)[:3, :3], on_poles=False
-    )
+    around = lat_long(image, SWAP @ transforms.inverse(state.ctm)[:3, :3], on_poles=False)
     return lights.Goniometric(
         intensity=intensity,
         image=Bitmap(image=around, raw=True, wrap_v="clamp"),

@@ -49,23 +49,24 @@ class _Reader(TransformDirectives):
     def directive(self) -> None:
         """Take the next directive and do what it says."""
         self.name = input_files.decode(self.lexer.next("a directive"))
-        if self.contents.shared.old:
-            self._modernise()
+        if self.contents.shared.old and not self._modernise():
+            return
         action = DIRECTIVES.get(self.name)
         if action is None:
             raise self._unknown()
         with self.locating():
             action(self)
 
-    def _modernise(self) -> None:
-        """Take a directive of version 2 or 3 for that of version 4."""
+    def _modernise(self) -> bool:
+        """Take a directive of version 2 or 3 for that of version 4, if there is such."""
         today = old_words.directive(self.name)
         if not today:
             with self.locating():
                 self._definition(f'{self.name} "{{}}"')
             self.warn_once("is left out")
-            today = "WorldEnd"  # which does nothing
+            return False
         self.name = today
+        return True
 
     def _unknown(self) -> SceneError:
         name = self.name
@@ -90,9 +91,12 @@ class _Reader(TransformDirectives):
         self.contents.shared.systems["world"] = np.eye(4), None
 
     def world_end(self) -> None:
-        """Versions 2 and 3 end a scene so."""
+        """Versions 2 and 3 end a scene so; another picture may follow."""
         if not self.contents.shared.old:
             raise self._unknown()
+        if self.lexer.peek():
+            self.warn("the pictures behind it are left out: the first is read")
+        self.lexer.skip()
 
     def option(self) -> None:
         """Camera, Film and the like; versions 2 and 3 ignore them after WorldBegin."""

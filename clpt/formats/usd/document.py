@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import tempfile
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +20,13 @@ from clpt import images
 from clpt.arrays import Matrix
 from clpt.errors import SceneError
 from clpt.files import budget, input_files
+from clpt.formats.reading import Once
 from clpt.scene.studio import Up
 
 MOST_TOLD = 4  # prims that a warning names
-Kept = TypeVar("Kept")
 
 
-class Document:
+class Document(Once):
     """A stage that is read at one time code.
 
     file: of the root layer; code: the time code; metres: of a unit of the stage; up: "y" or "z";
@@ -34,12 +34,12 @@ class Document:
     """
 
     def __init__(self, file: Path, stage: Usd.Stage, time: float, level: int | None = None):
+        super().__init__()
         self.file, self.stage, self.level = file, stage, level
         self.metres = float(UsdGeom.GetStageMetersPerUnit(stage))
         self.up: Up = "z" if UsdGeom.GetStageUpAxis(stage) == "Z" else "y"
         self.to_metres = np.diag([self.metres] * 3 + [1.0])
         self.left_out: dict[str, list[str]] = {}
-        self.memory: dict[object, Any] = {}
         self.set_time(time)
 
     def set_time(self, code: float) -> None:
@@ -64,13 +64,6 @@ class Document:
     def error(self, message: str, path: object) -> SceneError:
         """Return the error of a prim."""
         return SceneError(message, file=self.file, where=str(path))
-
-    def once(self, key: object, make: Callable[[], Kept]) -> Kept:
-        """Return what `make` returned when it was first asked for this key."""
-        if key not in self.memory:
-            self.memory[key] = make()
-        kept: Kept = self.memory[key]
-        return kept
 
     def value(self, prim: Usd.Prim, name: str, default: object = None) -> Any:
         """Return an attribute's value at the time; `default` for none."""

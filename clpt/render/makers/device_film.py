@@ -30,7 +30,7 @@ from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.render.options import RenderOptions
 from clpt.render.records import materials
 from clpt.render.textures.image_files import ImageFiles
-from clpt.render.trials import Ground, decided
+from clpt.render.trials import decided
 from clpt.render.wavefront.noise import DenoisedNoise
 from clpt.render.wavefront.strategy import Tuning
 from clpt.render.wavefront.tracer import use_all_pixels
@@ -102,14 +102,14 @@ class DeviceFilm:
             texture_budget = texture_budget_of(device)
         self._texture_budget, self.successors = texture_budget, Successors()
         looped = options.get("looped", None if options.get("queue") is None else True)
-        tuning = Tuning(options.get("layout"), options.get("queued"), options.get("cancel_seconds"))
-        self._ground = Ground(device, tuning, looped)
+        self._tuning = Tuning(
+            options.get("layout"), options.get("queued"), looped, options.get("cancel_seconds")
+        )
         self.create = partial(
             Wavefront.create,
             device,
-            tuning=tuning,
+            tuning=self._tuning,
             slots=options.get("slots"),
-            looped=looped,
             trees=options.get("tree_quality", "high"),
             halves=options.get("halves", False) or needs.halves(scene, denoise),
         )
@@ -209,7 +209,7 @@ class DeviceFilm:
         anew: choose the integrator anew. A trial may decide, but not for interactive pictures,
         which must come soon and keep their integrator.
         """
-        steered = self._ground.tuning.cancel_seconds is not None
+        steered = self._tuning.cancel_seconds is not None
         chooses = anew and not (steered and self.is_open)
 
         def make() -> Lowered:
@@ -217,11 +217,7 @@ class DeviceFilm:
             lowered = lower(readable, budget, former, anew=chooses)
             if not lowered.candidates or steered:
                 return lowered
-
-            def lower_as(way: Integrator) -> Lowered:
-                return lower(readable, budget, replace(lowered, integrator=way))
-
-            return decided(self._ground, lowered, lower_as)
+            return decided(self.device, self._tuning, readable, lowered, budget)
 
         if share is None:
             return make()

@@ -22,14 +22,15 @@ SHARE = 512  # slots of a work-item of the loop on a CPU, which fit into the sec
 
 @dataclass(frozen=True)
 class Tuning:
-    """Wishes of the caller for a `Strategy`; None: the default of the device and the scene.
+    """Wishes of the caller; None: the default of the device and the scene.
 
-    layout, queued: as in `Strategy`; cancel_seconds: the longest time from a request to stop to the
-    end of the run [s].
+    layout, queued: as in `Strategy`; looped: whether a kernel on the device runs all bounces;
+    cancel_seconds: the longest time from a request to stop to the end of the run [s].
     """
 
     layout: str | None = None
     queued: bool | None = None
+    looped: bool | None = None
     cancel_seconds: float | None = None
 
 

@@ -109,7 +109,6 @@ class Wavefront:
         tuning: Tuning = UNTUNED,
         *,
         slots: int | None = None,
-        looped: bool | None = None,
         trees: bvh.Quality | DeviceScene = "high",
         halves: bool = False,
     ) -> Wavefront:
@@ -122,8 +121,7 @@ class Wavefront:
         Raises as `Wavefront` does, SceneError for a layout that cannot hold the scene.
         """
         chosen = strategy.choose(on, lowered, tuning)
-        if looped is None:
-            looped = strategy.use_loop(on)
+        looped = strategy.use_loop(on) if tuning.looped is None else tuning.looped
         if looped:  # beside the trees
             texts = programs.loop_sources(
                 lowered.features, chosen.layout, on.lanes, chosen.interleaved

@@ -410,15 +410,18 @@ def test_lights_with_images(scene, scenes):
         + picture.format("irradiance") + "</emitter>"
         '<emitter type="projector"><float name="fov" value="40"/>'
         '<rgb name="irradiance" value="1 2 3"/></emitter>'
+        '<emitter type="projector"><float name="fov" value="40"/><float name="scale" value="3"/>'
+        '<spectrum name="irradiance" value="2"/></emitter>'
         '<emitter type="spot">' + picture.format("texture") + "</emitter>"
     )  # fmt: skip
-    across, up, plain, spot = made.lights
+    across, up, plain, even, spot = made.lights
     assert (across.irradiance.r, across.fov) == (pytest.approx(2 * np.pi), pytest.approx(40))
     assert np.array_equal(across.image.to_uv, np.eye(3))  # upright as it is
     height, width = images.read(up.image.image).shape[:2]
     tan = np.tan(np.radians(20)) * width / height
     assert up.fov == pytest.approx(np.degrees(2 * np.arctan(tan)))
     assert plain.irradiance.b == pytest.approx(3 * np.pi)
+    assert even.irradiance.value == pytest.approx(6 * np.pi)
     assert spot.image.image.name == "tiles.png"
 
 
@@ -638,8 +641,6 @@ ERRORS = {
     '<shape type="cube"><emitter type="point"/></shape>': "only an area light",
     '<emitter type="area"/>': "must stand in a <shape>",
     '<emitter type="projector"><float name="fov" value="0"/></emitter>': "field of view",
-    '<emitter type="projector"><float name="fov" value="9"/><spectrum name="irradiance" value="2"/>'
-    "</emitter>": "a texture or a colour",
     '<integrator type="path"><integer name="max_depth" value="1.5"/></integrator>': "whole number",
     '<integrator type="path"><boolean name="hide_emitters" value="1"/></integrator>': "true or",
     '<integrator type="path"><integer name="rr_depth" value="1"/>'

@@ -379,3 +379,17 @@ def test_images_of_lights_are_linear_whatever_their_bits(read, tmp_path, kind):
     if kind != "infinite":
         of_bytes, of_floats = of_bytes.image, of_floats.image
     np.testing.assert_allclose(of_bytes, of_floats, rtol=1e-3)
+
+
+def test_a_second_picture_in_a_file_is_left_out(tmp_path):
+    """Version 2 renders one world after the other."""
+    path = tmp_path / "two.pbrt"
+    first = (
+        f'Film "image" "integer xresolution" 9\nWorldBegin\n{DISK}\nVolume "x"\n{DISK}\nWorldEnd'
+    )
+    path.write_text(f'{first}\nFilm "image"\nWorldBegin\nShape "ofafork"\nWorldEnd\n')
+    scene = load(path)
+    assert scene.film.width == 9 and len(scene.shapes) == 2
+    assert any("the pictures behind it are left out" in text for text in scene.warnings)
+    path.write_text(first + "\n# the end\n")
+    assert not any("pictures" in text for text in load(path).warnings)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib as files
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from clpt.render import trials
 from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.render.transport import hard_light, light_caches
 from clpt.render.transport.hard_light import TRIAL_SAMPLES
+from clpt.render.wavefront.strategy import UNTUNED
 from clpt.scene import Scene
 from clpt.scene.integrators import Auto, Integrator, Path
 from clpt.scene.lights import Point
@@ -37,8 +37,10 @@ def long(scene: Scene, integrator: Integrator = AUTO, **changes: Any) -> Scene:
     return dataclasses.replace(scene, **changes)
 
 
-def lower_way(scene: Scene, way: Integrator) -> Lowered:
-    return lower(dataclasses.replace(scene, integrator=way))
+def decided(scene: Scene) -> Lowered:
+    """The choice of trials without a device."""
+    on: Any = None
+    return trials.decided(on, UNTUNED, scene, lower(scene), None)
 
 
 def ways(scene: Scene) -> list[tuple[Any, bool]]:
@@ -164,7 +166,7 @@ def made_up(
     """Let trials find these variances at equal rays; return what is tried, as it is."""
     asked: list[Any] = []
 
-    def tried(_: trials.Ground, lowered: Lowered, *__: Any) -> tuple[trials.Trial, None]:
+    def tried(_: object, __: object, lowered: Lowered, *___: Any) -> tuple[trials.Trial, None]:
         way = lowered.integrator.light_paths, lowered.integrator.guiding
         asked.append(way)
         drawn = np.random.default_rng(len(asked)).normal(1.0, noise[way] ** 0.5, (8, 32, 64, 3))
@@ -178,8 +180,7 @@ def made_up(
 def test_the_cheapest_way_is_taken(monkeypatch: pytest.MonkeyPatch, best: tuple[Any, bool]) -> None:
     scene = long(caustic())
     asked = made_up(monkeypatch, {way: 0.5 if way == best else 1.0 for way in WAYS})
-    ground: Any = None
-    found = trials.decided(ground, lower(scene), partial(lower_way, scene))
+    found = decided(scene)
     assert asked == WAYS
     assert (found.integrator.light_paths, found.integrator.guiding) == best
     assert found.features.transport.guided == best[1]
@@ -189,35 +190,31 @@ def test_the_cheapest_way_is_taken(monkeypatch: pytest.MonkeyPatch, best: tuple[
 
 def test_no_guide_is_compiled_where_there_is_little_noise(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = made_up(monkeypatch, dict.fromkeys(WAYS, 0.9 * trials.QUIET))
-    ground: Any = None
     scene = long(caustic())
-    trials.decided(ground, lower(scene), partial(lower_way, scene))
+    decided(scene)
     assert asked == WAYS[:2]
     asked.clear()
     asked = made_up(monkeypatch, dict.fromkeys([(0, False), (0, True)], 0.9 * trials.QUIET))
-    alone = lower(long(slit()))
-    found = trials.decided(ground, alone, lambda way: alone)
-    assert asked == [(0, False)] and found.reason == alone.reason
+    alone = long(slit())
+    assert decided(alone).reason == lower(alone).reason and asked == [(0, False)]
 
 
 def test_no_guide_is_compiled_for_few_rays(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = long(caustic(), spp=-(-TRIAL_SAMPLES // (16 * 12)))
-    ground: Any = None
     pictures = trials.ROUNDS * trials.SAMPLES * 32 * 64
     for each, guides_too in ((15, False), (17, True)):  # rays of a sample
         asked = made_up(monkeypatch, dict.fromkeys(WAYS, 1.0), each * pictures)
-        trials.decided(ground, lower(scene), partial(lower_way, scene))
+        decided(scene)
         assert asked == ([WAYS[0], WAYS[2]] if guides_too else WAYS[:1])
 
 
 def test_path_without_light_paths_is_compiled_for_very_many_rays(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    ground: Any = None
     for power, without in ((27, False), (29, True)):  # of four rays each
         scene = long(caustic(), spp=-(-(1 << power) // (16 * 12)))
         asked = made_up(monkeypatch, {way: 0.1 if way == (0, False) else 0.3 for way in WAYS})
-        found = trials.decided(ground, lower(scene), partial(lower_way, scene))
+        found = decided(scene)
         assert asked == (WAYS[:2] if without else WAYS[:1])
         assert (found.integrator.light_paths == 0) == without
 

@@ -53,8 +53,8 @@ def test_nobody_can_write_to_a_lowered_scene(cornell: Scene) -> None:
 def test_two_wavefronts_share_a_lowered_scene(cornell: Scene) -> None:
     """With other slots, layouts and seeds, while one of them is edited and rebuilt."""
     on, lowered = device.choose(), lower(cornell)
-    one = Wavefront.create(on, lowered, Tuning(layout="wide8"), looped=False)
-    other = Wavefront.create(on, lowered, Tuning(layout="binary"), slots=64, looped=False)
+    one = Wavefront.create(on, lowered, Tuning(layout="wide8", looped=False))
+    other = Wavefront.create(on, lowered, Tuning(layout="binary", looped=False), slots=64)
     assert one.scene.lowered is other.scene.lowered is lowered
     assert one.paths.slots != other.paths.slots
     first, second = picture(one), picture(other)
@@ -81,5 +81,5 @@ def test_two_wavefronts_share_a_lowered_scene(cornell: Scene) -> None:
     if isinstance(plan, str):
         plan = plans.prepare_rebuild(other, lower(edited, former=other.scene.lowered))
     plan.write()
-    new = Wavefront.create(on, lower(edited), Tuning(layout="binary"), slots=64, looped=False)
+    new = Wavefront.create(on, lower(edited), Tuning(layout="binary", looped=False), slots=64)
     np.testing.assert_array_equal(picture(other), picture(new))
