@@ -30,6 +30,7 @@ from clpt.scene.params import (
     flag,
     host,
     index,
+    member,
     params,
     real,
 )
@@ -127,7 +128,7 @@ class Camera(Kind):
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
         """Return the members of its record in `clpt.render.records.camera` by name.
 
-        Parameters that are declared with `member=True` are no part of them. A traced lens has only
+        Parameters that are declared by `member` are no part of them. A traced lens has only
         those that need no table. width, height: of the film [pixels].
         Raises SceneError for planes, a matrix, a glass or a lens that cannot be used.
         """
@@ -244,8 +245,8 @@ class Perspective(Camera):
 
     fov: float = real(45.0, "field of view along `fov_axis`", "degrees", 1e-3, 179.999)
     fov_axis: str = choice("x", "which side `fov` spans", ("x", "y", "smaller", "larger"))
-    near: float = real(1e-2, "nearest distance seen", "m", low=0.0, member=True)
-    far: float = real(1e4, "farthest distance seen", "m", low=0.0, member=True)
+    near: float = member(1e-2, "nearest distance seen", "m", low=0.0)
+    far: float = member(1e4, "farthest distance seen", "m", low=0.0)
     offset_x: float = real(
         0.0, "the principal point lies at 1/2 less this from the left, in widths of the film"
     )
@@ -302,13 +303,13 @@ class ThinLens(Perspective):
     A `glass` that disperses gives it chromatic aberration: `focus_distance` is that at 587.56 nm.
     """
 
-    aperture_radius: float = real(0.1, "of the lens", "m", low=0.0, member=True)
-    focus_distance: float = real(1.0, "of the plane in focus", "m", low=1e-6, member=True)
+    aperture_radius: float = member(0.1, "of the lens", "m", low=0.0)
+    focus_distance: float = member(1.0, "of the plane in focus", "m", low=1e-6)
     glass: IndexLike = index(
         1.5, "of the lens; one that disperses focuses each wavelength elsewhere"
     )
-    focal_length: float = real(
-        0.05, "of the lens at 587.56 nm; matters to `glass`", "m", low=1e-6, member=True
+    focal_length: float = member(
+        0.05, "of the lens at 587.56 nm; matters to `glass`", "m", low=1e-6
     )
 
     @property
@@ -429,8 +430,8 @@ class Orthographic(Camera):
     is_rigid: ClassVar[bool] = False
     has_axis: ClassVar[bool] = True
 
-    near: float = real(1e-2, "nearest distance seen", "m", low=0.0, member=True)
-    far: float = real(1e4, "farthest distance seen", "m", low=0.0, member=True)
+    near: float = member(1e-2, "nearest distance seen", "m", low=0.0)
+    far: float = member(1e4, "farthest distance seen", "m", low=0.0)
 
     def half_height(self, aspect: float) -> float:
         """Return half the height of the film [m]."""

@@ -137,14 +137,16 @@ def real(
     *,
     textured: bool = False,
     lobe: bool = False,
-    member: bool = False,
 ) -> Any:
-    """Declare a number with its limits; may be a texture where `textured`.
+    """Declare a number with its limits; may be a texture where `textured`. `lobe`: see `Param`."""
+    return _field(default, Param(roles.REAL, doc, unit, low, high, textured=textured, lobe=lobe))
 
-    lobe, member: see `Param`.
-    """
-    declared = Param(roles.REAL, doc, unit, low, high, textured=textured, lobe=lobe, member=member)
-    return _field(default, declared)
+
+def member(
+    default: object, doc: str, unit: str = "", low: float = -math.inf, high: float = math.inf
+) -> Any:
+    """Declare a number of a camera that kernels read: a member of its record."""
+    return _field(default, Param(roles.REAL, doc, unit, low, high, member=True))
 
 
 def flag(default: bool, doc: str) -> Any:

@@ -22,7 +22,7 @@ GHOST_CELLS = 1024  # of equal probability; a cell gives a pair of reflecting su
 
 
 def _declared(kind: type[Kind]) -> dict[str, tuple[str, str]]:
-    """Return the members that a camera declares by `member=True`."""
+    """Return the members that a camera declares by `member`."""
     return {
         name: ("real", f"{param.doc} [{param.unit}]" if param.unit else param.doc)
         for name, param in params(kind).items()
