@@ -71,9 +71,11 @@ def glare(
     """Return the glare of a view in a scene.
 
     view: from the eye to the world (4, 4), along +z, such as of `clpt.transforms.look_at`.
-    threshold: luminance of a source [cd/m^2]; None: BRIGHT times the mean of the view. height: of the picture [pixels], which
-    is twice as wide; a source must take some pixels. samples: of a pixel. device, options: see
-    `clpt.Renderer`. Raises SceneError for a view that cannot be used, and as `clpt.Renderer` does.
+    threshold: luminance of a source [cd/m^2]; None: BRIGHT times the mean of the view. height: of
+    the picture [pixels], which is twice as wide; a source must take some pixels. samples: of a
+    pixel. device, options: see `clpt.Renderer`.
+
+    Raises SceneError for a view that cannot be used, and as `clpt.Renderer` does.
     """
     check_scene(scene)
     if height < 2 or samples < len(OFFSETS):
