@@ -10,6 +10,7 @@ import secrets
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from multiprocessing.connection import Connection, Listener
 from pathlib import Path
 from typing import Any
@@ -31,10 +32,14 @@ class Process:
         with Listener(("127.0.0.1", 0), authkey=key) as listener:
             listener._listener._socket.settimeout(0.5)  # accept() has no limit of its own
             command = [python or interpreter(), str(WORKER), str(listener.address[1])]
-            self.child = subprocess.Popen(command, stdin=subprocess.PIPE)
+            try:
+                self.child = subprocess.Popen(command, stdin=subprocess.PIPE)
+            except OSError as error:
+                raise ProcessError(f"{command[0]} does not start: {error.strerror}") from None
             assert self.child.stdin is not None
-            self.child.stdin.write(key)
-            self.child.stdin.close()
+            with suppress(BrokenPipeError):  # a child that has ended is told below
+                self.child.stdin.write(key)
+                self.child.stdin.close()
             self.connection = self._accept(listener)
 
     def _accept(self, listener: Listener) -> Connection:

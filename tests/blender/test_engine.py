@@ -122,9 +122,9 @@ def test_a_turned_dome(tmp_path: Path) -> None:
     bpy.context.scene.world = world
     world.use_nodes = True
     nodes, links = world.node_tree.nodes, world.node_tree.links
-    image = bpy.data.images.new("sky", 64, 32, float_buffer=True)
-    pixels = np.full((32, 64, 4), 0.1, np.float32)
-    pixels[14:18, 40:44, :3] = (5.0, 2.0, 1.0)
+    image = bpy.data.images.new("sky", 128, 64, float_buffer=True)
+    pixels = np.full((64, 128, 4), 0.1, np.float32)
+    pixels[28:36, 80:88, :3] = (5.0, 2.0, 1.0)
     image.pixels = pixels.ravel()
     texture = nodes.new("ShaderNodeTexEnvironment")
     texture.image = image
