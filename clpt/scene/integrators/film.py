@@ -157,12 +157,12 @@ def _width_and_height(size: tuple[int, int]) -> dict[str, int]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Film(Kind):
-    """The picture that is recorded: size, mode, wavelengths, filter, and how light becomes colour.
+    """The recorded picture: size, mode, wavelengths, filter, and the conversion of light to colour.
 
-    With `bands` a pixel holds the mean radiance [W m^-2 sr^-1 nm^-1] of as many equal parts of the
-    range of wavelengths. `white_balance` makes that illuminant the white of `output_space`
-    (Bradford); without it colours are as the sensor tells them. A `sensor` other than cie1931 and
-    `bands` need the spectral mode.
+    With `bands` the range of wavelengths has so many equal parts, and a pixel holds the mean
+    radiance of each part [W m^-2 sr^-1 nm^-1]. `white_balance` makes its illuminant the white of
+    `output_space` (Bradford). Without it colours are those of the sensor. `bands` and a `sensor`
+    other than cie1931 need the spectral mode.
     """
 
     shorthands = (
@@ -185,8 +185,9 @@ class Film(Kind):
     filter: Filter = host(Box(), "pixel filter", form="filter")
     filtering: str = choice(
         "auto",
-        "splatting: a sample serves all pixels whose filters hold it; importance: one pixel, at a "
-        "place drawn from its filter; auto: splatting, but importance with `noise`",
+        "splatting: a sample counts for all pixels whose filters reach it; importance: for a "
+        "single pixel, at a point drawn from the filter; auto: splatting, but importance with "
+        "`noise`",
         ("auto", "splatting", "importance"),
     )
     lambda_min: float = real(360.0, "shortest wavelength", "nm", SHORTEST, LONGEST)
@@ -197,12 +198,12 @@ class Film(Kind):
         ("auto", "visible", "scene"),
     )
     sensor: str | Sensor = host(
-        "cie1931", "what responds: cie1931, cie1964 or a clpt.spectra.Sensor", form="sensor"
+        "cie1931", "its curves: cie1931, cie1964 or a clpt.spectra.Sensor", form="sensor"
     )
     bands: int = host(0, "of a spectral picture; 0: a picture of three colours")
     white_balance: str | float | tuple[float, float] = host(
         "none",
-        "what becomes white: none, an illuminant, a colour temperature [K], or (x, y)",
+        "the colour that becomes white: none, an illuminant, a temperature [K], or (x, y)",
         form="white_balance",
     )
     output_space: str = choice("rec709", "colour space of the picture", spaces.SPACES)
@@ -211,7 +212,7 @@ class Film(Kind):
         0.0, "brightens pictures for screens; other files keep the light", "stops", -64.0, 64.0
     )
     alpha: bool = host(
-        False, "transparent: the camera sees no sky, and a fourth channel tells what is covered"
+        False, "transparent: the camera sees no sky, and a fourth channel holds the coverage"
     )
     layers: tuple[str, ...] = host(
         (), f"beside the picture: any of {', '.join(LAYERS)}", form="names"
