@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import clpt
 from clpt import images
 from clpt.errors import SceneError
 from clpt.formats import load
@@ -418,3 +419,31 @@ def test_a_hyperboloid_has_its_waist_at_0(read, p1, p2, turn):
 def test_no_hyperboloid(read):
     with pytest.raises(SceneError, match="no hyperboloid goes through"):
         read('Shape "hyperboloid" "point p1" [0 0 0] "point p2" [0 0 1]')
+
+
+@pytest.mark.parametrize("end", ["", "WorldEnd"])
+def test_the_inside_of_dots_surrounds_them(tmp_path, end):
+    """pbrt-v3's dots.cpp hands "inside" to the parameter `outsideDot`; so does pbrt-v4's."""
+    path = tmp_path / "a.pbrt"
+    texture = 'Texture "d" "float" "dots" "float inside" 0.2 "float outside" 0.7'
+    kind = '"matte" "texture sigma"' if end else '"coateddiffuse" "texture roughness"'
+    path.write_text(f'WorldBegin\n{texture}\nMaterial {kind} "d"\n{DISK}\n{end}\n')
+    material = load(path).shapes[0].material.front
+    mixed = material.sigma if end else material.alpha
+    assert isinstance(mixed.amount, textures.Dots)
+    assert level(mixed.first) < level(mixed.second)
+    if end:
+        assert (level(mixed.first), level(mixed.second)) == (0.2, 0.7)
+
+
+def test_glass_in_a_mix_has_the_front_of_the_rest(read):
+    text = (
+        'MakeNamedMaterial "a" "string type" "glass"\nMakeNamedMaterial "b" "string type" "matte"\n'
+        'Material "mix" "color amount" [.4 .4 .4] "string namedmaterial1" "a" '
+        f'"string namedmaterial2" "b"\n{DISK}'
+    )
+    scene = read(text)
+    kinds = [part.kind for part in materials.parts(scene.shapes[0].material)]
+    assert "dielectric" in kinds and "two_sided" not in kinds
+    assert any("black from behind" in text for text in scene.warnings)
+    assert np.isfinite(np.asarray(clpt.render(scene, 1, size=(4, 4)))).all()
