@@ -83,7 +83,7 @@ def _convert_scene(file: Path, target: Path, loading: Loading) -> None:
 
 def _with_maps(scene: Scene) -> Scene:
     """Return a scene whose sky and cube of images are a map in latitude and longitude."""
-    import numpy as np  # here: help needs none
+    import numpy as np
 
     from ..scene import Film, Scene, cameras, integrators
     from ..scene.lights import Constant, Envmap
