@@ -54,31 +54,36 @@ def traffic(features: Features, layout: str, *, queued: bool = False) -> dict[st
     An item is a slot with work: in `generate` a path that ends and its successor, in `intersect`
     and `shade_...` a ray and its hit, in `shadow` a shadow ray, in `append` a slot.
     """
-    texts = programs.sources(features, layout, 1, queued=queued)
+    sizes = words_of_members(features)
+    moved = {}
+    for name, source in programs.sources(features, layout, 1, queued=queued).items():
+        read, written = (_QUEUED.get(name.split("_")[0]) if queued else None) or (0, 0)
+        loads, stores = members_moved(source.text, sizes)
+        read += sum(sizes[member] for member in loads)
+        written += sum(sizes[member] for member in stores)
+        moved[name] = Moved(_WORD * read, _WORD * written)
+    return moved
+
+
+def words_of_members(features: Features) -> dict[str, int]:
+    """Return the words of the slabs' members that a scene uses, by names such as `path_beta`."""
     unused = blocks.unused(features)
-    sizes = {
+    return {
         f"{record.name.lower()}_{member.name}": member.words
         - (member.type == "spectrum" and not features.spectra.spectral)
         for record in SLABS
         for member in record.members
         if member.name not in unused
     }
-    moved = {}
-    for name, source in texts.items():
-        queue_words = _QUEUED.get(name.split("_")[0]) if queued else None
-        moved[name] = _moved(source.text, sizes, *(queue_words or (0, 0)))
-    return moved
 
 
-def _moved(text: str, sizes: Mapping[str, int], read: int, written: int) -> Moved:
-    """Return an item's traffic; sizes: words of slabs' members; read, written: further words."""
-    words: dict[str, set[str]] = {"load": set(), "store": set()}
+def members_moved(text: str, sizes: Mapping[str, int]) -> tuple[set[str], set[str]]:
+    """Return the members of `sizes` that a program's text loads, and those that it stores."""
+    members: dict[str, set[str]] = {"load": set(), "store": set()}
     for call in _CALL.finditer(_COMMENT.sub("", text)):
         if call["member"] in sizes:
-            words[call["verb"]].add(call["member"])
-    read += sum(sizes[member] for member in words["load"])
-    written += sum(sizes[member] for member in words["store"])
-    return Moved(_WORD * read, _WORD * written)
+            members[call["verb"]].add(call["member"])
+    return members["load"], members["store"]
 
 
 def measure(
