@@ -160,6 +160,7 @@ SETTINGS = Record(
     ),
     aim_count=("integer", "number of these spheres, see kernels/lights/aiming.cl"),
     camera_medium=("integer", "medium around the camera, see kernels/media/medium.cl"),
+    camera_around=("integer", "medium around the body at the camera that absorbs; 0: none"),
     camera_bodies=("integer", "bodies around it, see kernels/media/bodies.cl"),
     second_u=(
         "integer",

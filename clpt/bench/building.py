@@ -10,8 +10,9 @@ from typing import get_args
 import numpy as np
 
 from clpt import bvh, device
+from clpt.arrays import Faces, Points
 from clpt.bench.figures import Copying, Figure, rates
-from clpt.bench.rays import Sets, Traced, Truth, sets
+from clpt.bench.rays import Rays, Traced, Truth, sets
 from clpt.choices import Quality
 from clpt.rays import Accel
 from clpt.scene import Scene
@@ -31,7 +32,7 @@ def measure(
 
     count: rays that check the trees; accel: class to trace them, with the parameters of Accel.
     """
-    work = _Work(on, sets(on, scene, count), scene.name, accel)
+    work = _Work(on, *sets(on, scene, count), scene.name, accel)
     builds = [(layout, quality) for layout in layouts for quality in get_args(Quality)]
     trees: dict[tuple[str, Quality], bvh.Bvh] = {}
     seconds: dict[str, list[float]] = {}
@@ -61,19 +62,22 @@ def _name(layout: str, quality: Quality) -> str:
 class _Work:
     """Triangles on the device in two positions, and rays to check trees."""
 
-    def __init__(self, on: device.Device, triangles: Sets, scene: str, accel: type[Accel]):
-        self.device, self.sets, self.scene, self.accel = on, triangles, scene, accel
-        height = float(np.ptp(triangles.vertices[:, 1]))
-        wave = np.sin(triangles.vertices[:, [1, 2, 0]] * (12.0 / max(height, 1e-6)))
-        self.bent = (triangles.vertices + BEND * height * wave).astype(np.float32)
-        self.rays = triangles.rays.get("diffuse") or triangles.rays["primary"]
+    def __init__(
+        self, on: device.Device, vertices: Points, faces: Faces,
+        ray_sets: dict[str, Rays], scene: str, accel: type[Accel],
+    ):  # fmt: skip
+        self.device, self.scene, self.accel = on, scene, accel
+        self.triangles = vertices, faces
+        height = float(np.ptp(vertices[:, 1]))
+        wave = np.sin(vertices[:, [1, 2, 0]] * (12.0 / max(height, 1e-6)))
+        self.bent = (vertices + BEND * height * wave).astype(np.float32)
+        self.rays = ray_sets.get("diffuse") or ray_sets["primary"]
         self.copying, give = Copying(on), device.Buffers(on)
         self._building = bvh.Building(on)
         self.points, self.moved = (
-            give.upload("vertices", points, np.float32)
-            for points in (triangles.vertices, self.bent)
+            give.upload("vertices", points, np.float32) for points in (vertices, self.bent)
         )
-        self.faces = give.upload("faces", triangles.faces, np.uint32)
+        self.faces = give.upload("faces", faces, np.uint32)
 
     def build(self, layout: str, quality: Quality) -> bvh.Bvh:
         """Build a tree."""
@@ -89,10 +93,11 @@ class _Work:
         *, moves: bool,
     ) -> Figure:  # fmt: skip
         """Return the speed of the rounds after the first, which compiles; check hits."""
-        count = len(self.sets.faces)
+        vertices, faces = self.triangles
+        count = len(faces)
         stats = {} if moves else {k: v for k, v in tree.stats.items() if k != "seconds"}
         more = {"layout": layout, "quality": quality, "triangles": count, **stats}
-        least = self.sets.vertices.nbytes + self.sets.faces.nbytes + tree.bytes
+        least = vertices.nbytes + faces.nbytes + tree.bytes
         rounds = rates(count, seconds[1:])
         figure = Figure("build", name, "Mtri/s", rounds, self.scene, {**more, "bytes": tree.bytes})
         slow = self.copying.complaint(least, min(seconds[1:]), least)
@@ -101,15 +106,12 @@ class _Work:
     @cached_property
     def _truths(self) -> tuple[Truth, Truth]:
         """The expected hits of the rays, before and after the triangles move."""
-        faces, rays = self.sets.faces, self.rays
-        return Truth(self.sets.vertices, faces, rays), Truth(self.bent, faces, rays)
+        (vertices, faces), rays = self.triangles, self.rays
+        return Truth(vertices, faces, rays), Truth(self.bent, faces, rays)
 
     def _answers(self, layout: str, quality: Quality, *, moves: bool) -> str:
         """Trace the rays through such a tree; return a complaint on its hits, or ""."""
-        queue, triangles = self.device.queue, self.sets
-        tree = self.accel(
-            queue, triangles.vertices, triangles.faces, layout=layout, quality=quality
-        )
+        tree = self.accel(self.device.queue, *self.triangles, layout=layout, quality=quality)
         if moves:
             tree.update(self.bent)
         hits, _ = Traced(self.device, self.rays).closest(tree)

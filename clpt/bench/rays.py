@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import bvh, device
+from clpt.arrays import Faces, Points
 from clpt.bench.figures import Copying, Figure, Taken, clock_complaint, rates, timed
 from clpt.bench.launches import Flight
 from clpt.errors import SceneError
@@ -166,17 +167,12 @@ class Rays:
         return len(self.origins)
 
 
-@dataclass(frozen=True)
-class Sets:
-    """A scene's vertices (n, 3) float32 and faces (m, 3) uint32, and its rays by set."""
+def sets(
+    on: device.Device, scene: Scene, count: int | None = None
+) -> tuple[Points, Faces, dict[str, Rays]]:
+    """Return a scene's vertices (n, 3) and faces (m, 3), and about `count` rays of each set.
 
-    vertices: NDArray[np.float32]
-    faces: NDArray[np.uint32]
-    rays: Mapping[str, Rays]
-
-
-def sets(on: device.Device, scene: Scene, count: int | None = None) -> Sets:
-    """Return about `count` rays of each set, from a render's stages, without empty sets.
+    Rays come from a render's stages; empty sets are left out.
 
     Raises SceneError for a scene without triangles.
     """
@@ -196,7 +192,7 @@ def sets(on: device.Device, scene: Scene, count: int | None = None) -> Sets:
             rays_by_set["diffuse"] = _diffuse(flight)
         elif name == "shade":
             rays_by_set["shadow"] = _shadow_rays(flight)
-    return Sets(vertices, faces, {name: rays for name, rays in rays_by_set.items() if len(rays)})
+    return vertices, faces, {name: rays for name, rays in rays_by_set.items() if len(rays)}
 
 
 def _path_rays(flight: Flight) -> Rays:
@@ -274,11 +270,10 @@ def measure(
 
     accel: the measured class, with the parameters of clpt.rays.Accel.
     """
-    ray_sets = sets(on, scene, count)
+    vertices, faces, ray_sets = sets(on, scene, count)
     copying = Copying(on)
-    vertices, faces = ray_sets.vertices, ray_sets.faces
     trees = {name: accel(on.queue, vertices, faces, layout=name) for name in layouts}
-    for name, rays in ray_sets.rays.items():
+    for name, rays in ray_sets.items():
         traced, truth = Traced(on, rays), Truth(vertices, faces, rays)
         taken: dict[str, list[Taken]] = {}
         hits: dict[str, dict[str, NDArray]] = {}

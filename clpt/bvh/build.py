@@ -236,7 +236,7 @@ def _build(
 class Runs:
     """Consecutive runs of triangles; triangles count from 0 in each run.
 
-    counts: their lengths; keys: the number of rows of a vertex in each run, 1 by default, see
+    counts: their lengths; keys: the number of rows of a vertex in each run, 1 by default,
     see `keyed`; corners: the vertices on the host, for runs with several keys.
     """
 

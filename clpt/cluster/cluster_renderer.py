@@ -15,7 +15,7 @@ from clpt.cluster.admission import Job
 from clpt.cluster.blocks import WorkerRecord
 from clpt.cluster.bundle import pack
 from clpt.cluster.farm import Farm, Film
-from clpt.cluster.host_maker import HostMaker
+from clpt.cluster.host_maker import HostMaker, HostPlan
 from clpt.denoise import needs
 from clpt.errors import SceneError
 from clpt.render.edit.plans import Plan
@@ -237,7 +237,11 @@ class ClusterMaker(HostMaker):
         scene = changes.scene or self.scene
         if changes.camera is not None:
             scene = replace(scene, camera=changes.camera)
-        return ClusterPlan(self, scene)
+        return HostPlan(self, Changes(scene=scene))
+
+    def write(self, changes: Changes, events: dev.Events) -> None:
+        """Let workers open the scene of the changes at the next call."""
+        self.take_scene(changes.scene or self.scene)
 
     def take_scene(self, scene: Scene) -> None:
         """Replace the scene; a film of another form on this machine is closed."""
@@ -262,22 +266,6 @@ class ClusterMaker(HostMaker):
         self._folder.cleanup()
         if self._home is not None:
             self._home.close()
-
-
-@dataclass(frozen=True, eq=False)
-class ClusterPlan(Plan):
-    """Another scene for the workers of a cluster."""
-
-    maker: ClusterMaker
-    scene: Scene
-    refusals = (Exception,)
-
-    @property
-    def repeatable(self) -> bool:
-        return False
-
-    def write(self) -> None:
-        self.maker.take_scene(self.scene)
 
 
 class ClusterRenderer(ResumableRenderer):

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import dataclass
 
 from clpt import device as dev
 from clpt.errors import ClusterError
+from clpt.render.edit.plans import Plan
 from clpt.render.film.state import FilmState
 from clpt.render.makers.maker import Maker, Tick
+from clpt.render.makers.planning import Changes
 from clpt.render.wavefront.bounce_loop import OnBatch
 from clpt.render.wavefront.tracer import Selection, Tracer
 
@@ -33,6 +36,10 @@ class HostMaker(Maker):
     def add(self, selection: Selection, first: int, end: int, tick: Tick) -> bool:
         """Add samples first to end - 1 of a selection; return False after a stop."""
 
+    @abstractmethod
+    def write(self, changes: Changes, events: dev.Events) -> None:
+        """Change the scene; see `HostPlan`."""
+
     def use_all_pixels(self) -> None:
         """Let later calls sample every pixel."""
 
@@ -43,6 +50,23 @@ class HostMaker(Maker):
     def tracer(self) -> Tracer:
         """Return a tracer that adds selections of samples to the film."""
         return HostTracer(self)
+
+
+@dataclass(frozen=True, eq=False)
+class HostPlan(Plan):
+    """Changes of the scene that a maker writes by itself, to its devices or for its workers."""
+
+    maker: HostMaker
+    changes: Changes
+    events: dev.Events = None
+    refusals = (Exception,)
+
+    @property
+    def repeatable(self) -> bool:
+        return False
+
+    def write(self) -> None:
+        self.maker.write(self.changes, self.events)
 
 
 class HostTracer(Tracer):

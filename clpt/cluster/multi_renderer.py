@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from clpt import device as dev
 from clpt.cluster.crew import Crew
 from clpt.cluster.device_worker import DeviceWorker, device_names, results_where_possible
-from clpt.cluster.host_maker import HostMaker
+from clpt.cluster.host_maker import HostMaker, HostPlan
 from clpt.errors import DeviceError, SceneError
 from clpt.render.edit.plans import Plan
 from clpt.render.film.state import FilmState, Ranges
@@ -232,7 +232,7 @@ class DevicesMaker(HostMaker):
 
     def plan(self, changes: Changes, events: dev.Events = None) -> Plan:
         """Return the plan of a changed scene, which is lowered once for all devices."""
-        return DevicesPlan(self, changes, events)
+        return HostPlan(self, changes, events)
 
     def write(self, changes: Changes, events: dev.Events) -> None:
         """Change the scene on all devices at once."""
@@ -271,23 +271,6 @@ class DevicesMaker(HostMaker):
             if isinstance(result, BaseException):
                 worker.unsaved.clear()  # they belong to the former picture
                 self.crew.drop(worker, result)
-
-
-@dataclass(frozen=True, eq=False)
-class DevicesPlan(Plan):
-    """Changes of the scene on several devices; each device plans and writes them."""
-
-    maker: DevicesMaker
-    changes: Changes
-    events: dev.Events
-    refusals = (Exception,)
-
-    @property
-    def repeatable(self) -> bool:
-        return False
-
-    def write(self) -> None:
-        self.maker.write(self.changes, self.events)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import numpy as np
 from clpt.arrays import Floats, Integers
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene
+from clpt.scene import materials as mt
 from clpt.scene.cameras import Calibrated, Perspective
 from clpt.scene.conventions import calibrated, pose
 from clpt.scene.integrators import Box, Path
@@ -24,6 +25,12 @@ from clpt.scene.shapes import Shape
 from clpt.scene.studio import shape_bounds
 
 NUMBER = re.compile(r"[._#/ -]?\d+$")
+WHITE = mt.Diffuse()
+OPAQUE = (  # to layers, which are of the first surface
+    mt.Diffuse, mt.OrenNayar, mt.Phong, mt.Ward, mt.AshikhminShirley, mt.Dielectric,
+    mt.RoughDielectric, mt.ThinDielectric, mt.Conductor, mt.RoughConductor, mt.Plastic,
+    mt.RoughPlastic, mt.CoatedConductor, mt.Principled,
+)  # fmt: skip
 LAYERS = ("position", "shape_id", "geometric_normal")
 
 
@@ -144,11 +151,24 @@ def truth_scene(scene: Scene, shapes: list[Shape] | None = None) -> Scene:
         scene.film, mode="rgb", bands=0, layers=LAYERS, filter=Box(radius=0.01),
         filtering="importance", alpha=False,
     )  # fmt: skip
-    kept = list(scene.shapes if shapes is None else shapes)
+    hide = scene.integrator.hide_lights
+    kept = [_plain(shape, hide) for shape in (scene.shapes if shapes is None else shapes)]
     return dataclasses.replace(
         scene, shapes=kept, lights=[], film=film, noise=None,
-        integrator=Path(max_depth=1, light_paths=0),
+        integrator=Path(max_depth=1, light_paths=0, hide_lights=hide),
     )  # fmt: skip
+
+
+def _plain(shape: Shape, hide_lights: bool) -> Shape:
+    """Return a shape that rays meet in the same places, white if its material lets none through.
+
+    Scenes of the same kinds of shapes then have the same programs.
+    """
+    hidden = shape.emission is not None and hide_lights
+    bounds = shape.interior is not None or shape.exterior is not None  # of a medium
+    if hidden or bounds or not isinstance(shape.material, OPAQUE):
+        return shape
+    return dataclasses.replace(shape, material=WHITE, emission=None)
 
 
 def _layers(renderer: Renderer, bare: Scene) -> dict[str, Floats]:

@@ -178,14 +178,17 @@ def load_dict(
     return built
 
 
-def save(scene: Scene, path: str | Path, /) -> None:
-    """Write a scene such that `load` gives the same content back.
+def save(scene: Scene, path: str | Path, /) -> list[str]:
+    """Write a scene; return what the format cannot say, a sentence each.
 
-    path: of a new .json, or of a folder that gets a scene.json; an existing file is replaced. The
-    arrays of shapes and images lie in files beside it, which begin with its name: meshes as .ply,
-    curves as .txt, spheres as .npz, images as .npy, .png or .exr, transforms of many instances as
-    .npy. An image that the scene has by its path is named, not copied. Colours of meshes keep
-    their float32. `warnings` and `extra` are not written.
+    path: of a new .json, such that `load` gives the same content back, or of a folder that gets a
+    scene.json; or of a .usda, .usdc, .usd or .usdz, with materials as OpenPBR and colors in place
+    of spectra (docs/usd.md). An existing file is replaced.
+
+    The arrays of shapes and images lie in files beside a .json, which begin with its name: meshes
+    as .ply, curves as .txt, spheres as .npz, images as .npy, .png or .exr, transforms of many
+    instances as .npy. An image that the scene has by its path is named, not copied. Colours of
+    meshes keep their float32. `warnings` and `extra` are not written.
 
     Raises TypeError for anything but a scene; SceneError for another suffix, for a buffer on a
     device, and where a file cannot be written.
@@ -197,9 +200,15 @@ def save(scene: Scene, path: str | Path, /) -> None:
         raise TypeError(f"clpt.save writes a clpt.Scene, not {type(scene).__name__}")
     if path.is_dir():
         path = path / IN_FOLDERS[0]
-    if path.suffix.lower() != ".json":
-        raise SceneError(f"a scene is saved as .json, not {path.suffix!r}", file=path)
-    importlib.import_module("clpt.formats.native").save(scene, path)
+    kind = FORMATS.get(path.suffix.lower())
+    if kind == "native":
+        importlib.import_module("clpt.formats.native").save(scene, path)
+        return []
+    if kind == "usd":
+        lost: list[str] = importlib.import_module("clpt.formats.usd").save(scene, path)
+        return lost
+    message = f"a scene is saved as .json, .usda, .usdc or .usdz, not {path.suffix!r}"
+    raise SceneError(message, file=path)
 
 
 def locate(path: str | Path, /) -> Path:

@@ -2,5 +2,6 @@
 
 from clpt.instruments.measuring import Measurement, measure, photometer
 from clpt.instruments.quantities import QUANTITIES
+from clpt.instruments.sensor import Sensor
 
-__all__ = ["QUANTITIES", "Measurement", "measure", "photometer"]
+__all__ = ["QUANTITIES", "Measurement", "Sensor", "measure", "photometer"]

@@ -22,7 +22,18 @@ from clpt.lenses.tracing import MARGIN, FocusedLens, focused_lens
 from clpt.scene import roles
 from clpt.scene.media import Medium
 from clpt.scene.motion import Keys, Shutter
-from clpt.scene.params import Kind, Shorthand, choice, flag, host, index, real
+from clpt.scene.params import (
+    Kind,
+    Shorthand,
+    choice,
+    fields_of,
+    flag,
+    host,
+    index,
+    member,
+    params,
+    real,
+)
 from clpt.scene.roles import Param
 from clpt.scene.values import IndexLike, Matrix4, Vector3
 from clpt.spectra import Constant, Spectrum
@@ -117,7 +128,8 @@ class Camera(Kind):
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
         """Return the members of its record in `clpt.render.records.camera` by name.
 
-        A traced lens has only those that need no table. width, height: of the film [pixels].
+        Parameters that are declared by `member` are no part of them. A traced lens has only
+        those that need no table. width, height: of the film [pixels].
         Raises SceneError for planes, a matrix, a glass or a lens that cannot be used.
         """
         raise NotImplementedError
@@ -130,8 +142,13 @@ class Camera(Kind):
         return {}
 
     def checked_members(self, width: int, height: int) -> dict[str, Any]:
-        """Return `record_members`; raise SceneError for a value beyond float32."""
+        """Return `record_members` and the parameters that are declared as members.
+
+        Raises SceneError for a value beyond float32.
+        """
+        values, declared = fields_of(self), params(type(self))
         members = self.record_members(width, height)
+        members |= {name: values[name] for name, param in declared.items() if param.member}
         for name, value in members.items():
             if not fits_single(value):
                 raise SceneError("is beyond float32, 3.4e38", where=f"{self.kind}.{name}")
@@ -228,8 +245,8 @@ class Perspective(Camera):
 
     fov: float = real(45.0, "field of view along `fov_axis`", "degrees", 1e-3, 179.999)
     fov_axis: str = choice("x", "which side `fov` spans", ("x", "y", "smaller", "larger"))
-    near: float = real(1e-2, "nearest distance seen", "m", low=0.0)
-    far: float = real(1e4, "farthest distance seen", "m", low=0.0)
+    near: float = member(1e-2, "nearest distance seen", "m", low=0.0)
+    far: float = member(1e4, "farthest distance seen", "m", low=0.0)
     offset_x: float = real(
         0.0, "the principal point lies at 1/2 less this from the left, in widths of the film"
     )
@@ -270,14 +287,12 @@ class Perspective(Camera):
         return pixel if np.allclose(pixel.extent(1, 1), wanted, rtol=1e-6, atol=0.0) else None
 
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
-        """Return its matrix, the film's extent at a distance of 1 m, and its planes."""
+        """Return its matrix, and the film's extent at a distance of 1 m."""
         _check_planes(self)
         return {
             "to_world": self.rigid_matrix(),
             "extent": list(self.extent(width, height)),
             "offset": [self.offset_x, self.offset_y],
-            "near": self.near,
-            "far": self.far,
         }
 
 
@@ -288,12 +303,14 @@ class ThinLens(Perspective):
     A `glass` that disperses gives it chromatic aberration: `focus_distance` is that at 587.56 nm.
     """
 
-    aperture_radius: float = real(0.1, "of the lens", "m", low=0.0)
-    focus_distance: float = real(1.0, "of the plane in focus", "m", low=1e-6)
+    aperture_radius: float = member(0.1, "of the lens", "m", low=0.0)
+    focus_distance: float = member(1.0, "of the plane in focus", "m", low=1e-6)
     glass: IndexLike = index(
         1.5, "of the lens; one that disperses focuses each wavelength elsewhere"
     )
-    focal_length: float = real(0.05, "of the lens at 587.56 nm; matters to `glass`", "m", low=1e-6)
+    focal_length: float = member(
+        0.05, "of the lens at 587.56 nm; matters to `glass`", "m", low=1e-6
+    )
 
     @property
     def dispersive_glasses(self) -> tuple[Spectrum, ...]:
@@ -303,19 +320,13 @@ class ThinLens(Perspective):
         return () if isinstance(index_, Constant) else (index_,)
 
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
-        """Return the members of a pinhole, its aperture, and its refractive power."""
+        """Return the members of a pinhole, and its refractive power."""
         glass = self.dispersive_glasses
         power = float(glass[0].sample(DESIGN_WAVELENGTH)) - 1.0 if glass else 1.0
         if power < 1e-3:
             message = f"its index must be above 1, not {power + 1.0:.4g}"
             raise SceneError(message, where="thin_lens.glass")
-        return {
-            **super().record_members(width, height),
-            "aperture_radius": self.aperture_radius,
-            "focus_distance": self.focus_distance,
-            "focal_length": self.focal_length,
-            "power": power,
-        }
+        return {**super().record_members(width, height), "power": power}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -419,8 +430,8 @@ class Orthographic(Camera):
     is_rigid: ClassVar[bool] = False
     has_axis: ClassVar[bool] = True
 
-    near: float = real(1e-2, "nearest distance seen", "m", low=0.0)
-    far: float = real(1e4, "farthest distance seen", "m", low=0.0)
+    near: float = member(1e-2, "nearest distance seen", "m", low=0.0)
+    far: float = member(1e4, "farthest distance seen", "m", low=0.0)
 
     def half_height(self, aspect: float) -> float:
         """Return half the height of the film [m]."""
@@ -439,10 +450,9 @@ class Orthographic(Camera):
         return dataclasses.replace(self, to_world=np.asarray(self.to_world, float) @ scale)
 
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
-        """Return its matrix, the film's aspect and its planes."""
+        """Return its matrix, and the film's aspect."""
         _check_planes(self)
-        planes = {"near": self.near, "far": self.far}
-        return {"to_world": self.affine_matrix(), "aspect": height / width, **planes}
+        return {"to_world": self.affine_matrix(), "aspect": height / width}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -142,6 +142,13 @@ def real(
     return _field(default, Param(roles.REAL, doc, unit, low, high, textured=textured, lobe=lobe))
 
 
+def member(
+    default: object, doc: str, unit: str = "", low: float = -math.inf, high: float = math.inf
+) -> Any:
+    """Declare a number of a camera that kernels read: a member of its record."""
+    return _field(default, Param(roles.REAL, doc, unit, low, high, member=True))
+
+
 def flag(default: bool, doc: str) -> Any:
     """Declare true or false."""
     return _field(default, Param(roles.FLAG, doc))

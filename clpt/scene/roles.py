@@ -74,6 +74,7 @@ class Param:
     lobe: bool = False  # 0 leaves a lobe out: kernels are made without it where all have 0
     positive: bool = False  # it cannot be 0 either, at any wavelength of the film
     linear: bool = False  # f is linear in it and no pdf knows it: a random texel may stand for it
+    member: bool = False  # of a camera: a member of its record, which kernels read
 
 
 class Real(Role):

@@ -1,7 +1,7 @@
 /* Light as it leaves a light, for integrators that start there. The step `emission` of kernels/lights/kinds/<kind>.cl
- * has, for lights at a point,
+ * has, for placed lights,
  *
- *   Spectrum <kind>_intensity(<Kind> l, Scene scene, vec3 d, Wavelengths lambdas);   sent along d [W sr^-1 nm^-1]
+ *   Spectrum <kind>_intensity(<Kind> l, Scene scene, vec3 d, Wavelengths lambdas);   all sent along d [W sr^-1 nm^-1]
  *   LightRay <kind>_emit(<Kind> l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas);
  *   real     <kind>_emit_pdf(<Kind> l, vec3 d);       density of a direction d [1/sr]; 0: the light has no MIS
  *                                                     weights, and is left to paths from the camera

@@ -65,11 +65,14 @@ inline Spectrum medium_dims(Scene scene, integer medium, real t, Wavelengths lam
 /* Twin, where a shadow ray may go through several media: tracing/transmittance.cl multiplies as it is traced. */
 inline Spectrum medium_dims(Scene scene, integer medium, real t, Wavelengths lambdas, Spectrum value) { return value; }
 
-/* Step lights: the table `media`: first the aims of media/equiangular.cl; then, with light paths, two words for each
- * row of `lights`, the bodies around the light and the name of its medium; then two words for each shape. */
-#define MEDIA_OF_SHAPES (4 * MEDIUM_AIMS + 2 * scene.settings->light_count)
-inline integer light_medium(Scene scene, integer row) { return gather_i(scene.media, 4 * MEDIUM_AIMS + 2 * row + 1); }
-inline integer light_bodies(Scene scene, integer row) { return gather_i(scene.media, 4 * MEDIUM_AIMS + 2 * row); }
+/* Step lights: the table `media`: first the aims of media/equiangular.cl; then, with light paths, three words for each
+ * row of `lights`: the bodies around the light, the name of its medium, and Path.around; then two words for each
+ * shape. */
+#define MEDIA_OF_SHAPES (4 * MEDIUM_AIMS + 3 * scene.settings->light_count)
+#define LIGHT_MEDIA(row, word) gather_i(scene.media, 4 * MEDIUM_AIMS + 3 * (row) + (word))
+inline integer light_bodies(Scene scene, integer row) { return LIGHT_MEDIA(row, 0); }
+inline integer light_medium(Scene scene, integer row) { return LIGHT_MEDIA(row, 1); }
+inline integer light_around(Scene scene, integer row) { return LIGHT_MEDIA(row, 2); }
 
 /* Twin, where no path starts at lights. */
 #define MEDIA_OF_SHAPES (4 * MEDIUM_AIMS)

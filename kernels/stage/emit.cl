@@ -76,7 +76,7 @@ inline integer begin_light_path(Scene scene, Slab path, Slab shadow, uint at, ma
     store_path_null_distance(path, at, go, (real)(0.0f));
     store_path_medium(path, at, go, light_medium(scene, lit));
     store_path_bodies(path, at, go, light_bodies(scene, lit));
-    store_path_around(path, at, go, (integer)(0));
+    store_path_around(path, at, go, light_around(scene, lit));
     store_path_ray_offset(path, at, go, (real)(0.0f));
     store_path_ratio(path, at, go, spectrum_of(1.0f));
     store_path_merge_ratio(path, at, go, (real)(0.0f));

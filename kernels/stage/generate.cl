@@ -104,7 +104,7 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_nulls(path, at, go, (integer)(0));
     store_path_null_distance(path, at, go, (real)(0.0f));
     store_path_medium(path, at, go, (integer)(settings->camera_medium));
-    store_path_around(path, at, go, (integer)(0));
+    store_path_around(path, at, go, (integer)(settings->camera_around));
     store_path_ray_offset(path, at, go, (real)(0.0f));
     store_path_escape_width(path, at, go, (real)(0.0f));
     store_path_bodies(path, at, go, (integer)(settings->camera_bodies));

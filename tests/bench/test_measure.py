@@ -47,12 +47,12 @@ def test_scenes() -> None:
 
 
 def test_rays_are_taken_from_the_scene(on: device.Device, scene: Scene) -> None:
-    given = rays.sets(on, scene, COUNT)
-    assert list(given.rays) == ["primary", "diffuse", "shadow"]
-    for one in given.rays.values():
+    _, _, ray_sets = rays.sets(on, scene, COUNT)
+    assert list(ray_sets) == ["primary", "diffuse", "shadow"]
+    for one in ray_sets.values():
         assert 0.4 * COUNT < len(one) <= COUNT + 64
         np.testing.assert_allclose(np.linalg.norm(one.directions, axis=1), 1.0, atol=1e-5)
-    primary, shadow = given.rays["primary"], given.rays["shadow"]
+    primary, shadow = ray_sets["primary"], ray_sets["shadow"]
     assert np.abs(primary.origins - [0, 0, 3.9]).max() < 0.02  # on the near plane
     to = shadow.origins + shadow.t_max[:, None] * shadow.directions
     np.testing.assert_allclose(to[:, 1], 0.999, atol=2e-3)  # the lamp

@@ -117,6 +117,25 @@ def test_poses_and_3d_boxes():
     np.testing.assert_allclose(truth.corners[2].mean(0), view.shapes[3].center, atol=1e-9)
 
 
+def test_what_lets_rays_through_is_no_object():
+    """A ball is seen behind a mask of opacity 0 and a hidden lamp, not behind glass or a lamp."""
+    view = scene(0, np.random.default_rng(3))
+    cube, ball = view.shapes[1], view.shapes[3]
+    around = tf.translate(ball.center) @ tf.scale(0.6)
+    lamp, mask, glass = lights.Area(), materials.Mask(opacity=0.0), materials.Dielectric()
+    for cover, hide, seen in (
+        ({"material": mask}, False, "ball"), ({"emission": lamp}, True, "ball"),
+        ({"emission": lamp}, False, "cover"), ({"material": glass}, False, "cover"),
+    ):  # fmt: skip
+        box = dataclasses.replace(cube, to_world=around, name="cover", **cover)
+        hidden = Path(max_depth=2, hide_lights=hide)
+        truth = dataset.ground_truth(
+            dataclasses.replace(view, shapes=[box, ball], integrator=hidden)
+        )
+        counts = dict(zip(truth.names, truth.visible, strict=True))
+        assert counts[seen] > 10 and sum(counts.values()) == counts[seen], (cover, counts)
+
+
 def moved(view: Scene) -> Scene:
     """The scene a moment later: a cup and the camera have moved, the ball is gone."""
     push = tf.translate([0.1, -0.05, 0.1]) @ tf.rotate([0, 0, 1], 7.0)

@@ -14,6 +14,8 @@ import numpy as np
 
 from clpt import transforms
 from clpt.scene import lights
+from clpt.scene.params import params
+from clpt.scene.roles import EMISSION
 from tests.kernels.light_probe import lit
 
 SIGMAS = 5.0  # of a mean: a chance of 6e-7 for each check
@@ -33,7 +35,7 @@ LAMPS = [cls for cls in lights.KINDS if cls.reach == "placed"]
 def lamp_of(cls: type[lights.Light], strength: float = 1.0, place: Any = PLACE) -> lights.Light:
     """Return a light with an emission of a strength at a place."""
     names = {field.name for field in dataclasses.fields(cls)}
-    emission = next(name for name in ("intensity", "irradiance", "radiance") if name in names)
+    emission = next(name for name, param in params(cls).items() if param.role is EMISSION)
     at = {"to_world": place} if "to_world" in names else {"position": place[:3, 3]}
     return cls(**at, **{emission: strength})
 

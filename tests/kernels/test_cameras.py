@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -14,6 +15,8 @@ from clpt.render.flow import stages
 from clpt.render.records import CameraFeatures
 from clpt.render.records import camera as camera_records
 from clpt.scene import cameras as scene
+from clpt.scene import roles
+from clpt.scene.params import params
 from tests.kernels.scene_harness import SceneProbe
 from tests.rotation import rotating
 
@@ -269,3 +272,98 @@ SINGULAR = np.diag([1.0, 0.0, 1.0, 1.0])
 def test_unusable_cameras(camera, part):
     with pytest.raises(SceneError, match=part.replace(".", r"\.")):
         encode_camera(camera, 4, 4)
+
+
+# ---- the contract of a kind, with all numbers that it declares away from their defaults
+
+
+def numbers(cls):
+    """The names of the numbers that a camera declares, with their declarations."""
+    return {name: p for name, p in params(cls).items() if p.role is roles.REAL}
+
+
+def varied(cls):
+    """A camera whose numbers are not their defaults."""
+    plain = cls()
+    values = {
+        name: float(np.clip(1.2 * getattr(plain, name) or 0.1, p.low, p.high))
+        for name, p in numbers(cls).items()
+    }
+    return cls(to_world=PLACE, **values)
+
+
+BASES = {scene.Lens: {"blades": 6, "f_number": 4.0}}  # where each number matters
+
+
+@pytest.mark.parametrize(
+    "cls, name", [(cls, name) for cls in scene.KINDS for name in numbers(cls)]
+)
+def test_every_number_changes_what_kernels_read(cls, name):
+    one = cls(**BASES[cls]) if cls in BASES else varied(cls)
+    other = replace(one, **{name: 1.1 * getattr(one, name) or 0.02})
+    first, second = (encode_camera(camera, 40, 30) for camera in (one, other))
+    assert first.shape != second.shape or (first != second).any()
+
+
+STEPS = {
+    "screen": """
+        mask seen = mask_of(1), away = x[3] > 0.5f;
+        vec3 p = {x[0], x[1], x[2]};
+        vec2 film = KIND_screen(RECORD, p, away, &seen);
+        r[0] = film.x; r[1] = film.y; r[2] = sel(seen, (real)(1.0f), (real)(0.0f)); r[3] = 1.0f;
+    """,
+    "connect": """
+        vec2 lens = {0.5f, 0.5f};
+        vec3 p = {x[0], x[1], x[2]};
+        CameraPoint c = KIND_connect(RECORD, scene.settings, p, x[3] > 0.5f, lens);
+        r[0] = c.film.x / 40.0f; r[1] = c.film.y / 30.0f;
+        r[2] = sel(c.seen, (real)(1.0f), (real)(0.0f)); r[3] = c.importance;
+    """,
+}
+
+
+def projected(camera, step, points, away):
+    """Where a step sees points (n, 3) on a film of 40 x 30: x, y, seen and its importance."""
+    kind = camera.kind
+    record = f"(global const {camera_records.RECORDS[kind].name} *)scene.camera"
+    probe = SceneProbe(
+        STEPS[step].replace("KIND", kind).replace("RECORD", record),
+        4,
+        4,
+        files=(
+            "cameras/camera.cl", "film/connect.cl", "generated/camera.cl",
+            f"cameras/kinds/{kind}.cl#{step}",
+        ),
+        virtual=_text(kind),
+        tables={"camera": encode_camera(camera, 40, 30)},
+        settings={"film_width": 40, "film_height": 30, "width": 40, "height": 30},
+    )  # fmt: skip
+    return probe(*points.T, np.full(len(points), float(away)))
+
+
+@pytest.mark.parametrize(
+    "cls, step",
+    [
+        (cls, step)
+        for cls in scene.KINDS
+        for step, asked in (("screen", cls.has_axis), ("connect", cls.connects))
+        if asked
+    ],
+)
+def test_points_are_seen_where_their_rays_begin(cls, step):
+    """What a ray of the film meets is projected back to its place, near and infinitely far."""
+    camera = varied(cls)
+    film = np.float32(0.1) + np.float32(0.8) * _samples()[0]
+    origins, directions = rays(camera, 40, 30, film)
+    x, y, seen, importance = projected(camera, step, origins + 3.0 * directions, away=False)
+    assert seen.all()
+    np.testing.assert_allclose(np.stack([x, y], axis=1), film, atol=2e-5)
+    if cls.connects:
+        assert pytest.approx(
+            np.column_stack([film, np.ones(len(film))]), abs=2e-5
+        ) == projected(camera, step, directions, away=True)[:3].T
+    if step == "connect":  # over the solid angle of the film, at 1 m
+        d = [directions, *(rays(camera, 40, 30, film + e)[1] for e in 1e-3 * np.eye(2))]
+        solid = np.linalg.norm(np.cross(d[1] - d[0], d[2] - d[0]), axis=1) * 1e6
+        distance = np.linalg.norm(origins + 3.0 * directions - PLACE[:3, 3], axis=1)
+        np.testing.assert_allclose(importance * solid * distance**2, 1.0, rtol=5e-3)

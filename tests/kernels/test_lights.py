@@ -14,10 +14,11 @@ from clpt.geometry import triangles
 from clpt.render.lights import encode as lights
 from clpt.render.lights import images as image_lights
 from clpt.render.lights.check import check_light
-from clpt.render.lights.find import environment_of
+from clpt.render.lights.find import environment_of, is_whole
 from clpt.render.lights.images import face_coordinates, face_directions
 from clpt.render.records import lights as light_records
 from clpt.scene.lights import (
+    KINDS,
     Area,
     Constant,
     CubeMap,
@@ -38,6 +39,7 @@ from tests.kernels.light_probe import LAMBDAS, lit
 SIGMAS = 4.5  # of the Monte Carlo estimates: a chance of 7e-6 each
 TURNED = T.rotate([1, 2, 3], 50.0)
 ABOVE = T.look_at([0.2, 0.4, 1.5], [0.1, 0, 0], [0, 1, 0])
+SHINES = (0.3, -0.4, 0.5)  # where some light of every kind comes by default
 PICTURE = Bitmap(image=np.random.default_rng(4).random((3, 4, 3)))
 NAMES = {"rgb": "xyz", "spectral": "xyzw"}
 
@@ -182,8 +184,8 @@ def test_lamps_follow_their_formulas():
 
 
 def test_all_lights_together_are_their_sum():
-    """The choice among sixteen kinds of rows: every pmf counts once."""
-    p, n = np.zeros(3), TILTED
+    """The choice among all kinds of rows: every pmf counts once."""
+    p, n = np.array(SHINES), TILTED
     lamps = [
         Point(position=(1.0, 2.0, 3.0), intensity=(3.0, 1.0, 2.0)),
         Spot(to_world=T.look_at([0, 1, 3], [0, 0, 0], [0, 1, 0]), intensity=(1.0, 5.0, 2.0)),
@@ -196,6 +198,8 @@ def test_all_lights_together_are_their_sum():
         CubeMap(image=np.random.default_rng(2).random((6, 4, 4, 3)), scale=0.2),
         Sky(sun_azimuth=20.0),
     ]
+    others = set(KINDS) - {type(lamp) for lamp in lamps}
+    lamps += [cls() for cls in KINDS if cls in others and cls.reach != "surface"]
     glowing = [FORMULAS[k][0] for k in ("disk", "sphere", "rectangle", "triangle")]
     glowing += [glows(Cube, T.translate([2.0, 0.3, 1.0]) @ T.scale(0.4))]
     glowing += [glows(Cylinder, T.translate([-1.0, 2.0, 1.0]), radius=0.3)]
@@ -243,7 +247,7 @@ def test_two_sided_emission():
         emission = Area(radiance=(1.0, 2.0, 3.0), two_sided=True)
         one = cls(to_world=np.eye(4) if more else plate, emission=emission, **more)
         scene = lit(emitters=[one])
-        assert scene.rows.two_sided
+        assert scene.rows.features().two_sided
         front = dataclasses.replace(one, emission=Area(radiance=(1.0, 2.0, 3.0)))
         back = dataclasses.replace(front, flip_normals=True)
         for p in ((0.1, 0.2, 1.2), (0.1, 0.2, -0.2)):
@@ -284,7 +288,7 @@ def skies(seed: int = 3):
 def test_samples_of_declared_lights(kind):
     """Unit directions, and finite light that is there or not."""
     lamp = light_records.DECLARED[kind]()
-    r = samples(lit([lamp]), (0.3, -0.4, 0.5), 512)
+    r = samples(lit([lamp]), SHINES, 512)
     shines = r[4] != 0.0
     assert np.isfinite(r).all() and (r[3] > 0.0).all() and (r[5:] >= 0.0).all() and shines.any()
     np.testing.assert_allclose(np.linalg.norm(r[:3], axis=0), 1.0, atol=1e-5)
@@ -632,7 +636,8 @@ def test_rows_are_infinite_lights_then_lamps_then_shapes():
     rows = scene.rows
     kinds = [light_records.KINDS[k] for k in rows.rows["kind"]]
     assert kinds == ["constant", "point", "directional", *["triangle"] * 12, "disk"]
-    assert rows.infinite == 1 and rows.first == (3, 15) and rows.whole == (False, True)
+    assert rows.sources.infinite == 1 and rows.sources.first == (3, 15)
+    assert [is_whole(shape) for shape in shapes_] == [False, True]
     pmf = rows.rows["pmf"].astype(float)
     assert pmf.sum() == pytest.approx(1.0) and pmf[0] == pytest.approx(0.5)
     assert pmf[3] == pytest.approx(pmf[14])

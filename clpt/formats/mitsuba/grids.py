@@ -96,6 +96,9 @@ def _read(element: Element, context: Context) -> Volume:
     props.finish()
     if values.shape[3] not in (1, 3):
         raise element.error(f"its file has {values.shape[3]} channels; read are 1 and 3")
+    if (least := float(np.min(values, initial=0.0))) < 0.0:
+        context.warn(element, f"the grid is negative somewhere, down to {least:.3g}: 0 counts")
+        values = np.maximum(values, 0)
     return Volume(values, to_world)
 
 

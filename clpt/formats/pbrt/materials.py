@@ -13,6 +13,7 @@ from clpt.formats.pbrt import old_materials, scattering
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.scattering import (
     alphas,
+    blended,
     both,
     coat,
     coated_diffuse,
@@ -29,7 +30,6 @@ from clpt.formats.pbrt.state import Maker, State
 from clpt.formats.pbrt.textures import map_values, normals, textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
-from clpt.scene.params import fields_of
 from clpt.scene.roles import INDEX, REAL, REFLECTANCE
 from clpt.scene.textures import Product, Texture
 
@@ -154,24 +154,7 @@ def _mix(params: Parameters, state: State) -> Material:
         raise SceneError(f"'materials' must be two names of materials, not {len(names)}")
     first, second = (state.named_material(name, params) for name in names)
     weight = textured(params, "amount", REAL, state, 0.5)
-    result = materials.Blend(first=first, second=second, weight=weight)
-    kinds = list(materials.parts(result))
-    if any(part.transmits for part in kinds) and materials.TwoSided in map(type, kinds):
-        state.warn(params, "beside what lets light through, the rest is black from behind")
-        return _one_sided(result)
-    return result
-
-
-def _one_sided(result: Material) -> Material:
-    """Return the material with the front sides of its two-sided parts."""
-    if isinstance(result, materials.TwoSided):
-        return _one_sided(result.front)
-    inner: dict[str, Any] = {
-        name: _one_sided(part)
-        for name, part in fields_of(result).items()
-        if name in ("material", "first", "second") and isinstance(part, Material)
-    }
-    return replace(result, **inner) if inner else result
+    return blended(first, second, weight, params, state)
 
 
 def _interface(params: Parameters, state: State) -> Material:

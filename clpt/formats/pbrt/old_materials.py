@@ -14,7 +14,7 @@ import numpy as np
 
 from clpt.errors import UnknownKindError
 from clpt.formats.pbrt.params import Parameters
-from clpt.formats.pbrt.scattering import both, hair, rough, subsurface
+from clpt.formats.pbrt.scattering import blended, both, hair, rough, subsurface
 from clpt.formats.pbrt.spectra import named, spectrum
 from clpt.formats.pbrt.state import Contents, Definition, Maker, State
 from clpt.formats.pbrt.textures import map_values, textured
@@ -237,7 +237,7 @@ def _mix(params: Parameters, state: State) -> Material:
     names = [params.one(f"namedmaterial{i}", "string", "") for i in (1, 2)]
     first, second = (state.named_material(name, params) for name in names)
     amount = _number(textured(params, "amount", REFLECTANCE, state, 0.5), params, state)
-    return materials.Blend(first=second, second=first, weight=amount)
+    return blended(second, first, amount, params, state)
 
 
 def _none(params: Parameters, state: State) -> Material:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from functools import partial
 from importlib.resources import files
 from typing import Any
@@ -18,6 +19,7 @@ from clpt.formats.pbrt.textures import map_values, textured
 from clpt.scene import materials
 from clpt.scene.materials import Hair, Material, pigment
 from clpt.scene.media import Homogeneous
+from clpt.scene.params import fields_of
 from clpt.scene.phases import HenyeyGreenstein, Isotropic
 from clpt.scene.roles import COEFFICIENT, FACTOR, INDEX, REAL, REFLECTANCE
 from clpt.scene.textures import Texture
@@ -301,3 +303,27 @@ def _of_colour(colour: Any, around: float) -> Any:
     """The absorption that gives many fibres a colour (Chiang et al. 2016 eq. 9)."""
     fit = np.polyval([0.245, 5.574, -10.73, 2.532, -0.215, 5.969], around)
     return (np.log(np.clip(colour, DARKEST, 1.0)) / fit) ** 2
+
+
+def blended(
+    first: Material, second: Material, weight: TexturedNumber, params: Parameters, state: State
+) -> Material:
+    """Return a mixture; opaque parts beside those that let light through have their front alone."""
+    result = materials.Blend(first=first, second=second, weight=weight)
+    kinds = list(materials.parts(result))
+    if any(part.transmits for part in kinds) and materials.TwoSided in map(type, kinds):
+        state.warn(params, "beside what lets light through, the rest is black from behind")
+        return _one_sided(result)
+    return result
+
+
+def _one_sided(result: Material) -> Material:
+    """Return the material with the front sides of its two-sided parts."""
+    if isinstance(result, materials.TwoSided):
+        return _one_sided(result.front)
+    inner: dict[str, Any] = {
+        name: _one_sided(part)
+        for name, part in fields_of(result).items()
+        if name in ("material", "first", "second") and isinstance(part, Material)
+    }
+    return dataclasses.replace(result, **inner) if inner else result

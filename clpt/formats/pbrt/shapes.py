@@ -28,6 +28,7 @@ from clpt.scene.textures import Bitmap
 
 Parts = dict[str, Any]
 QUADRICS = ("cylinder", "disk", "sphere", "cone", "hyperboloid", "paraboloid")
+MOST_STEPS = 8  # along the line of a hyperboloid, for a point that decides its shape
 OLD = ("cone", "hyperboloid", "paraboloid", "heightfield", "nurbs")
 ALIKE = 1e-3  # relative difference of areas that is none
 MOST_SPLITS = 10  # of a curve, each in two
@@ -344,9 +345,35 @@ def _paraboloid(params: Parameters, state: State) -> Geometry | None:
 
 
 def _hyperboloid(params: Parameters, state: State) -> Geometry | None:
-    ends = [params.one("p1", "point3", (0.0,) * 3), params.one("p2", "point3", (1.0,) * 3)]
+    """A hyperboloid about z = 0 as pbrt-v3 has it, which is not the turned line p1 to p2.
+
+    It goes through p2 and a point of the line behind p2: src/shapes/hyperboloid.cpp.
+    """
+    p1 = np.array(params.one("p1", "point3", (0.0,) * 3))
+    p2 = np.array(params.one("p2", "point3", (1.0,) * 3))
+    if p2[2] == 0.0:
+        p1, p2 = p2, p1
     parts = np.linspace(0.0, 1.0, surfaces.ALONG + 1)[:, None]
-    return _revolved(params, (1.0 - parts) * ends[0] + parts * ends[1])
+    line = (1.0 - parts) * p1 + parts * p2
+    if p2[2] == 0.0:
+        return _revolved(params, line)  # a flat ring, at which pbrt does not end
+    behind, squares = p1, np.zeros(2)
+    for _ in range(MOST_STEPS):
+        behind = behind + 2.0 * (p2 - p1)
+        rows = np.array(
+            [[point[0] ** 2 + point[1] ** 2, -(point[2] ** 2)] for point in (behind, p2)]
+        )
+        if np.linalg.det(rows) != 0.0:
+            squares = np.linalg.solve(rows, np.ones(2))
+            break
+    if squares[0] == 0.0:
+        raise SceneError("no hyperboloid goes through 'p1' and 'p2'")
+    radii = np.sqrt(np.maximum((1.0 + squares[1] * line[:, 2:] ** 2) / squares[0], 0.0))
+    lengths = np.linalg.norm(line[:, :2], axis=1, keepdims=True)
+    around = np.where(
+        lengths > 0.0, line[:, :2] / np.where(lengths > 0.0, lengths, 1.0), [1.0, 0.0]
+    )
+    return _revolved(params, np.hstack([around * radii, line[:, 2:]]))
 
 
 def _revolved(params: Parameters, profile: ArrayLike) -> Geometry | None:

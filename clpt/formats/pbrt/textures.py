@@ -312,9 +312,10 @@ def _decoded(bitmap: Bitmap, encoding: str) -> Bitmap:
 
 
 def _dots(form: str, params: Parameters, state: State) -> Any:
+    """In pbrt "inside" surrounds the dots: src/textures/dots.cpp swaps both, as does pbrt-v4."""
     return Mix(
-        first=_argument(form, params, "outside", state, 0.0),
-        second=_argument(form, params, "inside", state, 1.0),
+        first=_argument(form, params, "inside", state, 1.0),
+        second=_argument(form, params, "outside", state, 0.0),
         amount=Dots(**_mapping(params, state)),
     )
 

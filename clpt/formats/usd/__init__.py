@@ -1,4 +1,4 @@
-"""Universal Scene Description (`pip install 'clpt[usd]'`): `load(path)` returns a stage's Scene."""
+"""Universal Scene Description (`pip install 'clpt[usd]'`): its stages as scenes, and back."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from clpt.errors import SceneError
 if TYPE_CHECKING:
     from clpt.scene import Scene
 
-__all__ = ["load"]
+__all__ = ["load", "save"]
 
 
 def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
@@ -21,12 +21,25 @@ def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
     missing: see clpt.load; a texture without a file has its own fallback color whatever it says.
     Raises SceneError, also where OpenUSD's Python package is not installed.
     """
+    scene: Scene = _module("scenes", path).load(path, **variables)
+    return scene
+
+
+def save(scene: Scene, path: Path) -> list[str]:
+    """Write a scene as a stage, see `clpt.formats.usd.export`; return what was lost.
+
+    Raises SceneError, also where OpenUSD's Python package is not installed.
+    """
+    lost: list[str] = _module("export", path).save(scene, path)
+    return lost
+
+
+def _module(name: str, path: Path) -> Any:
+    """Import a module of this package that needs OpenUSD."""
     try:
-        scenes = importlib.import_module("clpt.formats.usd.scenes")
+        return importlib.import_module(f"clpt.formats.usd.{name}")
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "pxr":
             raise
-        message = "is read by OpenUSD: pip install 'clpt[usd]'"
+        message = "needs OpenUSD: pip install 'clpt[usd]'"
         raise SceneError(message, file=path) from None
-    scene: Scene = scenes.load(path, **variables)
-    return scene

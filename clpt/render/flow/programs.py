@@ -187,6 +187,7 @@ def append_source(features: Features, layout: str, lanes: int) -> device.Source:
     return _source("append", files, _defines(features, lanes), 1)
 
 
+@functools.lru_cache(maxsize=32)
 def film_sources(features: Features, layout: str) -> dict[str, device.Source]:
     """Return the programs that make the picture of a film, by name."""
     return _static(_alone(features, layout, "accumulate"))
@@ -197,7 +198,7 @@ def noise_sources(features: Features, layout: str) -> dict[str, device.Source]:
     return _static(_alone(features, layout, "noise"))
 
 
-@functools.lru_cache(maxsize=4)
+@functools.lru_cache(maxsize=32)
 def loop_sources(
     features: Features, layout: str, lanes: int, interleaved: bool = False
 ) -> dict[str, device.Source]:
@@ -206,7 +207,7 @@ def loop_sources(
     "loop" holds the kernel, which traces each kind of paths of the scene; the others are the stages
     as functions, see kernels/stage/stage.cl. Materials shade all kinds of paths, and other stages
     that are equal for all kinds stand there once. The texts are cached, since a renderer asks
-    twice: to compile ahead, and to link.
+    twice: to compile ahead, and to link. Random scenes come back to a few sets of kinds.
     """
     looks_up = lanes > 1 and features.textures.roles
     part = _textures(features, "elsewhere") if looks_up else {}
@@ -306,7 +307,7 @@ def _shared(features: Features, layout: str) -> Files:
     return dict(_generated(features, layout))
 
 
-@functools.lru_cache(maxsize=4)
+@functools.lru_cache(maxsize=32)
 def _generated(features: Features, layout: str) -> Files:
     return {
         **shapes.virtual_files(features),

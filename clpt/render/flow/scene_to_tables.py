@@ -32,6 +32,7 @@ from clpt.render.geometry.encode import (
     shape_words,
 )
 from clpt.render.geometry.find import Geometry, Owner, spheres_move
+from clpt.render.geometry.surroundings import for_rays
 from clpt.render.lights.encode import LightRows, has_tree, light_rows
 from clpt.render.lights.find import is_whole
 from clpt.render.materials.encode import MaterialWords, gloss_word
@@ -39,7 +40,7 @@ from clpt.render.materials.encoder import Encoder
 from clpt.render.media.bodies import BodyWords
 from clpt.render.media.encode import MediumWords, media_features, medium_aims
 from clpt.render.media.grids import DeviceGrid
-from clpt.render.media.light_media import light_media_words
+from clpt.render.media.light_media import around_words, light_media_words
 from clpt.render.motion import lower_motion
 from clpt.render.records import (
     CameraFeatures,
@@ -286,7 +287,8 @@ class _Tables:
             layers, disperses,
         )  # fmt: skip
         settings["aims"], settings["aim_count"] = self.aims, len(self.analysis.aims)
-        settings["camera_bodies"], settings["camera_medium"] = self.around
+        for name, word in zip(("bodies", "medium", "around"), self.around, strict=True):
+            settings[f"camera_{name}"] = word
         settings["second_u"], settings["second_v"] = self.encoder.textures.second_uv
         settings["ambient"], settings["density"] = self.ambient, self.density
         return settings
@@ -344,7 +346,7 @@ class _Tables:
         self.store.append("media", np.array(near, np.float32).view(np.uint32))
         return len(near)
 
-    def _append_bodies(self, media: MediumWords) -> tuple[int, int]:
+    def _append_bodies(self, media: MediumWords) -> tuple[int, int, int]:
         """Append the media of lights and both sides of shapes; return `around`.
 
         Kernels find the sides of shapes behind the media of lights, in the same table.
@@ -359,9 +361,8 @@ class _Tables:
             words = light_media_words(self.analysis.light_media, media, bodies)
             self.store.append("media", words)
         self.store.append("media", sides)
-        if bodies is not None:
-            return bodies.around(self.analysis.around, media)
-        return 0, media.word(next(iter(self.analysis.around), None))
+        around = self.analysis.around
+        return around_words(around if bodies else for_rays(around), media, bodies)
 
     def _append_profile(self) -> int:
         if not self.index.weighed:

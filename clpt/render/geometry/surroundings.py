@@ -1,5 +1,7 @@
 """The media around a point, such as the camera, from the winding numbers of their boundaries.
 
+A body whose material absorbs fills its inside as a medium does.
+
 A closed boundary subtends the solid angle 4 pi at a point inside, and 0, signed, at a point
 outside. So a medium fills a point if the shapes with this interior wind around the point once more
 than the shapes with this exterior. A medium whose signed volume is negative extends to infinity: it
@@ -20,7 +22,8 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from itertools import dropwhile, islice
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,25 +40,70 @@ from clpt.scene import materials as mt
 from clpt.scene.cameras import Camera
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Cylinder, Disk, Shape
+from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum
 
 MOST_COMPARED = 500  # bodies whose boxes are compared
+NEAR = 1e-3  # least winding number of the boundaries around a point, of a filling of many bodies
 OPEN = 1e-2  # largest sum of area vectors of a closed boundary, over its area
 
 # The matter of a shape's body, whose first entry is its priority; None for a shape without a body.
 MatterOf = Callable[[Shape], "tuple[Any, ...] | None"]
 
 
+@dataclasses.dataclass(frozen=True)
+class Absorber:
+    """The inside of a body whose material absorbs, and which names no media."""
+
+    absorption: Spectrum
+    scatters: ClassVar[bool] = False
+
+    @classmethod
+    def of(cls, shape: Shape) -> Absorber | None:
+        """Return the inside of a shape, None if it names media or absorbs nothing."""
+        if bounds_media(shape):
+            return None
+        for part in mt.parts(shape.material):
+            absorption = cast(Spectrum, part.absorption)
+            if part.absorbs_inside and not part.is_sheet and not _is_clear(absorption):
+                return cls(absorption)
+        return None
+
+
+Filling = Medium | Absorber
+
+
+def _is_clear(absorption: Spectrum) -> bool:
+    """Whether an absorption is a number or a colour of zeros."""
+    plain = isinstance(absorption, Constant | RGB | RGBUnbounded)
+    return plain and not np.any(absorption.to_rgb("unbounded"))
+
+
 def media_around(
     scene: Scene, cached: LoweringCache | None = None, time: float | None = None
-) -> tuple[Medium, ...]:
-    """Return the media at the camera, by ascending extent; only `camera.medium` if it is set.
+) -> tuple[Filling, ...]:
+    """Return what fills the camera's place, as `media_at` does, or `camera.medium`.
 
-    cached: keeps the triangles of boundaries. Raises SceneError for invalid shapes and cameras.
+    camera.medium is taken to be around a body that absorbs. cached: keeps the triangles of
+    boundaries. Raises SceneError for invalid shapes and cameras.
     """
     camera, time = scene.camera, moment(scene.camera, time)
+    fillings = media_at(scene.shapes, camera_origin(camera, scene.film, time), time, cached)
     if camera.medium is not None:
-        return (camera.medium,)
-    return media_at(scene.shapes, camera_origin(camera, scene.film, time), time, cached)
+        fillings = (*(f for f in fillings[:1] if isinstance(f, Absorber)), camera.medium)
+    return fillings
+
+
+def for_rays(
+    fillings: Sequence[Filling], elsewhere: tuple[Medium, ...] = ()
+) -> tuple[Filling | None, Filling | None]:
+    """Return the filling in which rays from a point begin, and that around the first absorber.
+
+    A ray that leaves an absorber comes into the latter. fillings: of `media_at`; elsewhere: the
+    medium of places that nothing fills.
+    """
+    every = [*fillings, *elsewhere]
+    beyond = dropwhile(lambda filling: not isinstance(filling, Absorber), every)
+    return next(iter(every), None), next(islice(beyond, 1, None), None)
 
 
 def media_at(
@@ -63,32 +111,41 @@ def media_at(
     p: NDArray[np.float64],
     time: float,
     cached: LoweringCache | None = None,
-) -> tuple[Medium, ...]:
-    """Return the media that fill a point (3,) [m], by ascending extent."""
-    bounding = [shape for shape in every(placed) if bounds_media(shape)]
-    numbers: dict[Medium, float] = {}  # winding numbers
-    extents: dict[Medium, float] = {}
-    bounds: dict[Medium, list[NDArray[np.float64]]] = {}
-    parts: dict[Medium, list[tuple[float, Shape]]] = {}
-    for shape in bounding:
-        low, high = _swept_box(shape, cached, time)
-        for medium, sign in ((shape.interior, 1.0), (shape.exterior, -1.0)):
-            if medium is not None:
-                parts.setdefault(medium, []).append((sign, shape))
-                bounds.setdefault(medium, []).append(np.stack([low, high]))
-    for medium, sides in parts.items():
-        low = np.min([box[0] for box in bounds[medium]], axis=0)
-        high = np.max([box[1] for box in bounds[medium]], axis=0)
-        outside = any(sign < 0.0 for sign, _ in sides)
-        volumes = (sign * winding.volume(shape, cached) for sign, shape in sides)
-        endless = outside and sum(volumes) < 0.0
-        numbers[medium] = 1.0 if endless else 0.0
-        extents[medium] = np.inf if endless else float(np.linalg.norm(high - low))
-        if ((p >= low) & (p <= high)).all():
-            windings = (sign * _winding(shape, p, cached, time) for sign, shape in sides)
-            numbers[medium] += sum(windings)
-    around = [medium for medium, number in numbers.items() if number > 0.5]
-    return tuple(sorted(around, key=lambda medium: extents[medium]))
+) -> tuple[Filling, ...]:
+    """Return what fills a point (3,) [m], by ascending extent: media, and bodies that absorb."""
+    sides: dict[Filling, list[tuple[float, Shape]]] = {}
+    for shape in every(placed, fills):
+        for filling, sign in (
+            (shape.interior, 1.0), (shape.exterior, -1.0), (Absorber.of(shape), 1.0),
+        ):  # fmt: skip
+            if filling is not None:
+                sides.setdefault(filling, []).append((sign, shape))
+    extents = {filling: _extent(parts, p, time, cached) for filling, parts in sides.items()}
+    around = {filling: extent for filling, extent in extents.items() if extent is not None}
+    return tuple(sorted(around, key=around.__getitem__))
+
+
+def _extent(
+    sides: Sequence[tuple[float, Shape]],
+    p: NDArray[np.float64],
+    time: float,
+    cached: LoweringCache | None,
+) -> float | None:
+    """Return the extent [m] of a filling around a point (3,), None if it does not fill the point.
+
+    sides: its boundaries, and 1 where it is inside of them, else -1.
+    """
+    boxes = np.array([_swept_box(shape, cached, time) for _, shape in sides])
+    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    volumes = (sign * winding.volume(shape, cached) for sign, shape in sides)
+    endless = any(sign < 0.0 for sign, _ in sides) and sum(volumes) < 0.0
+    windings = np.zeros(len(sides))
+    if ((p >= low) & (p <= high)).all():
+        windings[:] = [sign * _winding(shape, p, cached, time) for sign, shape in sides]
+    if endless + windings.sum() <= 0.5:
+        return None
+    near = boxes[np.abs(windings) > NEAR]
+    return np.inf if endless else float(np.linalg.norm(near[:, 1].max(0) - near[:, 0].min(0)))
 
 
 def open_medium(
@@ -147,13 +204,14 @@ def bodies_at(
     return tuple(body for body, number in numbers.items() if number > 0.5)
 
 
-def warnings_of(around: tuple[Any, ...]) -> list[str]:
+def warnings_of(around: tuple[Filling, ...]) -> list[str]:
     """Return a warning if the camera is in several media, else an empty list."""
-    if len(around) < 2:
+    media = [filling for filling in around if isinstance(filling, Medium)]
+    if len(media) < 2:
         return []
-    names = " and ".join(repr(medium.name or medium.kind) for medium in around)
+    names = " and ".join(repr(medium.name or medium.kind) for medium in media)
     return [
-        f"camera: it is in {len(around)} media at once, {names}; the one of the smallest extent is "
+        f"camera: it is in {len(media)} media at once, {names}; the one of the smallest extent is "
         "taken. Name one by camera.medium, or the outer one by the inner shape's exterior"
     ]
 
@@ -161,6 +219,11 @@ def warnings_of(around: tuple[Any, ...]) -> list[str]:
 def bounds_media(shape: Shape) -> bool:
     """Return whether a shape names a medium on either side."""
     return shape.interior is not None or shape.exterior is not None
+
+
+def fills(shape: Shape) -> bool:
+    """Return whether a shape names a medium, or its inside absorbs."""
+    return bounds_media(shape) or Absorber.of(shape) is not None
 
 
 def contested(
@@ -206,10 +269,10 @@ def every(
 
 
 def boundaries(placed: Sequence[Shape], matter: MatterOf | None = None) -> list[Shape]:
-    """Return the boundaries of bodies, or of media if `matter` is None, where they are placed."""
+    """Return the boundaries of bodies, or of fillings without `matter`, where they are placed."""
 
     def wanted(shape: Shape) -> bool:
-        return bounds_media(shape) if matter is None else matter(shape) is not None
+        return fills(shape) if matter is None else matter(shape) is not None
 
     return [shape for shape in every(placed, wanted) if wanted(shape)]
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Callable, Collection, Iterator
-from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.arrays import Floats
+from clpt.arrays import Floats, Integers
 from clpt.geometry import shapes
 from clpt.render.geometry.find import Geometry
 from clpt.render.scene_index import SceneIndex
@@ -22,7 +20,6 @@ LARGE = 0.5  # of the scene's radius: a single sphere that is larger is no aim
 CLUSTERS = 256  # most clusters into which specular pieces are cut
 CELLS = 16  # along each side of a grid that merges many pieces cell by cell
 GAP = 0.05  # of the span of pieces along an axis: wider gaps are cut first
-SEVERAL = 1 << 12  # most pieces among which gaps are searched
 PRICE = 1e-3  # of a sphere, over the area of all: a cut that gains less is not made
 PAD = 1.01  # radius over the radius of the pieces inside
 ROUNDING = 4e-6  # of the scene's coordinates, added to a radius
@@ -118,7 +115,7 @@ def _placed(geometry: Geometry, pieces: Floats, prototype: int, moving: Collecti
     mine = geometry.instances.prototypes == prototype
     rows = geometry.instances.rows[mine]
     linear = np.linalg.inv(np.stack([rows[name] for name in "xyz"], axis=1).astype(np.float64))
-    centre, radius = np.split(_around(_columns(pieces)), [3])
+    centre, radius = np.split(_around(_columns(pieces), np.zeros(1, np.int64))[0], [3])
     placed = _pieces(linear @ centre + rows["origin"], np.linalg.norm(linear, 2, (1, 2)) * radius)
     ways = np.isin(rows["number"], list(moving))
     if ways.any():
@@ -136,37 +133,67 @@ def _columns(pieces: Floats) -> Floats:
     return columns
 
 
-def _around(columns: Floats) -> NDArray[np.float64]:
-    """Return centre and radius (4,) of a sphere about the middle of the pieces' box."""
-    centre = (columns[10:13].min(axis=1) + columns[13:].max(axis=1)) / 2
-    squares = (columns[:9].reshape(3, 3, -1) - centre[:, None]) ** 2
+def _around(columns: Floats, runs: Integers) -> Floats:
+    """Return spheres (k, 4) about the middles of the boxes of runs; runs: their first pieces."""
+    sizes = np.diff(runs, append=columns.shape[1])
+    low = np.minimum.reduceat(columns[10:13], runs, axis=1)
+    centre = (low + np.maximum.reduceat(columns[13:], runs, axis=1)) / 2
+    squares = (columns[:9].reshape(3, 3, -1) - np.repeat(centre, sizes, axis=1)) ** 2
     away = np.sqrt(squares[:, 0] + squares[:, 2] + squares[:, 1])
-    return np.append(centre, (away + columns[9]).max())
+    radius = np.maximum.reduceat((away + columns[9]).max(axis=0), runs)
+    return np.vstack([centre, radius]).T
 
 
-def _cut(columns: Floats) -> tuple[tuple[Floats, ...], bool]:
-    """Return pieces in two parts, and whether a wide gap separates these.
+def _cuts(columns: Floats, runs: Integers) -> tuple[Integers, Integers, NDArray[np.bool_]]:
+    """Return an order of the pieces in which each run is cut, its first part, and whether by a gap.
 
+    Pieces stay in their runs. The first part has a number of pieces (k,), 0 of a single piece.
     Without a wide gap along an axis, the longest axis is halved.
     """
     lows, highs = columns[10:13], columns[13:]
-    number = columns.shape[1]
-    if number <= SEVERAL:
-        span = np.maximum(highs.max(axis=1) - lows.min(axis=1), 1e-30)
-        order = np.argsort(lows, axis=1)
-        reached = np.maximum.accumulate(np.take_along_axis(highs, order[:, :-1], axis=1), axis=1)
-        gaps = (np.take_along_axis(lows, order[:, 1:], axis=1) - reached) / span[:, None]
-        places = gaps.argmax(axis=1)
-        axis = min(range(3), key=lambda i: (-gaps[i, places[i]], places[i]))
-        if gaps[axis, places[axis]] > GAP:
-            left, right = np.split(order[axis], [places[axis] + 1])
-            return (columns[:, left], columns[:, right]), True
+    sizes = np.diff(runs, append=columns.shape[1])
+    run = np.repeat(np.arange(len(runs)), sizes)
+    low = np.minimum.reduceat(lows, runs, axis=1)
+    span = np.maximum(np.maximum.reduceat(highs, runs, axis=1) - low, 1e-30)
+    orders, widths, places = zip(
+        *(_widest_gaps(lows[i], highs[i], run, runs) for i in range(3)), strict=True
+    )
+    gaps = np.array(widths) / span
+    axis = gaps.argmax(axis=0)
+    each = np.arange(len(runs))
+    has_gap = gaps[axis, each] > GAP
     middles = (lows + highs) / 2
-    along = middles[np.ptp(middles, axis=1).argmax()]
-    low = along < (along.min() + along.max()) / 2
-    if not low.any():  # all at the same point
-        low = np.arange(number) < number // 2
-    return (columns[:, low], columns[:, ~low]), False
+    least = np.minimum.reduceat(middles, runs, axis=1)
+    most = np.maximum.reduceat(middles, runs, axis=1)
+    longest = (most - least).argmax(axis=0)
+    along = middles[longest[run], np.arange(len(run))]
+    first = along < ((least + most) / 2)[longest, each][run]
+    halved = np.lexsort((~first, run))
+    left = np.add.reduceat(first, runs, dtype=np.int64)
+    left = np.where(left == 0, sizes // 2, left)  # all at the same point
+    order = np.where(has_gap[run], np.array(orders)[axis[run], np.arange(len(run))], halved)
+    return order, np.where(has_gap, np.array(places)[axis, each] - runs + 1, left), has_gap
+
+
+def _widest_gaps(
+    low: Floats, high: Floats, run: Integers, runs: Integers
+) -> tuple[Integers, Floats, Integers]:
+    """Return the order of pieces along an axis, each run's widest gap, and the piece before it.
+
+    run: of each piece; runs: their first pieces.
+    """
+    order = np.lexsort((low, run))
+    reach = high[order]
+    by_reach = np.argsort(reach, kind="stable")
+    rank = np.empty(len(reach), np.int64)
+    rank[by_reach] = np.arange(len(reach))
+    farthest = np.maximum.accumulate(rank + run * len(reach)) - run * len(reach)
+    gaps = np.full(len(reach), -np.inf)
+    gaps[:-1] = low[order[1:]] - reach[by_reach[farthest[:-1]]]
+    gaps[runs[1:] - 1] = -np.inf  # the last piece of a run
+    widest = np.maximum.reduceat(gaps, runs)
+    at = np.where(gaps == widest[run], np.arange(len(reach)), len(reach))
+    return order, widest, np.minimum.reduceat(at, runs)
 
 
 def _fewer(pieces: Floats) -> Floats:
@@ -187,42 +214,62 @@ def _fewer(pieces: Floats) -> Floats:
     return _in_boxes(np.stack([low.T, high.T], axis=1), False)
 
 
-class _Cluster:
-    """Some pieces, the sphere around them, and the clusters into which they are cut."""
+class _Clusters:
+    """Clusters of pieces by number: the sphere around each, and the two into which it is cut.
+
+    Each is a run of `columns`; pieces of a cluster stand in the order of its parts.
+    """
 
     def __init__(self, columns: Floats):
-        self.sphere = _around(columns)
-        self.area = float(self.sphere[3] ** 2)
-        self.halves, self.gap = _cut(columns) if columns.shape[1] > 1 else ((), False)
-        self.parts: list[_Cluster] = []
+        self.columns = columns
+        self.bounds, self.spheres = np.zeros((0, 3), np.int64), np.zeros((0, 4))
+        self.gaps = np.zeros(0, bool)
+        self.parts: dict[int, tuple[int, int]] = {}
+        self._add(np.array([[0, columns.shape[1]]]))
 
-    def cut(self) -> list[_Cluster]:
-        """Return the two parts; a single piece has none."""
-        self.parts, self.halves = [_Cluster(half) for half in self.halves], ()
-        return self.parts
+    def _add(self, bounds: Integers) -> None:
+        """Add clusters, from their first columns to their ends (k, 2)."""
+        sizes = bounds[:, 1] - bounds[:, 0]
+        runs = np.cumsum(sizes) - sizes
+        rows = np.arange(sizes.sum()) + np.repeat(bounds[:, 0] - runs, sizes)
+        columns = self.columns[:, rows]
+        order, left, gaps = _cuts(columns, runs)
+        self.columns[:, rows] = columns[:, order]
+        added = np.column_stack([bounds[:, 0], bounds[:, 0] + left, bounds[:, 1]])
+        self.bounds = np.concatenate([self.bounds, added])
+        self.spheres = np.concatenate([self.spheres, _around(columns, runs)])
+        self.gaps = np.concatenate([self.gaps, gaps])
 
-    def cover(self, price: float) -> tuple[float, list[NDArray[np.float64]]]:
-        """Return the cheapest spheres around all pieces; each costs its area and a price."""
-        whole = self.area + price
-        if self.parts:
-            costs, spheres = zip(*(part.cover(price) for part in self.parts), strict=True)
-            if sum(costs) < whole:
-                return sum(costs), [sphere for some in spheres for sphere in some]
-        return whole, [self.sphere]
+    def cut(self, numbers: Integers) -> Integers:
+        """Cut clusters of several pieces; return the numbers of their parts."""
+        new = len(self.spheres) + np.arange(2 * len(numbers))
+        pairs = zip(new[::2].tolist(), new[1::2].tolist(), strict=True)
+        self.parts |= dict(zip(numbers.tolist(), pairs, strict=True))
+        self._add(np.stack([self.bounds[numbers, :2], self.bounds[numbers, 1:]], 1).reshape(-1, 2))
+        return new
+
+    def cover(self, price: float, number: int = 0) -> tuple[float, list[int]]:
+        """Return the cheapest spheres around a cluster; each costs its area and a price."""
+        whole = float(self.spheres[number, 3] ** 2) + price
+        if number in self.parts:
+            near, far = (self.cover(price, part) for part in self.parts[number])
+            if near[0] + far[0] < whole:
+                return near[0] + far[0], near[1] + far[1]
+        return whole, [number]
 
 
 def _spheres(pieces: Floats) -> NDArray[np.float64]:
     """Return at most MOST spheres (k, 4) around pieces, whose disks have little area together."""
-    root, number = _Cluster(_columns(pieces)), count()
-    leaves: list[tuple[bool, float, int, _Cluster]] = []
-    cut = [root]
-    while cut or leaves:
-        for cluster in cut:  # a gap comes first, then the largest, then the earliest
-            heapq.heappush(leaves, (not cluster.gap, -cluster.area, next(number), cluster))
-        if len(leaves) >= CLUSTERS:
+    clusters = _Clusters(_columns(pieces))
+    leaves = np.zeros(1, np.int64)
+    while len(leaves) < CLUSTERS:  # those with gaps come first, then the largest
+        several = leaves[np.ptp(clusters.bounds[leaves][:, ::2], axis=1) > 1]
+        order = np.lexsort((-clusters.spheres[several, 3], ~clusters.gaps[several]))
+        chosen = several[order[: min(CLUSTERS - len(leaves), -(-len(leaves) // 2))]]
+        if not len(chosen):
             break
-        cut = heapq.heappop(leaves)[-1].cut()
-    price = PRICE * root.cover(0.0)[0]
-    while len(spheres := root.cover(price)[1]) > MOST:
+        leaves = np.concatenate([np.setdiff1d(leaves, chosen), clusters.cut(chosen)])
+    price = PRICE * clusters.cover(0.0)[0]
+    while len(numbers := clusters.cover(price)[1]) > MOST:
         price *= 2.0
-    return np.array(spheres)
+    return clusters.spheres[numbers]

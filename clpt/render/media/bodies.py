@@ -16,7 +16,7 @@ with other needs do without.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,7 @@ from clpt.scene import roles
 from clpt.scene.materials import CLEAR, Material
 from clpt.scene.media import Medium
 from clpt.scene.shapes import Shape
-from clpt.spectra import Constant
+from clpt.spectra import Constant, Spectrum
 
 MOST_NUMBERS = 255  # a path's word holds a number in a byte
 DEPTH = 4  # bodies at a point: bytes of that word
@@ -131,7 +131,7 @@ class BodyWords:
                 inside = shape.material.inside_index
                 index_words = encoder.named_words("body", "index", inside, roles.INDEX)[0]
                 index = encoder.store.append("materials", index_words)
-            self._media.append(_interior_word(shape, encoder, media))
+            self._media.append(_interior_word(shape, media))
             words.append((self._media[-1], index))
         return np.array(words, np.uint32).ravel()
 
@@ -149,15 +149,12 @@ class BodyWords:
         return word, self._media[numbers[0] - 1] if numbers else 0
 
 
-def _interior_word(shape: Shape, encoder: Encoder, media: MediumWords) -> int:
+def _interior_word(shape: Shape, media: MediumWords) -> int:
     """Return the word of a body's interior medium, else of its material's absorption."""
     if shape.interior is not None:
         return media.word(shape.interior)
-    absorption = shape.material.absorption
-    if absorption == CLEAR:
-        return 0
-    words = encoder.named_words("medium", "absorption", absorption, roles.COEFFICIENT)[0]
-    return 1 + encoder.store.append("materials", words)
+    absorption = cast(Spectrum, shape.material.absorption)
+    return 0 if absorption == CLEAR else media.absorber(absorption)
 
 
 MOST_COMPARED = 64  # lamps: beyond this number no boxes are compared

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Words
 from clpt.records import MEDIUM_BITS
+from clpt.render.geometry.surroundings import Absorber, Filling
 from clpt.render.lights.bodies import BodyLight, BrickLights, black_bodies, brick_counts
 from clpt.render.lights.bounds import Bounds
 from clpt.render.lights.find import Sources
@@ -81,18 +82,26 @@ class MediumWords:
     ):
         self._index, self._encoder, self._materials = index, encoder, materials
         self._sealed, self._glows = sealed, glows
-        self._words: dict[Medium, int] = {}
+        self._words: dict[Filling, int] = {}
         self.lights: list[tuple[int, BrickLights | BodyLight]] = []  # by their medium's word
         self._light_row = len(index.lights)  # in `lights`, of the next brick or body
         self._has_media = bool(index.media)  # False for an integrator that sees none
 
-    def word(self, medium: Medium | None) -> int:
-        """Return the word of a medium, 0 of None."""
-        if medium is None or not self._has_media:
+    def word(self, filling: Filling | None) -> int:
+        """Return the word of a medium or of the inside of a body that absorbs, 0 of None."""
+        if filling is None or not self._has_media:
             return 0
-        if medium not in self._words:
-            self._words[medium] = self._append(medium)
-        return self._words[medium]
+        if filling not in self._words:
+            if isinstance(filling, Absorber):
+                self._words[filling] = self.absorber(filling.absorption)
+            else:
+                self._words[filling] = self._append(filling)
+        return self._words[filling]
+
+    def absorber(self, absorption: Spectrum) -> int:
+        """Append the absorption of the inside of a body [1/m]; return its word."""
+        words = self._encoder.named_words("medium", "absorption", absorption, roles.COEFFICIENT)[0]
+        return 1 + self._encoder.store.append("materials", words)
 
     def of_shapes(self, shapes: Iterable[Shape]) -> NDArray[np.uint32]:
         """Return the words of shapes' interiors and exteriors (2 n,), () without media."""

@@ -32,7 +32,7 @@ INFINITY = 1e4  # radii of the scene: the distance of a point that stands for in
 CROSSES = "{} comes into another medium while the shutter is open"
 STRADDLES = "{} lies in more than one medium, or does not know its bounds"
 
-Around = tuple[Any, ...]  # media, or the matter of bodies; the first counts
+Around = tuple[Any, ...]  # both of `surroundings.for_rays`, or the matter of bodies
 
 
 class LightMedia(NamedTuple):
@@ -75,15 +75,21 @@ def light_media(
 def light_media_words(
     surrounding: LightMedia, media: MediumWords, bodies: BodyWords | None
 ) -> NDArray[np.uint32]:
-    """Return the words of bodies and medium for each row of `lights`, (2 n,) uint32."""
-    words: list[tuple[int, int]] = []
+    """Return the words of `around` for each row of `lights`, (3 n,) uint32."""
+    words: list[tuple[int, int, int]] = []
     for at_light, count in surrounding.around:
-        if bodies is None:
-            row = 0, media.word(next(iter(at_light), None))
-        else:
-            row = bodies.around(at_light, media)
-        words += [row] * count
+        words += [around_words(at_light, media, bodies)] * count
     return np.array(words, np.uint32).ravel()
+
+
+def around_words(
+    surrounding: Around, media: MediumWords, bodies: BodyWords | None
+) -> tuple[int, int, int]:
+    """Return the words of the bodies around a point, and of both of `surroundings.for_rays`."""
+    if bodies is not None:
+        return (*bodies.around(surrounding, media), 0)
+    medium, beyond = surrounding
+    return 0, media.word(medium), media.word(beyond)
 
 
 class Unknown(Exception):
@@ -150,7 +156,7 @@ def _around_lamp(
             raise Unknown(STRADDLES.format(name), name)
         return first
     surrounding = boundaries.around(far, None)
-    if surrounding or surrounding is None:
+    if surrounding is None or any(surrounding):
         reason = f"the light of {name} comes from infinity, where a medium has no end"
         raise Unknown(reason, name)
     return surrounding
@@ -194,7 +200,7 @@ class _Boundaries:
         self.still = surroundings.stands_still(self.shapes)
         self.elsewhere = () if self.nested else self._around_camera(index)
 
-    def _around_camera(self, index: SceneIndex) -> Around:
+    def _around_camera(self, index: SceneIndex) -> tuple[Medium, ...]:
         """Return the camera's medium if no boundary encloses the camera with it.
 
         That medium then fills all space without another medium.
@@ -233,7 +239,8 @@ class _Boundaries:
     def _at(self, p: NDArray[np.float64], time: float) -> Around:
         if self.nested:
             return surroundings.bodies_at(self.shapes, matter_of, p, time, self.cache)
-        return surroundings.media_at(self.shapes, p, time, self.cache)[:1] or self.elsewhere
+        fillings = surroundings.media_at(self.shapes, p, time, self.cache)
+        return surroundings.for_rays(fillings, self.elsewhere)
 
 
 def _around_shape(emitter: Emitter, boundaries: _Boundaries, number: int) -> Around | None:
@@ -248,7 +255,7 @@ def _around_shape(emitter: Emitter, boundaries: _Boundaries, number: int) -> Aro
     if not boundaries.nested and surroundings.bounds_media(shape):
         if two_sided and shape.interior is not shape.exterior:
             return None
-        return () if shape.exterior is None else (shape.exterior,)
+        return shape.exterior, None
     offsets = (OFFSET, -OFFSET) if two_sided else (OFFSET,)
     keys = motions.shapes.get(number)
     if emitter.keys == 1:

@@ -6,33 +6,39 @@ from dataclasses import dataclass
 
 from clpt.layout import Record
 from clpt.render.records.macros import flag
+from clpt.scene import cameras
+from clpt.scene.params import Kind, params
 
 _TO_WORLD = ("matrix", "camera space to world, row-major")
-
-_NEAR = ("real", "distance of the near plane [m]")
-
-_FAR = ("real", "distance of the far plane [m]")
 
 _PINHOLE = {
     "to_world": _TO_WORLD,
     "extent": ("vec2", "width and height of the film at distance 1"),
     "offset": ("vec2", "of the principal point, in widths and heights of the film"),
-    "near": _NEAR,
-    "far": _FAR,
 }
 
 WEIGHTED = ("lens", "rays", "calibrated")  # cameras whose rays have weights
 GHOST_CELLS = 1024  # of equal probability; a cell gives a pair of reflecting surfaces
 
+
+def _declared(kind: type[Kind]) -> dict[str, tuple[str, str]]:
+    """Return the members that a camera declares by `member`."""
+    return {
+        name: ("real", f"{param.doc} [{param.unit}]" if param.unit else param.doc)
+        for name, param in params(kind).items()
+        if param.member
+    }
+
+
 RECORDS: dict[str, Record] = {
-    "perspective": Record("PerspectiveCamera", "A pinhole.", **_PINHOLE),
+    "perspective": Record(
+        "PerspectiveCamera", "A pinhole.", **_PINHOLE, **_declared(cameras.Perspective)
+    ),
     "thin_lens": Record(
         "ThinLensCamera",
         "A pinhole with an aperture.",
         **_PINHOLE,
-        aperture_radius=("real", "of the lens [m]"),
-        focus_distance=("real", "of the plane in focus [m]"),
-        focal_length=("real", "at the design wavelength [m]"),
+        **_declared(cameras.ThinLens),
         power=("real", "index - 1 of the glass at that wavelength"),
         glass=("integer", "row in `spectra` of a glass that disperses"),
     ),
@@ -60,8 +66,7 @@ RECORDS: dict[str, Record] = {
         "Parallel rays.",
         to_world=_TO_WORLD,
         aspect=("real", "height of the film over its width"),
-        near=_NEAR,
-        far=_FAR,
+        **_declared(cameras.Orthographic),
     ),
     "spherical": Record("SphericalCamera", "All directions around a point.", to_world=_TO_WORLD),
     "matrix": Record(

@@ -243,3 +243,12 @@ def test_beside_mitsuba(written, name):
     theirs = blocks(mitsubas(path, 16, 64))
     ours = blocks(exposures(with_film(clpt.load(path), mode="rgb"), 16, 128))
     assert_agree(ours, theirs, name, 0.01)
+
+
+def test_negative_numbers_of_a_grid_count_as_0(written, tmp_path):
+    write_grid(tmp_path / "n.vol", NUMBERS - 0.2)
+    scene = clpt.load(written("heterogeneous", grid("sigma_t", "n.vol")))
+    density = scene.shapes[-1].interior.density
+    values = density.values if hasattr(density, "values") else density
+    assert values.min() == 0.0 and values.max() > 0.0
+    assert any("negative somewhere" in text for text in scene.warnings)

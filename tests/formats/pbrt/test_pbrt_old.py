@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import clpt
 from clpt import images
 from clpt.errors import SceneError
 from clpt.formats import load
@@ -393,3 +394,56 @@ def test_a_second_picture_in_a_file_is_left_out(tmp_path):
     assert any("the pictures behind it are left out" in text for text in scene.warnings)
     path.write_text(first + "\n# the end\n")
     assert not any("pictures" in text for text in load(path).warnings)
+
+
+@pytest.mark.parametrize(
+    ("p1", "p2", "turn"),
+    [((-3.2, 0.8, 0.4), (-1.0, -0.5, -1.25), 360), ((3.0, 1.2, 1.0), (0.65, -0.5, -1.0), 270)],
+)
+def test_a_hyperboloid_has_its_waist_at_0(read, p1, p2, turn):
+    """pbrt-v3 solves a r^2 - c z^2 = 1 for p2 and p1 + 2 (p2 - p1); p1 gives its other end."""
+    numbers = [" ".join(map(str, p)) for p in (p1, p2)]
+    text = '"hyperboloid" "point p1" [{}] "point p2" [{}] "float phimax" {}'
+    mesh = read(f"Shape {text.format(*numbers, turn)}").shapes[0]
+    first, second = np.array(p1), np.array(p2)
+    ends = np.array([second, first + 2.0 * (second - first)])
+    a, c = np.linalg.solve(np.column_stack([(ends[:, :2] ** 2).sum(1), -(ends[:, 2] ** 2)]), [1, 1])
+    squares = (mesh.vertices[:, :2] ** 2).sum(axis=1)
+    wanted = np.maximum((1.0 + c * mesh.vertices[:, 2] ** 2) / a, 0.0)  # none between two sheets
+    np.testing.assert_allclose(squares, wanted, atol=1e-5)
+    assert mesh.vertices[:, 2].min() == pytest.approx(min(p1[2], p2[2]))
+    assert mesh.vertices[:, 2].max() == pytest.approx(max(p1[2], p2[2]))
+    assert np.linalg.norm(mesh.vertices - second, axis=1).min() < 1e-5
+
+
+def test_no_hyperboloid(read):
+    with pytest.raises(SceneError, match="no hyperboloid goes through"):
+        read('Shape "hyperboloid" "point p1" [0 0 0] "point p2" [0 0 1]')
+
+
+@pytest.mark.parametrize("end", ["", "WorldEnd"])
+def test_the_inside_of_dots_surrounds_them(tmp_path, end):
+    """pbrt-v3's dots.cpp hands "inside" to the parameter `outsideDot`; so does pbrt-v4's."""
+    path = tmp_path / "a.pbrt"
+    texture = 'Texture "d" "float" "dots" "float inside" 0.2 "float outside" 0.7'
+    kind = '"matte" "texture sigma"' if end else '"coateddiffuse" "texture roughness"'
+    path.write_text(f'WorldBegin\n{texture}\nMaterial {kind} "d"\n{DISK}\n{end}\n')
+    material = load(path).shapes[0].material.front
+    mixed = material.sigma if end else material.alpha
+    assert isinstance(mixed.amount, textures.Dots)
+    assert level(mixed.first) < level(mixed.second)
+    if end:
+        assert (level(mixed.first), level(mixed.second)) == (0.2, 0.7)
+
+
+def test_glass_in_a_mix_has_the_front_of_the_rest(read):
+    text = (
+        'MakeNamedMaterial "a" "string type" "glass"\nMakeNamedMaterial "b" "string type" "matte"\n'
+        'Material "mix" "color amount" [.4 .4 .4] "string namedmaterial1" "a" '
+        f'"string namedmaterial2" "b"\n{DISK}'
+    )
+    scene = read(text)
+    kinds = [part.kind for part in materials.parts(scene.shapes[0].material)]
+    assert "dielectric" in kinds and "two_sided" not in kinds
+    assert any("black from behind" in text for text in scene.warnings)
+    assert np.isfinite(np.asarray(clpt.render(scene, 1, size=(4, 4)))).all()

@@ -175,7 +175,7 @@ def test_patterns_are_placed_by_the_texture_space():
     solid, warnings = make("checkerboard", dimension=("integer", 3), tex1=("rgb", 1, 0, 0))
     assert isinstance(solid.amount, Checkers) and not warnings
     dots, warnings = make("dots", "float", inside=("float", 0.3))
-    assert dots.second.value == 0.3 and isinstance(dots.amount, Dots) and not warnings
+    assert dots.first.value == 0.3 and isinstance(dots.amount, Dots) and not warnings
 
 
 def test_mappings():
