@@ -22,14 +22,19 @@ from clpt.records import SLABS
 from clpt.render.film.state import FILM_WORDS
 from clpt.render.flow import blocks, programs
 from clpt.render.records import Features
-from clpt.render.wavefront.path_buffers import queue_sizes, queue_steps
+from clpt.render.wavefront.path_buffers import QUEUEING, queue_sizes, queue_steps
 from clpt.scene import Scene
 
 _WORD = 4  # bytes
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _CALL = re.compile(r"(?<!\w)(?P<verb>load|store)_(?P<member>\w+)\((?!Slab )")
-_QUEUED = {"append": (0, 1), "shade": (1, 0)}  # words read and written of a queue
-QUEUEING = [kernel for kernel, *_ in queue_steps(1, 1)]
+_QUEUED = {
+    "append": (0, 1),
+    "shade": (1, 0),
+    "generate": (1, 0),
+    "shadow": (1, 0),
+}  # words read and written of a queue
+APPENDING = {"append_begin", *QUEUEING.values()}
 WARM = 4  # bounces before the measurement, so that paths of all depths are in flight
 BOUNCES = 4  # of a round: in a single bounce few paths may begin
 
@@ -111,7 +116,7 @@ def measure(
     features, layout = wave.features, wave.scene.strategy.layout
     moved = traffic(features, layout, queued=wave.scene.strategy.queued)
     for name, work in noted.items():
-        if name not in QUEUEING and _selected(name, only):
+        if name not in APPENDING and _selected(name, only):
             yield _figure(flight, copying, name, moved[name].total, work)
     if _selected("append", only):
         yield _queue(flight, copying, rounds)
@@ -162,7 +167,7 @@ def _queue(flight: Flight, copying: Copying, rounds: int) -> Figure:
     features, layout = wave.features, wave.scene.strategy.layout
     kinds = len(features.materials.kinds)
     for step in wave.stages:  # up to unshaded hits
-        if step.bound.kernel.name == "shade" or step.name in QUEUEING:
+        if step.bound.kernel.name in ("shade", "append"):
             break
         flight.stage(step)
     program = device.build(on, programs.append_source(features, layout, wave.lanes))
