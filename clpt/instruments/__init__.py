@@ -1,7 +1,22 @@
 """Instruments: light as numbers with units and standard errors, at points and along rays."""
 
+from clpt.instruments.false_color import write_false_color
+from clpt.instruments.glare_rating import Glare, glare
+from clpt.instruments.goniophotometry import Distribution, goniophotometer, write_photometry
 from clpt.instruments.measuring import Measurement, measure, photometer
 from clpt.instruments.quantities import QUANTITIES
 from clpt.instruments.sensor import Sensor
 
-__all__ = ["QUANTITIES", "Measurement", "Sensor", "measure", "photometer"]
+__all__ = [
+    "QUANTITIES",
+    "Distribution",
+    "Glare",
+    "Measurement",
+    "Sensor",
+    "glare",
+    "goniophotometer",
+    "measure",
+    "photometer",
+    "write_false_color",
+    "write_photometry",
+]

@@ -28,7 +28,7 @@ from clpt.render.lights.check import rotation
 from clpt.render.materials.encoder import Encoder
 from clpt.render.records.tables import version
 from clpt.render.spectra.find import Look
-from clpt.render.textures.texels import bands, texels
+from clpt.render.textures.texels import bands, negative_notes, texels
 from clpt.scene.lights import CubeMap, Envmap, Light, Sky
 from clpt.scene.params import fields_of
 from clpt.scene.pixels import image_file
@@ -150,7 +150,10 @@ def _sphere(
     where = "envmap.image"
     spectra = spectral_exr.find(source, emissive=True, where=where)
     notes: list[str] = []
-    image = _loaded(source if spectra is None else spectra.to_rgb(), where, notes)
+    if spectra is None:
+        image = _loaded(source, where, notes)
+    else:  # the colour of a spectrum may be negative
+        image = _loaded(spectra.to_rgb(), where, notes, tells=False)
     image = _at_least_two_rows(image * np.float32(scale))
     height, width, _ = image.shape
     if spectra is None or not spectral:
@@ -164,11 +167,12 @@ def _sphere(
             _sphere_blocks(corners, compensated),
             notes=tuple(notes),
         )
+    notes += negative_notes(spectra.values, image_file(source) or where)
     spectra = _scaled(spectra, scale, where)
     corners = _latitude_weights(luminance(image) + UNSEEN * _brightness(spectra.values))[None]
     values, number = bands(spectra, lo, hi)
     grid = _sphere_blocks(corners, compensated)
-    return Content(width, height, values, corners, grid, values.shape[1], number)
+    return Content(width, height, values, corners, grid, values.shape[1], number, tuple(notes))
 
 
 def _sphere_blocks(corners: NDArray[Any], compensated: bool) -> block_grids.BlockGrid:
@@ -207,10 +211,10 @@ def _scaled(image: SpectralImage, scale: float, where: str) -> SpectralImage:
     return dataclasses.replace(image, values=np.maximum(values, np.float32(0.0)))
 
 
-def _loaded(image: object, where: str, notes: list[str]) -> Floats32:
+def _loaded(image: object, where: str, notes: list[str], *, tells: bool = True) -> Floats32:
     """Return an image as (h, w, 3) float32 without negative values. Raises SceneError.
 
-    notes: warnings of ignored parts of its file are appended.
+    notes: warnings of ignored parts of its file are appended, and if it tells, of negative values.
     """
     if spectral_exr.find(image, emissive=True, where=where) is not None:
         raise SceneError("spectral images can be an envmap only", where=where)
@@ -224,6 +228,8 @@ def _loaded(image: object, where: str, notes: list[str]) -> Floats32:
     values = np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values[..., :3]
     if not np.isfinite(values).all():
         raise SceneError("has a texel that is not finite", where=where)
+    if tells:
+        notes += negative_notes(values, file or where)
     return np.maximum(values, np.float32(0.0))
 
 

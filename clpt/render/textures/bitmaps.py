@@ -28,7 +28,7 @@ from clpt.images import Stored
 from clpt.images.stored import checked
 from clpt.render.records.tables import LoweringCache, TableStore, version
 from clpt.render.records.textures import KINDS, MIPS
-from clpt.render.textures.texels import texels
+from clpt.render.textures.texels import negative_notes, texels
 from clpt.scene.pixels import channel, image_file
 from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role
 from clpt.scene.textures import Bitmap
@@ -109,12 +109,14 @@ class _Pixels:
 class _Packed:
     """The words of an image, later a view of the joined table; size: height and width.
 
-    levels (n, 3): first word, width and height of each level, the first is the image itself.
+    levels (n, 3): first word, width and height of each level, the first is the image itself; notes:
+    warnings about its values.
     """
 
     words: Words
     size: tuple[int, ...]
     levels: NDArray[np.int64] | None = None
+    notes: list[str] = field(default_factory=list)
 
 
 @dataclass
@@ -179,6 +181,7 @@ class Images:
         notes = [*_left_out(wanted), *self._fit(wanted)]
         for image in wanted:
             roles.add((self._put(image, store), image.role.name))
+            notes += self._packed(image).notes
         for image in wanted:
             image.pixels.let_go()
         self._spectra.clear()
@@ -261,9 +264,13 @@ class Images:
         if role is REAL:
             numbers = np.nan_to_num(channel(decoded, texture.channel).astype(np.float32))
             return _Packed(numbers.reshape(-1).view(np.uint32), size)
+        is_light = role is EMISSION and texture.spectral(role) is None  # else colours of spectra
+        name = image_file(texture.image) or "bitmap.image"
+        notes = negative_notes(decoded[..., :3], name) if is_light else []
         colours = texels(np.nan_to_num(decoded[..., :3]), role, self.spectral)
         colours = colours if self.spectral else colours[:, :3]
-        return _Packed(np.ascontiguousarray(colours).reshape(-1).view(np.uint32), size)
+        words = np.ascontiguousarray(colours).reshape(-1).view(np.uint32)
+        return _Packed(words, size, notes=notes)
 
     def _read(self, image: object) -> _Pixels:
         """Return the pixels of an image; a file is decoded once."""

@@ -14,7 +14,25 @@ from clpt.images.spectral_exr import SpectralImage
 from clpt.scene.roles import REAL, REFLECTANCE, Role
 from clpt.spectra import Tabulated
 
+NEGATIVE = 1e-5  # share of an image's light
 FAR = 1000.0  # bands of the numbering beyond each end of a spectral image
+
+
+def negative_notes(values: Floats32, name: object) -> list[str]:
+    """Return a warning if an image (h, w, n) of light has negative values, which become 0.
+
+    Rounding makes tiny negative values: light below NEGATIVE of the whole is not told.
+    """
+    budget.check_time()
+    below = np.minimum(values, np.float32(0.0))
+    lost = -below.sum(dtype=np.float64)
+    if not lost > NEGATIVE * max(float(values.sum(dtype=np.float64)) + lost, 0.0):
+        return []
+    count = int((below < 0.0).any(axis=-1).sum())
+    return [
+        f"{name}: {count:,} of {values[..., 0].size:,} texels have a negative value, down to "
+        f"{below.min():.3g}; light is never negative, so these values count as 0"
+    ]
 
 
 def texels(image: Floats32, role: Role, spectral: bool) -> Floats32:
