@@ -80,6 +80,9 @@ def sources(
     texts |= _shading(features, layout, lanes, queued=queued)
     if queued:
         texts["append"] = append_source(features, layout, lanes)
+        if not features.transport.light_paths:
+            files, defines = _shared(features, layout), _defines(features, lanes)
+            texts["append_some"] = _source("append_some", files, defines, 1)
     return _static(texts)
 
 

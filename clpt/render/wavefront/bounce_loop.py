@@ -307,12 +307,13 @@ class BounceLoop:
 
     def _bind_queues(self, kernel: str, kinds: int) -> list[Step]:
         """The kernels that queue slots for a stage: by material for shading, else in a queue."""
-        append = f"{self._label}append"
-        queues = queue_steps(self.paths.slots, kinds if kernel == "shade" else 1, QUEUEING[kernel])
-        return [
-            Step(name, self.kernels.bind(append, name), (size,), (group,) if group else None)
-            for name, size, group in queues
-        ]
+        shades, steps = kernel == "shade", []
+        queues = queue_steps(self.paths.slots, kinds if shades else 1, QUEUEING[kernel])
+        for name, size, group in queues:
+            program = "append" if shades or name == "append_begin" else "append_some"
+            bound = self.kernels.bind(self._label + program, name)
+            steps.append(Step(name, bound, (size,), (group,) if group else None))
+        return steps
 
     def _texts(self, lowered: Lowered, chosen: Strategy) -> dict[str, device.Source]:
         texts = programs.sources(

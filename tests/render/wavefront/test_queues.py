@@ -193,8 +193,9 @@ def test_stages_get_the_slots_with_work(kernel: str, slots: int) -> None:
     expected = np.flatnonzero(far) if kernel == "append_shadows" else np.delete(range(slots), waits)
     host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queue_sizes(slots, KINDS, True).items()}
     numbers = {"stride": stride_of(slots), "slots": slots}
-    steps = tuple(queue_steps(slots, 1, kernel))
-    words = on_device(assembled("stage/append.cl"), steps, host, **numbers)
+    host["queue_counts"][0] = 0
+    steps = tuple(queue_steps(slots, 1, kernel))[1:]
+    words = on_device(assembled("stage/append_some.cl"), steps, host, **numbers)
     count = words["queue_counts"][0]
     np.testing.assert_array_equal(np.sort(words["queue"][:count]), expected)
     assert (words["queue"][count:] == 0xDEAD).all()
