@@ -29,7 +29,7 @@ LOWEST_TESTS := tests/test_lowest.py tests/test_public.py tests/files/test_input
 	tests/formats/test_volumes.py tests/device/test_program.py tests/pictures/film/test_resume.py
 LOWEST_SCENES := cornell_box wine_and_jade cloud prism color_checker oil_film mist
 
-.PHONY: help demo test test-all test-lowest bench assets-report lint docs clean
+.PHONY: help demo test test-all test-lowest bench assets-report lint docs clean blender
 help:
 	@echo "make demo      render a scene to demo.exr and demo.png"
 	@echo "make test      the tests;  make test-all  the slow ones too"
@@ -75,6 +75,10 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/mypy --config-file= --strict --follow-imports=silent tests/typed_program.py
+
+# the extension: Blender installs it from disk
+blender: $(BIN)/python
+	cd blender && ../$(BIN)/python -m zipfile -c ../clpt_blender.zip *.py *.toml LICENSE
 
 docs: $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build

@@ -22,7 +22,7 @@ import clpt
 from bench import machine
 from bench.peer_scenes import SCENES
 from clpt.formats import load
-from clpt.render.wavefront.work_list import SIDE
+from clpt.render.wavefront.path_buffers import SIDE
 from clpt.scene import Scene
 
 WORST = 99  # percentile of the squares

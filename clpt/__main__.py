@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from .cli import cli
-from .cli.process import allocator, failures, stopping, terminal
+from .cli.process import allocator, ending, terminal
 
 
 def main() -> None:
@@ -19,11 +19,11 @@ def main() -> None:
     os.environ.setdefault("POCL_WORK_GROUP_SPECIALIZATION", "0")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy's threads take .04 s to start
     try:
-        stopping.raise_at_signals()
-        stopping.end_at_second()
+        ending.raise_at_signals()
+        ending.end_at_second()
         status = run(sys.argv[1:])
     except KeyboardInterrupt as error:  # before `run` handles it, or a second Ctrl-C
-        status = stopping.ended_by(error)
+        status = ending.ended_by(error)
     sys.exit(status)
 
 
@@ -37,13 +37,13 @@ def run(arguments: Sequence[str]) -> int:
         status = cli.main(args=list(arguments), prog_name="clpt", standalone_mode=False)
         return status if isinstance(status, int) else 0
     except KeyboardInterrupt as error:
-        return stopping.ended_by(error)
+        return ending.ended_by(error)
     except Exception as error:
-        interrupt = stopping.interrupt_behind(error)
+        interrupt = ending.interrupt_behind(error)
         if interrupt is not None:
-            return stopping.ended_by(interrupt)
-        message, status = failures.message_of(error)
-    failures.complain(message)
+            return ending.ended_by(interrupt)
+        message, status = ending.message_of(error)
+    ending.complain(message)
     return status
 
 

@@ -17,7 +17,7 @@ import clpt
 from clpt import images, measured, scene
 from clpt.cli.display import Display
 from clpt.cli.files import checkpoints
-from clpt.cli.render import video
+from clpt.cli.render.frames import write_video
 from clpt.files import output_files
 from clpt.formats.meshes import spheres_curves
 from clpt.formats.native import motion
@@ -94,7 +94,7 @@ def frames() -> list[Path]:
 
 
 def film_of_frames(path: Path) -> None:
-    video.write(path, frames(), 24.0)
+    write_video(path, frames(), 24.0)
 
 
 WRITERS: dict[str, tuple[str, Writer]] = {

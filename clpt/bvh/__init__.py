@@ -10,10 +10,12 @@ from .build import (
     choose_layout,
     choose_tree,
     outgrows_caches,
+    rebuild_boxes,
+    refit,
+    refit_boxes,
 )
 from .building import Building
 from .layouts import ALONE, LAYOUTS, TREES, shapes_layout, traversal_text
-from .refit import rebuild_boxes, refit, refit_boxes
 
 __all__ = [
     "ALONE",

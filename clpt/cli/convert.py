@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 import click
-import numpy as np
 
 from ..choices import Missing
 from ..errors import SceneError
@@ -84,6 +83,8 @@ def _convert_scene(file: Path, target: Path, loading: Loading) -> None:
 
 def _with_maps(scene: Scene) -> Scene:
     """Return a scene whose sky and cube of images are a map in latitude and longitude."""
+    import numpy as np
+
     from ..scene import Film, Scene, cameras, integrators
     from ..scene.lights import Constant, Envmap
 

@@ -11,7 +11,7 @@ import click
 
 from ..formats import locate
 from .process import terminal
-from .process.failures import extra
+from .process.ending import extra
 
 if TYPE_CHECKING:
     import numpy as np

@@ -10,7 +10,7 @@ import click
 
 from ..errors import SceneError
 from .process import terminal
-from .process.failures import extra
+from .process.ending import extra
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -15,7 +15,7 @@ from ..errors import SceneError
 from .options.records import with_records
 from .options.values import Choice
 from .process import terminal
-from .process.failures import extra
+from .process.ending import extra
 
 if TYPE_CHECKING:
     import numpy as np

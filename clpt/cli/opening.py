@@ -25,9 +25,9 @@ from ..scene import Scene
 from .display import Display, device_names
 from .options.applied import changed
 from .options.scene_options import Machine, SceneOptions, Workers
-from .process import failures
+from .process import ending
 from .process.allocator import reusing
-from .process.stopping import prompt
+from .process.ending import prompt
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -50,8 +50,8 @@ def ending_at_limit() -> Iterator[None]:
 
     def end(said: str) -> None:
         dev.kill_compilers()
-        failures.complain(said)
-        os._exit(failures.BAD_INPUT)
+        ending.complain(said)
+        os._exit(ending.BAD_INPUT)
 
     before, compilers.at_limit = compilers.at_limit, end
     try:
@@ -313,10 +313,10 @@ class Watch:
         for name, of_worker in sorted(records.items())[:MOST_LISTED]:
             samples = sum(record.samples for record in of_worker)
             blocks = sum(record.blocks for record in of_worker)
-            failures = sum(record.failures for record in of_worker)
+            failed = sum(record.failures for record in of_worker)
             self._shown.note(
                 f"{name}  {samples:.5g} spp in {blocks} blocks, {of_worker[-1].rate:.3g} spp/s, "
-                f"{failures} failures"
+                f"{failed} failures"
             )
         lost = max((renderer.lost for renderer in renderers), default=0)
         self._shown.note(f"{len(records)} workers, {lost} lost")

@@ -60,7 +60,7 @@ LOOK_AT = Shorthand(
     {
         "origin": Param(roles.host("vector"), "where the camera is", "m"),
         "target": Param(roles.host("vector"), "what it looks at", "m"),
-        "up": Param(roles.host("vector"), "what is up in the picture; (0, 1, 0) if left out"),
+        "up": Param(roles.host("vector"), "the direction up in the picture; (0, 1, 0) if left out"),
     },
     ("to_world",),
     _looking,
@@ -244,14 +244,14 @@ class Perspective(Camera):
     has_axis: ClassVar[bool] = True
 
     fov: float = real(45.0, "field of view along `fov_axis`", "degrees", 1e-3, 179.999)
-    fov_axis: str = choice("x", "which side `fov` spans", ("x", "y", "smaller", "larger"))
+    fov_axis: str = choice("x", "the side that `fov` spans", ("x", "y", "smaller", "larger"))
     near: float = member(1e-2, "nearest distance seen", "m", low=0.0)
     far: float = member(1e4, "farthest distance seen", "m", low=0.0)
     offset_x: float = real(
-        0.0, "the principal point lies at 1/2 less this from the left, in widths of the film"
+        0.0, "shift of the principal point: it lies at 1/2 - offset from the left, in widths"
     )
     offset_y: float = real(
-        0.0, "the principal point lies at 1/2 less this from the top, in heights of the film"
+        0.0, "shift of the principal point: it lies at 1/2 - offset from the top, in heights"
     )
 
     def extent(self, width: float, height: float) -> tuple[float, float]:
@@ -305,9 +305,7 @@ class ThinLens(Perspective):
 
     aperture_radius: float = member(0.1, "of the lens", "m", low=0.0)
     focus_distance: float = member(1.0, "of the plane in focus", "m", low=1e-6)
-    glass: IndexLike = index(
-        1.5, "of the lens; one that disperses focuses each wavelength elsewhere"
-    )
+    glass: IndexLike = index(1.5, "of the lens; with dispersion each wavelength has its own focus")
     focal_length: float = member(
         0.05, "of the lens at 587.56 nm; matters to `glass`", "m", low=1e-6
     )
@@ -338,23 +336,21 @@ class Lens(Camera):
 
     lens: Prescription | str = host("double_gauss", "its surfaces", form="lens")
     film_width: float = real(0.036, "of the film; its height follows from the picture's", "m", 1e-6)
-    focus_distance: float = real(1e4, "of what is sharp, from the film", "m", low=1e-6)
+    focus_distance: float = real(1e4, "from the film to the plane in focus", "m", low=1e-6)
     film_shift: float = real(0.0, "of the film away from the lens, out of that focus", "m")
-    f_number: float = real(
-        0.0, "focal length over entrance pupil; 0: as far open as it is", low=0.0
-    )
+    f_number: float = real(0.0, "focal length over entrance pupil; 0: wide open", low=0.0)
     blades: int = host(0, "of the diaphragm, from 3 on; 0: it is round", form="integer")
-    blade_angle: float = real(0.0, "by which the diaphragm is turned", "degrees")
-    losses: bool = flag(False, "surfaces reflect a part of the light, which is lost")
+    blade_angle: float = real(0.0, "the diaphragm is turned by it", "degrees")
+    losses: bool = flag(False, "lens surfaces reflect a part of the light, and it is lost")
     coating: str = choice(
         "none", "of surfaces between glass and air that have none", tuple(lenses.COATINGS)
     )
     ghosts: float = real(
-        0.0, "share of the samples that follow light which two surfaces reflect", low=0.0, high=0.9
+        0.0, "share of the samples for light that two lens surfaces reflect", low=0.0, high=0.9
     )
     exposure: str = choice(
         "relative",
-        "what radiance 1 makes of the film's middle: 1, or its irradiance, as pbrt has it",
+        "value of radiance 1 in the middle of the film: 1, or its irradiance, as in pbrt",
         ("relative", "irradiance"),
     )
     unit: float = real(1e-3, "a millimetre of the lens in the scene", "m", low=1e-12)
@@ -459,9 +455,9 @@ class Orthographic(Camera):
 class Spherical(Camera):
     """All directions: the film is a map in latitude and longitude, +y up, +z in its middle.
 
-    The middle of row i of h rows lies at pi (i + 1/2) / h from +y. Rows of an `envmap` lie at
-    pi i / (h - 1), from pole to pole: the film, shown as an `envmap`, is stretched by half a row at
-    the poles: 3 % of the height with 16 rows, invisible with 1024.
+    The middle of row i of h rows lies at pi (i + 1/2) / h from +y. Rows of an `envmap` lie at pi i
+    / (h - 1), from pole to pole. So the film as an `envmap` is stretched by half a row at the
+    poles. That is 3 % of the height with 16 rows, and invisible with 1024.
     """
 
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
@@ -527,16 +523,17 @@ class Matrix(Camera):
 class Rays(Camera):
     """A list of rays: pixel i of the film, row by row, is the radiance along ray i mod n.
 
-    A film of several times n pixels measures each ray as often, independently. Only a `box` filter
-    keeps pixels apart; with a radius of 0.25 even the last bit of a position on the film does.
-    `to_world` and `motion` move all rays. The camera's medium is that around their mean origin.
+    If a film has several times n pixels, it measures each ray several times, independently. Only a
+    `box` filter keeps pixels apart. With a radius of 0.25 it does so also where positions on the
+    film are rounded. `to_world` and `motion` move all rays. The camera's medium is the medium
+    around their mean origin.
     """
 
     shorthands = ()
 
     origins: ArrayLike = host(((0.0, 0.0, 0.0),), "(n, 3), where rays begin", "m", form="rows3")
     directions: ArrayLike = host(((0.0, 0.0, 1.0),), "(n, 3), or a row for all", form="rows3")
-    weights: ArrayLike = host(1.0, "(n,) factors, or one for all", form="number_or_list")
+    weights: ArrayLike = host(1.0, "(n,) factors, or a factor for all", form="number_or_list")
 
     def _origins(self) -> NDArray[np.float64]:
         return vectors(self.origins, "rays.origins").reshape(-1, 3)
@@ -572,7 +569,7 @@ class Rays(Camera):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Calibrated(Camera):
-    """A camera as calibration describes it: intrinsics in pixels, and a model of its distortion.
+    """A calibrated camera: intrinsics in pixels, and a model of the distortion.
 
     Camera space and pixels are OpenCV's in `project`, `unproject` and the coefficients: x right,
     y down, z forward; (0, 0) is the middle of the top left pixel. A film of another size than

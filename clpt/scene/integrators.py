@@ -95,10 +95,10 @@ class Path(Integrator):
 
     `max_depth` counts surfaces and the light: 1 shows only lights, 2 adds direct light.
 
-    With `light_paths` paths start at lights too: each vertex is joined to the camera, and weighed
-    against the camera's paths. Caustics that the camera sees directly converge then. The camera
-    must be `perspective` or `thin_lens`. A number below 1 is a share: at 0.5 every second sample
-    has a light path. "auto" starts light paths where a surface is specular and a light is small.
+    With `light_paths` some paths start at lights. Each vertex of them is connected to the camera,
+    with a weight (MIS). So caustics converge that the camera sees directly. The camera must be
+    `perspective` or `thin_lens`. A number below 1 is a share: with 0.5 every second sample has a
+    light path. "auto" starts light paths if a surface is specular and a light is small.
     """
 
     has_escape_rays = True
@@ -141,12 +141,11 @@ class Path(Integrator):
 class Vcm(Integrator):
     """`path` with light paths and photons: vertex connection and merging (Georgiev 2012).
 
-    Each pass is a sample of every pixel. Where a light path meets a surface behind something sharp
-    it leaves a photon, and paths from the camera gather the photons of their pass around them. So
-    caustics converge that are seen in mirrors and through glass, also those of points and suns. In
-    homogeneous media photons are gathered along rays (Krivanek 2014).
-    What is gathered is blurred by the radius, which shrinks from pass to pass. A `max_depth` of -1
-    or beyond 65 counts as 65.
+    A pass is a sample of every pixel. A light path that has met a specular surface leaves photons
+    on later surfaces. Paths from the camera gather the photons of their pass in a radius around
+    their vertices. So caustics converge in mirrors and behind glass, also those of points and suns.
+    In homogeneous media photons are gathered along rays (Krivanek 2014). The radius blurs the
+    gathered light, and shrinks from pass to pass. A `max_depth` of -1 or beyond 65 counts as 65.
     """
 
     has_photons = True
@@ -178,8 +177,8 @@ class Vcm(Integrator):
 class Auto(Integrator):
     """The integrator that suits the scene: `path`, `path` with light paths, or `vcm`.
 
-    Light paths where something is specular and a light is small; photons too where the camera sees
-    mirrors or clear glass, and the scene asks for no limit of noise and no denoiser.
+    It uses light paths if a surface is specular and a light is small. It also uses photons if the
+    camera sees mirrors or clear glass, and the scene has no limit of noise and no denoiser.
     """
 
     asks_photons = True
@@ -226,11 +225,11 @@ class Whitted(Integrator):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParticleTracer(Integrator):
-    """Light tracing: paths start at lights, and every vertex is joined to the camera.
+    """Light tracing: paths start at lights, and every vertex is connected to the camera.
 
-    Finds caustics, also of the smallest lights; views through glass and in mirrors stay black. A
-    sample per pixel is a light path for every pixel of the film.
-    The camera must be `perspective` or `thin_lens`.
+    It finds caustics, also of the smallest lights. Mirrors and smooth glass are black. A sample per
+    pixel is a light path for every pixel of the film. The camera must be `perspective` or
+    `thin_lens`.
     """
 
     from_lights_alone = True
@@ -263,8 +262,8 @@ class Sobol(Sampler):
 class Zsobol(Sampler):
     """A single Sobol sequence for all pixels, so that the remaining noise is fine-grained.
 
-    Neighbours err in opposite directions (Ahmed and Wonka 2020), best at the scene's `spp`; a
-    pixel by itself has the error of `sobol`.
+    The errors of neighbouring pixels have opposite signs (Ahmed and Wonka 2020), best at the
+    scene's `spp`. The error of a single pixel is that of `sobol`.
     """
 
 
@@ -407,12 +406,12 @@ def _width_and_height(size: tuple[int, int]) -> dict[str, int]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Film(Kind):
-    """The picture that is recorded: size, mode, wavelengths, filter, and how light becomes colour.
+    """The recorded picture: size, mode, wavelengths, filter, and the conversion of light to colour.
 
-    With `bands` a pixel holds the mean radiance [W m^-2 sr^-1 nm^-1] of as many equal parts of the
-    range of wavelengths. `white_balance` makes that illuminant the white of `output_space`
-    (Bradford); without it colours are as the sensor tells them. A `sensor` other than cie1931 and
-    `bands` need the spectral mode.
+    With `bands` the range of wavelengths has so many equal parts, and a pixel holds the mean
+    radiance of each part [W m^-2 sr^-1 nm^-1]. `white_balance` makes its illuminant the white of
+    `output_space` (Bradford). Without it colours are those of the sensor. `bands` and a `sensor`
+    other than cie1931 need the spectral mode.
     """
 
     shorthands = (
@@ -435,8 +434,9 @@ class Film(Kind):
     filter: Filter = host(Box(), "pixel filter", form="filter")
     filtering: str = choice(
         "auto",
-        "splatting: a sample serves all pixels whose filters hold it; importance: one pixel, at a "
-        "place drawn from its filter; auto: splatting, but importance with `noise`",
+        "splatting: a sample counts for all pixels whose filters reach it; importance: for a "
+        "single pixel, at a point drawn from the filter; auto: splatting, but importance with "
+        "`noise`",
         ("auto", "splatting", "importance"),
     )
     lambda_min: float = real(360.0, "shortest wavelength", "nm", SHORTEST, LONGEST)
@@ -447,12 +447,12 @@ class Film(Kind):
         ("auto", "visible", "scene"),
     )
     sensor: str | Sensor = host(
-        "cie1931", "what responds: cie1931, cie1964 or a clpt.spectra.Sensor", form="sensor"
+        "cie1931", "its curves: cie1931, cie1964 or a clpt.spectra.Sensor", form="sensor"
     )
     bands: int = host(0, "of a spectral picture; 0: a picture of three colours")
     white_balance: str | float | tuple[float, float] = host(
         "none",
-        "what becomes white: none, an illuminant, a colour temperature [K], or (x, y)",
+        "the colour that becomes white: none, an illuminant, a temperature [K], or (x, y)",
         form="white_balance",
     )
     output_space: str = choice("rec709", "colour space of the picture", spaces.SPACES)
@@ -461,7 +461,7 @@ class Film(Kind):
         0.0, "brightens pictures for screens; other files keep the light", "stops", -64.0, 64.0
     )
     alpha: bool = host(
-        False, "transparent: the camera sees no sky, and a fourth channel tells what is covered"
+        False, "transparent: the camera sees no sky, and a fourth channel holds the coverage"
     )
     layers: tuple[str, ...] = host(
         (), f"beside the picture: any of {', '.join(LAYERS)}", form="names"

@@ -216,7 +216,7 @@ STRENGTHS = ("power", "lumens", "candela", "lux", "nits")  # a lamp has at most 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Area(PoweredLamp):
-    """A surface that emits from its front side, or from both, evenly in all directions."""
+    """A surface that emits uniformly in all directions, from its front or from both sides."""
 
     reach = "surface"
 
@@ -224,7 +224,8 @@ class Area(PoweredLamp):
     nits: float | None = _to_the_eye("its luminance", "cd/m^2")
     two_sided: bool = flag(False, "True: its back emits too")
     visible: bool = flag(
-        True, "False: no ray sees it shine; as with a point, only what it shines on shows its light"
+        True,
+        "False: rays do not see the light, as they do not see a point; surfaces still receive it",
     )
 
     def extent(self, area: float) -> float:
@@ -236,7 +237,7 @@ class Area(PoweredLamp):
 class DirectionalArea(PoweredLamp):
     """A surface that emits from its front side along its normal only: a flat surface emits a beam.
 
-    Only the `particle_tracer` finds it. The camera does not see it shine.
+    Only the `particle_tracer` finds its light. The surface itself looks dark.
     """
 
     reach = "surface"
@@ -254,7 +255,7 @@ class DirectionalArea(PoweredLamp):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Point(PoweredLamp):
-    """A point that emits evenly."""
+    """A point that emits uniformly in all directions."""
 
     position: Vector3 = host((0.0, 0.0, 0.0), "where it is", "m")
     intensity: SpectrumLike = emission(1.0, "radiant intensity", "W sr^-1 nm^-1")
@@ -292,7 +293,7 @@ class Spot(PoweredLamp):
     to_world: Matrix4 = host(np.eye(4), "placement, (4, 4); shines along its +z")
     intensity: SpectrumLike = emission(1.0, "radiant intensity on the axis", "W sr^-1 nm^-1")
     candela: float | None = _to_the_eye("luminous intensity on the axis", "cd")
-    cutoff: float = real(20.0, "half angle beyond which it is dark", "degrees", 0.0, 180.0)
+    cutoff: float = real(20.0, "half angle of the cone; beyond it is dark", "degrees", 0.0, 180.0)
     beam_width: float = real(15.0, "half angle of full intensity", "degrees", 0.0, 180.0)
     edge: str = choice(
         "linear",
@@ -300,7 +301,7 @@ class Spot(PoweredLamp):
         SPOT_EDGES,
     )
     image: Textured = reflectance(
-        1.0, "what its light passes through; a texture fills the square around a cone below 90"
+        1.0, "a filter in its light; a texture fills the square around a cone below 90"
     )
 
     @property
@@ -351,15 +352,17 @@ class Spot(PoweredLamp):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Projector(Lamp):
-    """A point that throws an image along +z of `to_world`: a pinhole camera in reverse."""
+    """A point that projects an image along +z of `to_world`: a pinhole camera in reverse."""
 
-    image: Textured = reflectance(1.0, "what it shows, upright along +y; a bitmap may go beyond 1")
+    image: Textured = reflectance(1.0, "the picture, upright along +y; a bitmap may go beyond 1")
     irradiance: SpectrumLike = emission(
         1.0, "where the image is 1, in the middle, a metre away", "W m^-2 nm^-1"
     )
     lux: float | None = _to_the_eye("illuminance there", "lx")
     fov: float = real(45.0, "angle that the image's width takes", "degrees", 1e-3, 179.0)
-    aspect: float = real(0.0, "width over height; 0: that of the image, 1 if it has none", low=0.0)
+    aspect: float = real(
+        0.0, "width over height; 0: as the image has it, or 1 without an image", low=0.0
+    )
     to_world: Matrix4 = host(np.eye(4), "placement, (4, 4), without a shear")
 
     @property
@@ -391,10 +394,10 @@ class Projector(Lamp):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Goniometric(PoweredLamp):
-    """A point whose intensity depends on the direction, as an image in latitude and longitude says.
+    """A point whose intensity by direction is an image in latitude and longitude.
 
-    Directions lie in the image as in that of an envmap. Its first and last rows hold on to the
-    poles, unless its `wrap_v` says other.
+    Directions lie in the image as in that of an envmap. The first and the last row continue to the
+    poles, unless `wrap_v` is set.
     """
 
     intensity: SpectrumLike = emission(
@@ -428,7 +431,7 @@ class Directional(Lamp):
 
     reach = "distant"
 
-    direction: Vector3 = host((0.0, 0.0, -1.0), "in which the light travels", form="direction")
+    direction: Vector3 = host((0.0, 0.0, -1.0), "the light travels along it", form="direction")
     irradiance: SpectrumLike = emission(1.0, "on a surface that faces it", "W m^-2 nm^-1")
     lux: float | None = _to_the_eye("illuminance of a surface that faces it", "lx")
 
@@ -463,7 +466,7 @@ class Envmap(Light):
     scale: float = real(1.0, "factor on the radiance", low=0.0)
     to_world: Matrix4 = host(np.eye(4), "rotation, (4, 4)")
     mis_compensation: bool = flag(
-        False, "True: rays are sent to its bright parts, and what materials scatter finds the rest"
+        False, "True: shadow rays go to its bright parts; rays from materials find the other parts"
     )
 
 
@@ -486,8 +489,8 @@ class CubeMap(Light):
 class Sky(Light):
     """The sky and the sun of a clear day or dusk, by the physics of air over a round earth.
 
-    In the light's own space +y is up. Below the horizon lies an even ground. Its light is physical:
-    1 is no day's brightness, so an `exposure` goes with it at dusk. See docs/sky.md.
+    In the light's own space +y is up. Below the horizon is a ground of a single colour. The light
+    is physical, so the brightness changes with the sun: set an `exposure` at dusk. See docs/sky.md.
     """
 
     reach = "infinite"
@@ -501,10 +504,10 @@ class Sky(Light):
     altitude: float = real(0.0, "of the observer above the ground", "m", 0.0, 60000.0)
     aerosol: float = real(0.1, "optical depth of haze, straight up at 550 nm", low=0.0, high=2.0)
     exponent: float = real(
-        1.3, "Angstrom's, by which haze thins with wavelength", low=0.0, high=4.0
+        1.3, "Angstrom's: haze thins with the wavelength to this power", low=0.0, high=4.0
     )
     aerosol_albedo: float = real(0.95, "share of it that haze scatters", low=0.0, high=1.0)
-    asymmetry: float = real(0.76, "mean cosine of what haze scatters", low=-0.9, high=0.9)
+    asymmetry: float = real(0.76, "mean cosine of the scattering by haze", low=-0.9, high=0.9)
     ozone: float = real(300.0, "column of ozone", "Dobson units", 0.0, 1000.0)
     ground: SpectrumLike = reflectance(0.2, "albedo of the ground around", textured=False)
     sky_scale: float = real(1.0, "factor on the sky and the ground", low=0.0)

@@ -44,7 +44,7 @@ class Isotropic(Phase):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HenyeyGreenstein(Phase):
-    """Henyey and Greenstein 1941: a single number is the mean cosine."""
+    """Henyey and Greenstein 1941, by the mean cosine."""
 
     chromatic = True
 
@@ -53,9 +53,9 @@ class HenyeyGreenstein(Phase):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Draine(Phase):
-    """Draine 2003: from Henyey and Greenstein's, with alpha 0, to Cornette and Shanks's, with 1.
+    """Draine 2003: Henyey and Greenstein's with alpha 0, Cornette and Shanks's with alpha 1.
 
-    With g of 0 and alpha of 1 it is Rayleigh's. Jendersie and d'Eon 2023 fit water drops by it.
+    With g = 0 and alpha = 1 it is Rayleigh's. Jendersie and d'Eon 2023 fit it to drops of water.
     """
 
     chromatic = True
@@ -69,9 +69,9 @@ class Tabulated(Phase):
     """Measured or calculated: a table over the cosine of the scattering angle.
 
     values: numbers (n,) from 0, in any unit, or a row for each wavelength (m, n); cosines: of each
-    number, ascending from -1 to 1, by default even; wavelengths: of each row [nm], ascending. It is
-    linear between, holds its end rows, and is scaled so that its integral over directions is 1. Its
-    parameters become float64 arrays, (m, n) and (n,) and (m,).
+    number, ascending from -1 to 1, by default even; wavelengths: of each row [nm], ascending. The
+    table is linear between its entries. Beyond the end rows it is constant. It is scaled so that
+    its integral over directions is 1. The parameters become float64 arrays, (m, n), (n,) and (m,).
 
     Raises SceneError for arrays of other forms or values.
     """
@@ -80,7 +80,9 @@ class Tabulated(Phase):
 
     values: ArrayLike = angular("how much goes where, over the cosine; a row for each wavelength")
     cosines: ArrayLike = host((), "of each value, from -1 to 1; none: even", form="numbers")
-    wavelengths: ArrayLike = host((), "of each row; none: one row is of all", "nm", form="numbers")
+    wavelengths: ArrayLike = host(
+        (), "of each row; none: a single row for all wavelengths", "nm", form="numbers"
+    )
 
     def check(self) -> None:
         """Check the three arrays, and scale the rows."""
@@ -181,12 +183,12 @@ class Rayleigh(Phase):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reradiating(Phase):
-    """Isotropic scattering with fluorescence: light also leaves at longer wavelengths than it came.
+    """Isotropic scattering with fluorescence: light also leaves at longer wavelengths.
 
-    The share `reflectance` of colliding light keeps its wavelength; `reradiation` is the emission
-    at other wavelengths. The particles collide with all wavelengths alike; for absorption that
-    depends on the wavelength use `dyed`. In RGB mode its colour is its colour under D65, at most
-    white.
+    The share `reflectance` of the colliding light keeps its wavelength. `reradiation` is the
+    emission at other wavelengths. The particles collide with all wavelengths equally. If the
+    absorption depends on the wavelength, use `dyed`. In RGB mode the colour is that under D65, at
+    most white.
     """
 
     fluoresces = True
@@ -194,7 +196,7 @@ class Reradiating(Phase):
     reflectance: SpectrumLike = reflectance(
         0.5, "share of the light that keeps its wavelength", textured=False
     )
-    reradiation: Reradiation | None = reradiation(None, "what is given out at other wavelengths")
+    reradiation: Reradiation | None = reradiation(None, "light that leaves at other wavelengths")
     amount: float = real(1.0, "factor on the re-radiation", low=0.0, high=1.0)
 
     def check(self) -> None:

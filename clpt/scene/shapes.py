@@ -69,7 +69,9 @@ class Shape(Kind):
     emission: PoweredLamp | None = host(None, "an `area` light, or None", form="area_light")
     interior: Medium | None = host(None, "medium behind its front, or None", form="medium")
     exterior: Medium | None = host(None, "medium before its front, or None", form="medium")
-    priority: int = host(0, "where bodies overlap, that of the highest fills the place")
+    priority: int = host(
+        0, "where bodies overlap, the body with the highest priority fills the place"
+    )
     to_world: Matrix4 | OnDevice = host(np.eye(4), "placement, (4, 4)")
     motion: Keys | None = host(None, "moves it after `to_world`, or None", form="keys")
     flip_normals: bool = host(False, "turn the front to the other side")
@@ -129,7 +131,7 @@ class Mesh(Shape):
         None, "heights by uv, along smooth normals, after subdivision; or None", form="texture"
     )
     displacement_scale: float = host(1.0, "factor on them", "m")
-    displacement_edge: float = host(0.05, "longest edge of what is displaced, in the world", "m")
+    displacement_edge: float = host(0.05, "longest edge of displaced triangles, in the world", "m")
 
     def at_time(self, time: float) -> Mesh:
         """Return the mesh with the vertices and normals of its deformation at a time [s]."""
@@ -188,7 +190,9 @@ class Sphere(Shape):
     """A sphere; uv from the azimuth and polar angle about z."""
 
     center: Vector3 = host((0.0, 0.0, 0.0), "before `to_world`", "m")
-    radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m", positive=True)
+    radius: float = host(
+        1.0, "radius before `to_world`, which may scale it evenly", "m", positive=True
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -204,7 +208,7 @@ class Spheres(Shape):
         None, "(n, 3) float32 before `to_world`; (n, 4): with the radii", "m", form="rows3"
     )
     radii: Any = host(
-        1.0, "(n,), or one of all; `to_world` may scale them, evenly", "m", form="number_or_list"
+        1.0, "(n,), or one number; `to_world` may scale them, evenly", "m", form="number_or_list"
     )
     attributes: Mapping[str, Any] = host(
         {}, "name that begins with vertex_ -> (n, 1 or 3) float32, per sphere", form="attributes"
@@ -241,20 +245,23 @@ class Cylinder(Shape):
 
     p0: Vector3 = host((0.0, 0.0, 0.0), "start of the axis", "m")
     p1: Vector3 = host((0.0, 0.0, 1.0), "end of the axis", "m")
-    radius: float = host(1.0, "before `to_world`, which may scale it evenly", "m", positive=True)
+    radius: float = host(
+        1.0, "radius before `to_world`, which may scale it evenly", "m", positive=True
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curves(Shape):
-    """Strands of a round cross-section, as hair: what spheres along a line cover.
+    """Strands of a round cross-section, such as hair: the space that spheres along a line fill.
 
-    u runs around, v along, from 0 to 1 over all pieces of all strands. Where a strand begins, u is
-    as in Mitsuba: 1/4 on the side of +z of the world, or of +y if the strand goes along z. From
-    there it goes on without a twist, while Mitsuba looks for +z anew at each point; for straight
-    strands, and those in a plane with z or across z, this is the same. A B-spline is
-    uniform and cubic; a Bezier strand has 4, 7, 10, ... points. `to_world` scales radii too. Curves
-    that emit light, that deform, that a transform stretches, or that more than 16 instances share
-    become tubes of triangles, which are open at the ends; others end in half spheres.
+    u runs around a strand. v runs along, from 0 to 1 over all pieces of all strands. At the
+    beginning of a strand u is as in Mitsuba: 1/4 on the side of +z of the world, or of +y if the
+    strand goes along z. From there u is carried on without a twist. Mitsuba looks for +z at each
+    point instead. For straight strands, and for strands in a plane with z or across z, both are the
+    same. A B-spline is uniform and cubic. A Bezier strand has 4, 7, 10, ... points. `to_world`
+    scales radii too. Strands end in half spheres. Some curves become tubes of triangles, which are
+    open at the ends: curves that emit light, that deform, that a transform stretches, or that more
+    than 16 instances share.
     """
 
     is_open = True
@@ -263,9 +270,9 @@ class Curves(Shape):
 
     points: Any = host(None, "(n, 4) of all strands: x y z and the radius", "m", form="rows4")
     lengths: Any = host(
-        (), "points of each strand, in their order; empty: all are of one", form="lengths"
+        (), "points of each strand, in their order; empty: a single strand", form="lengths"
     )
-    basis: str = choice("bspline", "what the points mean", BASES)
+    basis: str = choice("bspline", "meaning of the points", BASES)
     deformation: Deformation | None = host(
         None, "where the points are at times, or None", form="deformation"
     )
@@ -281,10 +288,10 @@ def _ball() -> np.ndarray:
 class SdfGrid(Shape):
     """The surface where a signed distance on a grid over the unit cube is zero; as triangles.
 
-    Between the grid's points, which lie on the faces of the cube too, the distance is trilinear.
-    The front is where it is positive. Corners of triangles lie on that surface. Inside, a triangle
-    is off it by at most .005 of a cell on a ball 11 cells across, and .09 at a sharp edge, with 2
-    `pieces`; by a quarter of that with twice the pieces.
+    The outer points of the grid lie on the faces of the cube. Between points the distance is
+    trilinear. The distance is positive in front of the surface. Corners of triangles lie on the
+    surface. The inside of a triangle is off the surface by at most .005 of a cell on a ball 11
+    cells across, and by .09 at a sharp edge, with 2 `pieces`. Twice the pieces divide this by 4.
     uv are 0 everywhere: a texture is constant over it.
     """
 
@@ -326,7 +333,7 @@ class Group:
 class Instance(Shape):
     """A group at a place; many share its triangles. In a mirror a front stays a front."""
 
-    group: Group = host(None, "what is placed: a name in the scene's `groups`", form="group")
+    group: Group = host(None, "the shapes: a name in the scene's `groups`", form="group")
     # The surfaces are those of the group's shapes.
     material: Material = field(default=cast(Material, None), init=False, repr=False)
     emission: PoweredLamp | None = field(default=None, init=False, repr=False)

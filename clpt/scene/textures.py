@@ -108,13 +108,14 @@ class Solid(Texture):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Bitmap(Placed):
-    """An image; v = 0 is its bottom row. Where a number is asked for it takes `channel`.
+    """An image; v = 0 is its bottom row. A parameter that is a number takes `channel`.
 
-    A pixel's samples average what lies within it. That is exact, but noisy where few samples meet
-    fine textures far away. The filter "trilinear" takes smaller copies of the image there, its MIP
-    levels: less noise, but a blur where a surface is seen at a grazing angle. The pixel's width
-    grows along the path as a cone; rough surfaces widen it much, mirrors do not. Lights, masks,
-    blends, images of spectra in spectral mode and mappings other than "uv" take no copies.
+    The samples of a pixel average the texture in the pixel. The mean is exact. It is noisy where
+    few samples meet a fine texture far away. The filter "trilinear" takes smaller copies of the
+    image there (MIP levels). They have less noise, but blur surfaces at grazing angles. The width
+    of a pixel grows along the path as a cone. Rough surfaces widen the cone much, and mirrors do
+    not. Lights, masks, blends, images of spectra in spectral mode and mappings other than "uv" use
+    no copies.
     """
 
     image: ImageLike | None = host(
@@ -133,7 +134,9 @@ class Bitmap(Placed):
     wrap: str = choice("repeat", "outside [0, 1]; zero: black, and no alpha", WRAPS)
     wrap_v: str | None = choice(None, "the same for v alone; none: as `wrap`", WRAPS)
     channel: str = choice(
-        "luminance", "what a number is taken from; a is never decoded", ("luminance", *"rgba")
+        "luminance",
+        "channel of the image for a number; `a` is never decoded",
+        ("luminance", *"rgba"),
     )
 
     @property
@@ -236,12 +239,12 @@ class Checkerboard(Placed):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Product(Texture):
-    """The product of two values; in an emission the second is a factor, not a light of its own."""
+    """The product of two values. In an emission the second value is a factor, and no light."""
 
     first: Textured = factor(1.0, "one of them")
     second: Textured = factor(1.0, "the other")
     rgb: bool = host(
-        False, "True: colours are multiplied as linear Rec. 709, and the product made a spectrum"
+        False, "True: colours are multiplied as linear Rec. 709, and the product becomes a spectrum"
     )
 
     @property
@@ -385,12 +388,12 @@ class MeshAttribute(Texture):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Dots(Placed):
-    """1 within round dots, 0 elsewhere: half of the cells of uv around whole numbers have a dot."""
+    """1 in round dots, and 0 elsewhere. Half of the cells of uv around whole numbers have a dot."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Checkers(Solid):
-    """0 and 1 by turns in cubes of unit size."""
+    """Cubes of unit size that are 0 and 1 alternately."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -400,8 +403,8 @@ class Noise(Solid):
     pattern: str = choice(
         "fbm", "fbm: octaves; wrinkled: their absolute values; windy: waves, six octaves", PATTERNS
     )
-    octaves: int = host(8, "how many, each 1.99 times as fine as the one before")
-    roughness: float = host(0.5, "how strong each is beside the one before")
+    octaves: int = host(8, "their number; each is 1.99 times as fine as the octave before")
+    roughness: float = host(0.5, "strength of each octave over that of the octave before")
 
     def check(self) -> None:
         super().check()
@@ -417,7 +420,7 @@ class Marble(Solid):
     """Marble with veins along y, as pbrt's."""
 
     octaves: int = host(8, "of the noise that disturbs the veins")
-    roughness: float = host(0.5, "how strong each octave is beside the one before")
+    roughness: float = host(0.5, "strength of each octave over that of the octave before")
     scale: float = host(1.0, "how fine the pattern is")
     variation: float = host(0.2, "how much the veins are disturbed")
 

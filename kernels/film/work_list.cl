@@ -1,4 +1,4 @@
-/* The next pixel and sample of a slot (clpt/render/wavefront/work_list.py).
+/* The next pixel and sample of a slot (clpt/render/wavefront/path_buffers.py).
  *
  * The slots of a film plane share its pixels: each has a list of pixels and renders all samples of the plane in a pixel
  * before it goes to the next. `work_list` holds, `padded_pixels` words each: the pixel after each pixel, the end of

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from clpt.cli.process import stopping
+from clpt.cli.process import ending
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 SPINS = """
@@ -36,7 +36,7 @@ with stopping.stops():
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, *stopping.ENDING], ids=lambda n: n.name)
+@pytest.mark.parametrize("number", [signal.SIGINT, *ending.ENDING], ids=lambda n: n.name)
 def test_a_second_signal_ends_a_process_whose_kernel_does_not_end(number: signal.Signals) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", SPINS], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -46,9 +46,9 @@ def test_a_second_signal_ends_a_process_whose_kernel_does_not_end(number: signal
         assert process.stdout.readline() == "begun\n"
         process.send_signal(number)
         with pytest.raises(subprocess.TimeoutExpired):  # the first one waits for what is whole
-            process.wait(2 * stopping.GRACE)
+            process.wait(2 * ending.GRACE)
         process.send_signal(number)
         _, told = process.communicate(timeout=60)  # without the thread it never ends
     finally:
         process.kill()
-    assert process.returncode == stopping.STATUS + number and "interrupted" in told
+    assert process.returncode == ending.STATUS + number and "interrupted" in told

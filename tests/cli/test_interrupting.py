@@ -16,7 +16,7 @@ from clpt.__main__ import run
 from clpt.cli import opening
 from clpt.cli.files import checkpoints, outputs, targets
 from clpt.cli.options import scene_options
-from clpt.cli.process import stopping
+from clpt.cli.process import ending
 from clpt.cli.render import picture
 from tests.cli import interrupting
 
@@ -42,9 +42,9 @@ POINTS = {
 @pytest.fixture
 def heeded():
     """The signals as a command has them."""
-    numbers = signal.SIGINT, *stopping.ENDING
+    numbers = signal.SIGINT, *ending.ENDING
     before = {number: signal.signal(number, signal.SIG_DFL) for number in numbers}
-    stopping.raise_at_signals()
+    ending.raise_at_signals()
     yield
     for number, action in before.items():
         signal.signal(number, action)

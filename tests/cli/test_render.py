@@ -24,7 +24,7 @@ from clpt.cli.files import outputs
 from clpt.cli.files import targets as names
 from clpt.cli.options.applied import changed
 from clpt.cli.options.changes import SceneChanges
-from clpt.cli.process import stopping
+from clpt.cli.process import ending
 from clpt.cli.render import picture
 from clpt.cli.render.passes import render_samples
 from clpt.errors import DeviceError, SceneError
@@ -100,7 +100,7 @@ def test_a_limit_of_time_leaves_a_whole_picture(tmp_path, capsys, monkeypatch):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signals for other processes")
-@pytest.mark.parametrize("number", [signal.SIGINT, *stopping.ENDING], ids=lambda n: n.name)
+@pytest.mark.parametrize("number", [signal.SIGINT, *ending.ENDING], ids=lambda n: n.name)
 def test_a_signal_writes_what_is_there(tmp_path, number):
     path = tmp_path / "out.npy"
     command = [sys.executable, "-m", "clpt", "render", CORNELL, "-o", str(path), "--time", "1h"]
@@ -121,7 +121,7 @@ def test_a_signal_writes_what_is_there(tmp_path, number):
 
 def listen() -> None:
     """Have signals as a terminal gives them, whatever the tests run under."""
-    for number in (signal.SIGINT, *stopping.ENDING):
+    for number in (signal.SIGINT, *ending.ENDING):
         signal.signal(number, signal.SIG_DFL)
 
 

@@ -15,7 +15,7 @@ from rich.console import Console
 from clpt.cli import display
 from clpt.cli.display import Bar, Lines, clock, device_name, device_names, figures
 from clpt.cli.opening import DEVICE_SECONDS
-from clpt.cli.process import stopping
+from clpt.cli.process import ending
 from clpt.cli.render import report
 from clpt.cli.render.passes import GROWTH, End, pass_size, render_samples
 from clpt.render.progress import Progress
@@ -66,9 +66,9 @@ def test_the_limit_ends_a_pass():
 @pytest.fixture
 def listening():
     """Signals as the command sets them, though a shell ignores Ctrl-C in the background."""
-    numbers = (signal.SIGINT, *stopping.ENDING)
+    numbers = (signal.SIGINT, *ending.ENDING)
     before = {number: signal.signal(number, signal.SIG_DFL) for number in numbers}
-    stopping.raise_at_signals()
+    ending.raise_at_signals()
     yield
     for number, action in before.items():
         signal.signal(number, action)
@@ -77,7 +77,7 @@ def listening():
 @pytest.mark.skipif(
     threading.current_thread() is not threading.main_thread(), reason="signals need it"
 )
-@pytest.mark.parametrize("number", [signal.SIGINT, *stopping.ENDING], ids=lambda n: n.name)
+@pytest.mark.parametrize("number", [signal.SIGINT, *ending.ENDING], ids=lambda n: n.name)
 def test_a_signal_ends_the_rendering_and_a_second_one_the_program(listening, number):
     shown = []
 
@@ -87,24 +87,24 @@ def test_a_signal_ends_the_rendering_and_a_second_one_the_program(listening, num
             signal.raise_signal(number)
 
     before = signal.getsignal(number)
-    with stopping.stops() as stopped:
+    with ending.stops() as stopped:
         render_samples(Counting(), End(1000, stopped=stopped), press)
     assert len(shown) == 9 and stopped == [number]
     assert signal.getsignal(number) is before
 
-    with pytest.raises(KeyboardInterrupt) as raised, stopping.stops():
+    with pytest.raises(KeyboardInterrupt) as raised, ending.stops():
         signal.raise_signal(number)
         signal.raise_signal(number)
-    assert stopping.ended_by(raised.value) == 128 + number
+    assert ending.ended_by(raised.value) == 128 + number
     assert signal.getsignal(number) is before
 
 
 def test_a_signal_that_is_ignored_stays_ignored(listening):
     """As of nohup."""
-    for number in stopping.ENDING:
+    for number in ending.ENDING:
         signal.signal(number, signal.SIG_IGN)
-        stopping.raise_at_signals()
-        with stopping.stops() as stopped:
+        ending.raise_at_signals()
+        with ending.stops() as stopped:
             signal.raise_signal(number)
         assert not stopped and signal.getsignal(number) is signal.SIG_IGN
 

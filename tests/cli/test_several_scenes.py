@@ -11,7 +11,7 @@ import pytest
 from clpt import images
 from clpt.__main__ import run
 from clpt.cli.files import outputs
-from clpt.cli.process import stopping
+from clpt.cli.process import ending
 
 CORNELL = str(Path(__file__).resolve().parents[2] / "scenes" / "cornell_box")
 COMMON = ["--size", "8x6", "--spp", "1", "--mode", "rgb"]
@@ -71,7 +71,7 @@ def test_a_signal_ends_all(meshes, monkeypatch, capsys):
     monkeypatch.setattr(rendering, "render_samples", stop)
     assert run(["render", "a.obj", "c.obj", *COMMON, "-o", "{scene}.npy"]) == 130
     assert seen == ["a"] and Path("a.npy").exists() and not Path("c.npy").exists()
-    assert stopping.STATUS + signal.SIGINT == 130
+    assert ending.STATUS + signal.SIGINT == 130
     assert "failed" not in capsys.readouterr().err
 
 

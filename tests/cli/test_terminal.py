@@ -22,7 +22,7 @@ from clpt import errors
 from clpt.__main__ import run
 from clpt.cli import display as displays
 from clpt.cli.options.records import Handler
-from clpt.cli.process import failures, terminal
+from clpt.cli.process import ending, terminal
 from clpt.errors import ClptError
 
 CLI = Path(clpt.__file__).parent / "cli"
@@ -233,11 +233,11 @@ def test_errors_and_tracebacks(
     try:
         raise KeyError(HOSTILE)
     except KeyError as error:
-        failures.complain(failures.message_of(error)[0])
+        ending.complain(ending.message_of(error)[0])
     try:
         raise RuntimeError(HOSTILE)
     except RuntimeError as error:
-        failures.complain(failures.message_of(error)[0])
+        ending.complain(ending.message_of(error)[0])
     said = capsys.readouterr().err
     (kept,) = tmp_path.rglob("traceback.txt")
     assert clean(said) and said.count("\n") == 2 and str(kept) in said

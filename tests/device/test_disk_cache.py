@@ -135,12 +135,12 @@ def test_a_user_without_a_home_has_temporary_caches_and_one_warning(homeless, ca
 
 @posix
 def test_a_fault_of_a_user_without_a_home_is_told(homeless):
-    from clpt.cli.process import failures
+    from clpt.cli.process import ending
 
     try:
         raise ValueError("a fault")
     except ValueError as error:
-        message, _ = failures.message_of(error)
+        message, _ = ending.message_of(error)
     assert "ValueError: a fault" in message and "traceback.txt" in message
 
 

@@ -25,7 +25,7 @@ BODY = """
     Spectrum weight, lambdas = spectrum_of(x[4]);
     CameraRay ray = RAY((global const RECORD *)scene.camera, film, lens);
     r[0] = ray.o.x; r[1] = ray.o.y; r[2] = ray.o.z;
-    r[3] = ray.d.x; r[4] = ray.d.y; r[5] = ray.d.z;
+    r[3] = ray.d.x; r[4] = ray.d.y; r[5] = ray.d.z; r[6] = ray.far;
 """
 PLACE = transforms.look_at([3.0, 2.0, -1.5], [0.2, 0.4, 0.1], [0.1, 1.0, 0.2])
 
@@ -37,6 +37,12 @@ def _text(kind: str) -> dict[str, str]:
 
 def rays(camera, width, height, film, lens=None, lanes=8, index=None):
     """Origins and directions (n, 3) at film positions (n, 2); index: of a lens's glass."""
+    values = ray_values(camera, width, height, film, lens, lanes, index)
+    return values[:, :3], values[:, 3:6]
+
+
+def ray_values(camera, width, height, film, lens=None, lanes=8, index=None):
+    """Origins, directions and ends of rays (n, 7), as `rays` has them."""
     kind, words = camera.kind, encode_camera(camera, width, height)
     call = f"{kind}_ray(camera, film, lens)"
     if kind in camera_records.WEIGHTED:
@@ -47,7 +53,7 @@ def rays(camera, width, height, film, lens=None, lanes=8, index=None):
     probe = SceneProbe(
         BODY,
         5,
-        6,
+        7,
         files=("cameras/camera.cl", "generated/camera.cl"),
         lanes=lanes,
         virtual=_text(kind),
@@ -55,8 +61,7 @@ def rays(camera, width, height, film, lens=None, lanes=8, index=None):
         tables={"camera": words},
     )
     lens = np.full_like(film, 0.5) if lens is None else lens
-    out = probe(*film.T, *lens.T, np.full(len(film), index or 1.0))
-    return out[:3].T, out[3:].T
+    return probe(*film.T, *lens.T, np.full(len(film), index or 1.0)).T
 
 
 def _samples(n=64, seed=1):
@@ -298,11 +303,17 @@ BASES = {scene.Lens: {"blades": 6, "f_number": 4.0}}  # where each number matter
 @pytest.mark.parametrize(
     "cls, name", [(cls, name) for cls in scene.KINDS for name in numbers(cls)]
 )
-def test_every_number_changes_what_kernels_read(cls, name):
+def test_every_number_changes_rays(cls, name):
+    """Of a traced lens it changes the record: rays that are reflected have its numbers too."""
     one = cls(**BASES[cls]) if cls in BASES else varied(cls)
-    other = replace(one, **{name: 1.1 * getattr(one, name) or 0.02})
-    first, second = (encode_camera(camera, 40, 30) for camera in (one, other))
-    assert first.shape != second.shape or (first != second).any()
+    pair = one, replace(one, **{name: 1.1 * getattr(one, name) or 0.02})
+    if cls is scene.Lens:
+        first, second = (encode_camera(camera, 40, 30) for camera in pair)
+        assert first.shape != second.shape or (first != second).any()
+        return
+    index = 1.6 if hasattr(one, "glass") else None
+    first, second = (ray_values(camera, 40, 30, *_samples(), index=index) for camera in pair)
+    assert not np.allclose(first, second, rtol=1e-5, atol=1e-6)
 
 
 STEPS = {

@@ -126,7 +126,7 @@ def test_the_inspector_sees_the_pixel(cls: type[Perspective], axis: str) -> None
     """Numbers that the kind declares are not their defaults."""
     plain = {"near", "far", "focus_distance", "focal_length"}
     numbers = {name for name, p in params(cls).items() if p.role is REAL} - plain
-    values = {name: 1.2 * getattr(cls(), name) or 0.05 for name in numbers}
+    values = {name: 1.2 * getattr(cls(), name) or 0.2 for name in numbers}
     values |= {"aperture_radius": 0.0} if "thin" in cls.kind else {}
     place = transforms.look_at([1, 2, AWAY], [0, 0, 0], [0, 1, 0])
     scene = wall(cls(to_world=place, fov_axis=axis, **values))

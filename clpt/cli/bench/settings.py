@@ -14,7 +14,7 @@ from clpt.files import output_files
 
 from ...choices import TREES
 from ...errors import SceneError
-from ..process.failures import extra
+from ..process.ending import extra
 
 STAGES = (
     "generate", "emit", "intersect", "mix", "shade", "shadow", "splat", "append", "accumulate",

@@ -17,7 +17,7 @@ from ..options.grading import grading_options, names_option
 from ..options.records import grouped, verbose_option, with_records
 from ..options.scene_options import denoise_option, scene_options, worker_options
 from ..options.values import ScenePath
-from ..process import failures, terminal
+from ..process import ending, terminal
 from .settings import Job, Settings, picture_options, tev_option
 
 EXAMPLES = (
@@ -159,12 +159,12 @@ def _all(jobs: list[Job]) -> int:
             which = "" if job.camera is None else f", camera {job.camera}"
             terminal.say(f"{job.scene}{which} ({number} of {len(jobs)})")
         status = _rendered_of_several(job)
-        if status > failures.BAD_INPUT:
+        if status > ending.BAD_INPUT:
             return status  # a signal
         statuses.append(status)
     failed = [str(job.scene) for job, status in zip(jobs, statuses, strict=True) if status]
     if failed:
-        failures.complain(f"{len(failed)} of {len(jobs)} scenes failed: {', '.join(failed)}")
+        ending.complain(f"{len(failed)} of {len(jobs)} scenes failed: {', '.join(failed)}")
     return max(statuses)
 
 
@@ -173,6 +173,6 @@ def _rendered_of_several(job: Job) -> int:
     try:
         return _rendered(job)
     except Exception as error:
-        message, status = failures.message_of(error)
-        failures.complain(message if str(job.scene) in message else f"{job.scene}: {message}")
+        message, status = ending.message_of(error)
+        ending.complain(message if str(job.scene) in message else f"{job.scene}: {message}")
         return status

@@ -22,7 +22,7 @@ class End:
     """When a render ends: the first of these that comes; None means no limit.
 
     samples: the number of the next sample; seconds: of the render; noise: that no pixel has more
-    of; stopped: gets an entry at a signal, see clpt.cli.process.stopping.
+    of; stopped: gets an entry at a signal, see clpt.cli.process.ending.
     """
 
     samples: int | None = None

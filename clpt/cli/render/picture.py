@@ -32,7 +32,7 @@ from ..opening import (
     read_scene,
 )
 from ..options.grading import Grading, for_screens
-from ..process.stopping import STATUS, stops
+from ..process.ending import STATUS, stops
 from . import report
 from .passes import End, render_samples
 from .report import refusals

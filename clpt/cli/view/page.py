@@ -29,8 +29,7 @@ from ..opening import connected, open_scene
 from ..options.grading import Grading
 from ..options.scene_options import SceneOptions
 from ..process import terminal
-from ..process.failures import extra
-from ..process.stopping import STATUS, stops
+from ..process.ending import STATUS, extra, stops
 from .settings import Settings
 
 CLOSE_SECONDS = 3.0  # a session that waits for no compiler ends within them

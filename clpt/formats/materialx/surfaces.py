@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.formats.materialx import document, solids
+from clpt.formats.materialx import document, noise
 from clpt.formats.materialx.graph import Graph, Host, Node, category
 from clpt.formats.materialx.nodes import FUNCTIONS
 from clpt.scene import gltf_material, insides
@@ -226,7 +226,7 @@ def surface(node: Node, host: Host, name: str = "", *, walk: bool = True) -> Sur
         host.warn(f"{named} is not read; grey stands for it", node.path)
         return Surface(*gltf_material.finished(_grey(name), None, None, both=True))
     read: Surface = READERS[kind](
-        Graph(host, FUNCTIONS, document.inner, solids.texture), node, name, walk
+        Graph(host, FUNCTIONS, document.inner, noise.texture), node, name, walk
     )
     return read
 

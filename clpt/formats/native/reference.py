@@ -25,10 +25,9 @@ from clpt.scene.params import Kind, defaults, params
 
 INTRODUCTION = """# scene.json
 
-A scene is a JSON file, or the same in Python: each `type` here is a dataclass of `clpt.scene`, and
-each parameter is one of its fields. Begin a file with `"$schema": ADDRESS`, where ADDRESS is what
-`clpt scenes --schema` prints; your editor
-then knows all names and limits.
+A scene is a JSON file, or an object in Python. Each `type` on this page is a dataclass of
+`clpt.scene`. Each parameter is a field of the dataclass. Begin a file with `"$schema": ADDRESS`.
+`clpt scenes --schema` prints the ADDRESS. Then your editor knows all names and limits.
 
 ```json
 {
@@ -61,52 +60,52 @@ scene = Scene(
 
 ## A scene
 
-| key | what it is |
+| key | meaning |
 | --- | --- |
-| `camera` | one of the [cameras](#cameras); the only key that must be there |
+| `camera` | a [camera](#cameras); the only key that a scene must have |
 | `film` | size, mode and filter: see [film](#film) |
-| `integrator` | how light is followed: [integrators](#integrators) |
-| `sampler` | where random numbers come from: [samplers](#samplers) |
+| `integrator` | how paths of light are found: [integrators](#integrators) |
+| `sampler` | the source of random numbers: [samplers](#samplers) |
 | `materials` | name -> [material](#materials); shapes refer to them by name |
 | `media` | name -> [medium](#media); shapes and cameras refer to them by name |
 | `groups` | name -> a list of shapes; an [instance](#instance) places all of them |
 | `shapes` | a list of [shapes](#shapes) |
-| `lights` | a list of [lights](#lights); area lights stand on shapes, as `emission` |
+| `lights` | a list of [lights](#lights); an area light is the `emission` of a shape |
 | `spp` | samples of a pixel |
-| `noise` | noise, such as 0.02, below which a pixel gets no more samples; `spp` is then the most |
+| `noise` | a pixel gets no more samples below this noise, such as 0.02; `spp` is then the most |
 | `seed` | of the random numbers |
-| `name` | for people, and for the names of pictures |
+| `name` | a name for people, and for files of pictures |
 
 Lengths are in metres, angles in degrees, wavelengths in nm. Names of files are relative to the
-scene file. An unknown key is an error, and so is a number outside its limits: the message
-names file, line and path of the value.
+scene file. An unknown key is an error. So is a number outside its limits. The message names the
+file, the line and the path of the value.
 
 ## Values
 
-**Transforms** (`to_world`) are a 4x4 matrix in rows, or a list of steps of which the first is
-applied first: `{"translate": [x, y, z]}`, `{"scale": s}` or `{"scale": [x, y, z]}`,
+**Transforms** (`to_world`) are a 4x4 matrix in rows, or a list of steps. The first step of the list
+is applied first. Steps are `{"translate": [x, y, z]}`, `{"scale": s}` or `{"scale": [x, y, z]}`,
 `{"rotate": {"axis": [x, y, z], "angle": degrees}}`,
 `{"look_at": {"origin": ..., "target": ..., "up": ...}}`. `to_uv` is a 3x3 matrix, or steps in the
 plane of u and v.
 
 **Spectra** are a number (the same at every wavelength), `[r, g, b]` in linear Rec. 709, a name, or
-an object. Reflectances, emissions and factors may be `"#rrggbb"` too: a colour in sRGB, as colour
-pickers show it. What a number or a colour means depends on the parameter's role:
+an object. Reflectances, emissions and factors may also be `"#rrggbb"`: a colour in sRGB, as colour
+pickers show it. The meaning of a number or a colour depends on the role of the parameter:
 
 | role | number | `[r, g, b]` | name | a table beyond its ends |
 | --- | --- | --- | --- | --- |
-| reflectance | even | the smoothest reflectance of that colour (Jakob and Hanika 2019) | - | 0 |
-| emission | D65 times it: white light | D65 times such a spectrum | an illuminant | 0 |
+| reflectance | even | a smooth reflectance of that colour (Jakob and Hanika 2019) | - | 0 |
+| emission | D65 times the number: white light | D65 times such a spectrum | an illuminant | 0 |
 | index | even | a smooth unbounded spectrum | a glass or liquid | its end values |
 | factor | even | a smooth unbounded spectrum | - | 0 |
 | coefficient | even | a smooth unbounded spectrum | - | its end values |
 | quantity | even | a smooth unbounded spectrum | - | its end values |
 
-Light of the same strength at every wavelength is the illuminant `"E"`; it looks pink beside D65.
-Tables have the limits that numbers have, at every wavelength from 200 to 2000 nm. An index is above
-0 at every wavelength of the film. Named metals end at 1100 nm and hold their end values; the
-illuminants A and D65 end at 830 nm and are dark beyond. Beyond their bands, spectral images of
-reflectances hold, and those of light are dark.
+The illuminant `"E"` has the same power at every wavelength. It looks pink beside D65. The limits of
+a number hold for a table at every wavelength from 200 to 2000 nm. An index must be above 0 at every
+wavelength of the film. Tables of named metals end at 1100 nm and keep their end values beyond. The
+illuminants A and D65 end at 830 nm and are 0 beyond. Beyond its bands a spectral image of
+reflectances keeps its end values, and a spectral image of light is 0.
 """
 
 ENDING = """## How this page is made

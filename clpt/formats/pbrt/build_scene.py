@@ -15,10 +15,10 @@ import numpy as np
 from clpt import transforms
 from clpt.errors import did_you_mean
 from clpt.files import budget
-from clpt.formats.pbrt.curves import joined
 from clpt.formats.pbrt.lights import area_light, light
 from clpt.formats.pbrt.materials import material
 from clpt.formats.pbrt.media import medium
+from clpt.formats.pbrt.parametric import joined
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.scattering import body
 from clpt.formats.pbrt.shapes import Geometry, displaced, geometry, with_uvs

@@ -10,8 +10,7 @@ from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError, did_you_mean
 from clpt.files import input_files
 from clpt.formats.pbrt import old_words
-from clpt.formats.pbrt.lexer import UPGRADE
-from clpt.formats.pbrt.params import Parameter, Parameters
+from clpt.formats.pbrt.params import UPGRADE, Parameter, Parameters
 from clpt.formats.pbrt.state import TARGETS, Contents, Definition, State, TransformDirectives
 
 COLOUR_SPACES = ("srgb", "rec2020", "aces2065-1", "dci-p3")

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import transforms
 from clpt.errors import SceneError, UnknownKindError
 from clpt.formats.meshes import mesh, ply
-from clpt.formats.pbrt import curves, surfaces
+from clpt.formats.pbrt import parametric
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.state import Definition, Maker, State
 from clpt.formats.pbrt.textures import textured
@@ -56,9 +56,9 @@ class Geometry:
     def areas(self) -> NDArray[np.float64]:
         """The area of each of pbrt's lights, in the world [m^2]."""
         if self.kind is shapes.Curves:
-            return curves.areas(self.parts) / self.split
+            return parametric.areas(self.parts) / self.split
         if self.kind is not shapes.Mesh:
-            return np.array([surfaces.area(self.kind, self.parts)])
+            return np.array([parametric.area(self.kind, self.parts)])
         points = transforms.transform_points(self.parts["to_world"], self.parts["vertices"])
         a, b, c = (points[self.parts["faces"][:, i]] for i in range(3))
         triangles = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
@@ -172,11 +172,11 @@ def with_uvs(result: Geometry) -> Geometry:
     parts = dict(result.parts)
     if result.kind is shapes.Disk:
         return Geometry(
-            shapes.Mesh, parts | surfaces.disk_mesh(1.0, 0.0, 0.0, 360.0), result.warnings
+            shapes.Mesh, parts | parametric.disk_mesh(1.0, 0.0, 0.0, 360.0), result.warnings
         )
     if result.kind is shapes.Cylinder:
         ends = parts.pop("p0")[2], parts.pop("p1")[2]
-        tube = surfaces.cylinder_mesh(parts.pop("radius"), *ends, 360.0)
+        tube = parametric.cylinder_mesh(parts.pop("radius"), *ends, 360.0)
         return Geometry(shapes.Mesh, parts | tube, result.warnings)
     if result.kind is not shapes.Mesh or parts["uvs"] is not None:
         return result
@@ -250,7 +250,7 @@ def _patches(params: Parameters, state: State) -> Geometry | None:
     tolerance = np.abs(points[corners] @ np.eye(3)).max(initial=1.0) * 1e-5
     twist = points[corners[:, 0]] - points[corners[:, 1]] - points[corners[:, 2]]
     plain = bool((np.abs(twist + points[corners[:, 3]]) <= tolerance).all())
-    u, v, faces = surfaces.grid(*([1, 1] if plain else [PATCH, PATCH]))
+    u, v, faces = parametric.grid(*([1, 1] if plain else [PATCH, PATCH]))
     result = _mesh(*_over_patches(u, v, faces, corners, (points, normals, uvs), plain))
     return _with_pieces(result, np.repeat(np.arange(len(corners)), len(faces)))
 
@@ -275,16 +275,16 @@ def _over_patches(
 
 
 def _sphere(params: Parameters, state: State) -> Geometry | None:
-    radius, turn = params.above_zero("radius", 1.0), surfaces.phi_max(params)
+    radius, turn = params.above_zero("radius", 1.0), parametric.phi_max(params)
     z = sorted(np.clip([params.one(n, "float", d) for n, d in _ends(radius)], -radius, radius))
     whole = z[0] <= -radius and z[1] >= radius and turn == 360.0
-    if whole and surfaces.is_even(state.ctm, 3):
-        parts = {"radius": radius, "to_world": state.ctm @ surfaces.UPWARD}
+    if whole and parametric.is_even(state.ctm, 3):
+        parts = {"radius": radius, "to_world": state.ctm @ parametric.UPWARD}
         return Geometry(shapes.Sphere, parts)
     if z[0] == z[1]:
         return None
     low, high = (math.acos(max(-1.0, min(1.0, end / radius))) for end in z)
-    return Geometry(shapes.Mesh, surfaces.sphere_mesh(radius, low, high, turn))
+    return Geometry(shapes.Mesh, parametric.sphere_mesh(radius, low, high, turn))
 
 
 def _ends(radius: float) -> tuple[tuple[str, float], tuple[str, float]]:
@@ -292,33 +292,33 @@ def _ends(radius: float) -> tuple[tuple[str, float], tuple[str, float]]:
 
 
 def _disk(params: Parameters, state: State) -> Geometry | None:
-    radius, turn = params.above_zero("radius", 1.0), surfaces.phi_max(params)
+    radius, turn = params.above_zero("radius", 1.0), parametric.phi_max(params)
     height, inner = params.one("height", "float", 0.0), params.one("innerradius", "float", 0.0)
     if inner == 0.0 and turn == 360.0:
         local = transforms.translate([0.0, 0.0, height]) @ transforms.scale([radius, radius, 1.0])
         return Geometry(shapes.Disk, {"to_world": state.ctm @ local})
     if not 0.0 <= inner < radius:
         raise SceneError(f"'innerradius' must be below the radius, not {inner:g}")
-    return Geometry(shapes.Mesh, surfaces.disk_mesh(radius, inner, height, turn))
+    return Geometry(shapes.Mesh, parametric.disk_mesh(radius, inner, height, turn))
 
 
 def _cylinder(params: Parameters, state: State) -> Geometry | None:
-    radius, turn = params.above_zero("radius", 1.0), surfaces.phi_max(params)
+    radius, turn = params.above_zero("radius", 1.0), parametric.phi_max(params)
     low, high = sorted((params.one("zmin", "float", -1.0), params.one("zmax", "float", 1.0)))
     if low == high:
         return None
-    if turn == 360.0 and surfaces.is_even(state.ctm, 2):
+    if turn == 360.0 and parametric.is_even(state.ctm, 2):
         ends = {"p0": (0.0, 0.0, low), "p1": (0.0, 0.0, high)}
         return Geometry(shapes.Cylinder, {"radius": radius, **ends, "to_world": state.ctm})
-    return Geometry(shapes.Mesh, surfaces.cylinder_mesh(radius, low, high, turn))
+    return Geometry(shapes.Mesh, parametric.cylinder_mesh(radius, low, high, turn))
 
 
 def _curve(params: Parameters, state: State) -> Geometry | None:
-    kind, parts = curves.curve(params)
+    kind, parts = parametric.curve(params)
     split = 2 ** min(max(params.one("splitdepth", "integer", 3), 0), MOST_SPLITS)
     if kind is None:
         result = _mesh(parts["points"], parts["faces"], parts["normals"], parts["uvs"])
-        cubics = np.arange(len(parts["faces"])) // (2 * curves.PIECES)
+        cubics = np.arange(len(parts["faces"])) // (2 * parametric.PIECES)
         return _with_pieces(result, cubics, split)
     current = state.material
     if isinstance(current, str):
@@ -339,7 +339,7 @@ def _paraboloid(params: Parameters, state: State) -> Geometry | None:
     low, high = sorted((params.one("zmin", "float", 0.0), params.one("zmax", "float", 1.0)))
     if not 0.0 <= low < high:
         raise SceneError("'zmin' and 'zmax' must differ, and not be negative")
-    z = np.linspace(low, high, surfaces.ALONG + 1)
+    z = np.linspace(low, high, parametric.ALONG + 1)
     r = radius * np.sqrt(z / high)
     return _revolved(params, np.stack([r, np.zeros_like(r), z], axis=1))
 
@@ -353,7 +353,7 @@ def _hyperboloid(params: Parameters, state: State) -> Geometry | None:
     p2 = np.array(params.one("p2", "point3", (1.0,) * 3))
     if p2[2] == 0.0:
         p1, p2 = p2, p1
-    parts = np.linspace(0.0, 1.0, surfaces.ALONG + 1)[:, None]
+    parts = np.linspace(0.0, 1.0, parametric.ALONG + 1)[:, None]
     line = (1.0 - parts) * p1 + parts * p2
     if p2[2] == 0.0:
         return _revolved(params, line)  # a flat ring, at which pbrt does not end
@@ -377,8 +377,8 @@ def _hyperboloid(params: Parameters, state: State) -> Geometry | None:
 
 
 def _revolved(params: Parameters, profile: ArrayLike) -> Geometry | None:
-    turn = surfaces.phi_max(params)
-    return Geometry(shapes.Mesh, surfaces.revolved_mesh(np.asarray(profile, np.float64), turn))
+    turn = parametric.phi_max(params)
+    return Geometry(shapes.Mesh, parametric.revolved_mesh(np.asarray(profile, np.float64), turn))
 
 
 def _heightfield(params: Parameters, state: State) -> Geometry | None:
@@ -387,7 +387,7 @@ def _heightfield(params: Parameters, state: State) -> Geometry | None:
     heights = params.several("Pz", "float")
     if min(columns, rows) < 2 or heights is None or len(heights) != columns * rows:
         raise SceneError("needs 'nu' and 'nv' of at least 2, and nu times nv numbers 'Pz'")
-    u, v, faces = surfaces.grid(columns - 1, rows - 1)
+    u, v, faces = parametric.grid(columns - 1, rows - 1)
     points = np.stack([u, v, heights], axis=1)
     return _with_pieces(_mesh(points, faces, None, np.stack([u, v], axis=1)))
 

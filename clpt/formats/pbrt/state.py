@@ -17,8 +17,7 @@ from clpt.choices import Missing
 from clpt.errors import SceneError, did_you_mean
 from clpt.files import budget, input_files
 from clpt.formats.pbrt import old_words
-from clpt.formats.pbrt.lexer import Lexer
-from clpt.formats.pbrt.params import Parameter, Parameters
+from clpt.formats.pbrt.params import Lexer, Parameter, Parameters
 from clpt.formats.reading import Located, grey_for
 from clpt.scene.materials import Material
 from clpt.scene.motion import Keys

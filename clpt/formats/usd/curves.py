@@ -9,10 +9,10 @@ from pxr import Usd, UsdGeom, UsdShade
 
 from clpt.arrays import Floats, Integers
 from clpt.files import budget
-from clpt.formats.usd import primvars
+from clpt.formats.usd import meshes
 from clpt.formats.usd.document import Document, rows
 from clpt.formats.usd.materials import surface
-from clpt.formats.usd.primvars import Topology
+from clpt.formats.usd.meshes import Topology
 from clpt.scene.shapes import Curves, Shape, Spheres
 
 WIDTH = 1.0  # of curves and points without widths
@@ -149,7 +149,7 @@ def points(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
     topology = Topology(np.zeros(0, np.int64), np.arange(len(centers)), len(centers))
     attributes = {}
     for name, row in look.fallbacks.items():
-        primvar = primvars.read(document, prim, name, topology, len(row))
+        primvar = meshes.read(document, prim, name, topology, len(row))
         usual = np.tile(np.array([row], np.float32), (len(centers), 1))
         attributes[f"vertex_{name}"] = (
             usual if primvar is None else primvar.values[primvar.at_corners(topology)]

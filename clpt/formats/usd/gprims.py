@@ -24,10 +24,10 @@ from clpt.errors import SceneError
 from clpt.files import budget
 from clpt.formats import volumes
 from clpt.formats.framing import TO_BOX
-from clpt.formats.usd import curves, meshes, primvars
+from clpt.formats.usd import curves, meshes
 from clpt.formats.usd.document import Document, file_of, shown
 from clpt.formats.usd.materials import surface
-from clpt.formats.usd.primvars import Topology
+from clpt.formats.usd.meshes import Topology
 from clpt.scene.materials import Null
 from clpt.scene.media import Grid
 from clpt.scene.params import fields_of
@@ -48,7 +48,7 @@ def quadric(document: Document, prim: Usd.Prim, material: UsdShade.Material | No
     look = surface(document, material, prim, both=both)
     attributes = {}
     for name, row in look.fallbacks.items():
-        primvar = primvars.read(document, prim, name, ONE, len(row))
+        primvar = meshes.read(document, prim, name, ONE, len(row))
         value = np.array([row], np.float32) if primvar is None else primvar.values[:1]
         attributes[f"vertex_{name}"] = np.tile(value, (len(arrays["vertices"]), 1))
     shared: dict[str, Any] = {

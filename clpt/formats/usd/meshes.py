@@ -1,9 +1,13 @@
-"""Polygon meshes: triangles with normals, texture coordinates and subsets of other materials."""
+"""Polygon meshes: triangles with normals, texture coordinates and subsets of other materials.
+
+Primvars of every interpolation are values, and the row that each corner of a face takes.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,15 +17,120 @@ from pxr import Usd, UsdGeom, UsdShade
 from clpt.arrays import Integers
 from clpt.files import budget
 from clpt.formats.meshes.mesh import Arrays, checked
-from clpt.formats.usd import primvars
 from clpt.formats.usd.document import Document, rows
 from clpt.formats.usd.materials import Surface, surface
-from clpt.formats.usd.primvars import Primvar, Topology
 from clpt.geometry import catmull_clark
 from clpt.geometry.catmull_clark import Cage
 from clpt.geometry.polygons import smooth_normals, triangulate
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import SECOND_UV
+
+AT_VERTICES = ("vertex", "varying")
+
+
+@dataclass(frozen=True)
+class Topology:
+    """Faces: how many corners each has (f,), and the vertex of each corner (c,); n vertices."""
+
+    counts: Integers
+    corners: Integers
+    vertices: int
+
+    @property
+    def faces(self) -> Integers:
+        """The face of each corner, (c,)."""
+        return np.repeat(np.arange(len(self.counts)), self.counts)
+
+    def elements(self, interpolation: str) -> Integers:
+        """Return the element that each corner takes a value of, (c,), before a primvar's indices.
+
+        interpolation: one of USD's; elements are vertices, faces, corners, or the whole mesh.
+        """
+        if interpolation in AT_VERTICES:
+            return self.corners
+        if interpolation == "uniform":
+            return self.faces
+        if interpolation == "faceVarying":
+            return np.arange(len(self.corners))
+        return np.zeros(len(self.corners), np.int64)
+
+    def count(self, interpolation: str) -> int:
+        """Return how many elements there are."""
+        sizes = {"uniform": len(self.counts), "faceVarying": len(self.corners), "constant": 1}
+        return sizes.get(interpolation, self.vertices)
+
+
+@dataclass(frozen=True)
+class Primvar:
+    """Values (v, width) and the row of them that each element has, (e,)."""
+
+    values: NDArray[np.float32]
+    indices: Integers
+    interpolation: str
+
+    def at_corners(self, topology: Topology) -> Integers:
+        """Return the row of the values for each corner, (c,)."""
+        return self.indices[topology.elements(self.interpolation)]
+
+
+def read(
+    document: Document, prim: Usd.Prim, name: str, topology: Topology, width: int = 0
+) -> Primvar | None:
+    """Return a primvar, inherited from above if need be; None where there is none of use.
+
+    width: of a value, 0 for that of the file. A primvar with too few values is left out.
+    """
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+    value = primvar.Get(document.time) if primvar else None
+    if value is None or isinstance(value, str):
+        return None
+    indices = primvar.GetIndices(document.time) if primvar.IsIndexed() else None
+    form = primvar.GetInterpolation(), width
+    return checked_primvar(document, prim, name, topology, form, (value, indices))
+
+
+def checked_primvar(
+    document: Document,
+    prim: Usd.Prim,
+    name: str,
+    topology: Topology,
+    form: tuple[str, int],
+    stored: tuple[object, object],
+) -> Primvar | None:
+    """Return values as a primvar; None, with a warning, where they do not fit the faces.
+
+    form: its interpolation, and the width of a value, 0 for that of the file. stored: the values,
+    and the row of each element or None.
+    """
+    interpolation, width = form
+    value, indices = stored
+    try:
+        table = np.asarray(value, np.float32)
+        table = table.reshape(-1, width or (table.shape[1] if table.ndim > 1 else 1))
+    except (TypeError, ValueError):
+        document.warn(f"primvar {name!r} is of a type that is not read", prim.GetPath())
+        return None
+    count = topology.count(interpolation)
+    order = np.arange(count) if indices is None else rows(indices, 0, np.int64)[:count]
+    fits = len(order) == count and (not count or (order.min() >= 0 and order.max() < len(table)))
+    if not fits:
+        message = f"primvar {name!r} is left out, as it has too few values to be {interpolation}"
+        document.warn(message, prim.GetPath())
+        return None
+    return Primvar(table, order, interpolation)
+
+
+def joined(columns: list[Integers]) -> tuple[Integers, Integers]:
+    """Return corners (k,) that differ in some column, and of each corner the number of its like.
+
+    columns: of each corner, numbers from 0.
+    """
+    key = columns[0]
+    for column in columns[1:]:
+        key = np.unique(key * (int(column.max(initial=0)) + 1) + column, return_inverse=True)[1]
+    _, first, like = np.unique(key, return_index=True, return_inverse=True)
+    return first, like.reshape(-1)
+
 
 MOST_FACES = 200_000  # of a mesh that is refined by a level of its own
 # How the boundaries of texture coordinates go, by faceVaryingLinearInterpolation.
@@ -165,16 +274,16 @@ def _primvar(
     """Return a primvar for a mesh's faces, refined as they are."""
     cage = polygons.cage
     if cage is None:
-        return primvars.read(document, prim, name, polygons.topology, width)
+        return read(document, prim, name, polygons.topology, width)
     coarse = Topology(cage.counts, cage.corners, len(cage.corner))
-    primvar = primvars.read(document, prim, name, coarse, width)
+    primvar = read(document, prim, name, coarse, width)
     if primvar is None or primvar.interpolation == "constant":
         return primvar
     if primvar.interpolation == "uniform":
         return dataclasses.replace(primvar, indices=primvar.indices[polygons.parents])
     if primvar.interpolation == "faceVarying":
         rule = str(document.value(prim, "faceVaryingLinearInterpolation", "cornersPlus1"))
-        first, like = primvars.joined([cage.corners, primvar.indices])
+        first, like = joined([cage.corners, primvar.indices])
         values, corners = primvar.values[primvar.indices[first]], like
         cage = Cage(
             cage.counts, corners, np.zeros((0, 2), np.int64), np.zeros(0), np.zeros(len(first)),
@@ -200,12 +309,12 @@ def _limit_values(
 
 def _normals(document: Document, prim: Usd.Prim, topology: Topology) -> Primvar | None:
     """Return the normals of a prim: primvars:normals before its own attribute."""
-    found = primvars.read(document, prim, "normals", topology, 3)
+    found = read(document, prim, "normals", topology, 3)
     value = document.value(prim, "normals")
     if found is not None or value is None or not len(value):
         return found
     form = UsdGeom.PointBased(prim).GetNormalsInterpolation(), 3
-    return primvars.checked(document, prim, "normals", topology, form, (value, None))
+    return checked_primvar(document, prim, "normals", topology, form, (value, None))
 
 
 def _subsets(
@@ -274,10 +383,10 @@ def _split(
     apart = [
         columns[name]
         for name, one in used.items()
-        if one.interpolation not in (*primvars.AT_VERTICES, "constant")
+        if one.interpolation not in (*AT_VERTICES, "constant")
     ]
     if apart:
-        first, like = primvars.joined([vertex, *apart])
+        first, like = joined([vertex, *apart])
     else:
         _, first, like = np.unique(vertex, return_index=True, return_inverse=True)
     values: dict[str, NDArray[Any]] = {n: used[n].values[c[first]] for n, c in columns.items()}

@@ -56,7 +56,7 @@ from clpt.render.records.materials import row_words
 from clpt.render.records.tables import LoweringCache, is_table
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.find import Density, density, emissions
-from clpt.render.textures.image_files import ImageFiles
+from clpt.render.textures.texels import ImageFiles
 from clpt.scene import Scene
 from clpt.scene import materials as mt
 from clpt.scene.fingerprint import named_files

@@ -29,7 +29,7 @@ from clpt.render.film.state import DIMENSIONS, FilmState, Ranges
 from clpt.render.flow.scene_to_tables import Lowered, lower
 from clpt.render.options import RenderOptions
 from clpt.render.records import materials
-from clpt.render.textures.image_files import ImageFiles
+from clpt.render.textures.texels import ImageFiles
 from clpt.render.trials import decided
 from clpt.render.wavefront.noise import DenoisedNoise
 from clpt.render.wavefront.strategy import Tuning

@@ -14,7 +14,6 @@ from typing import Any
 
 from clpt import device as dev
 from clpt.geometry import shapes
-from clpt.render.edit.blurring import between
 from clpt.render.edit.moving import Move, Moving
 from clpt.render.edit.plans import (
     Patch,
@@ -28,6 +27,7 @@ from clpt.render.edit.scene_edit import (
     MaterialKey,
     Replacements,
     ShapeKey,
+    between,
     edit_scene,
     match_replacements,
     resolve_device_arrays,

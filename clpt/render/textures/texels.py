@@ -1,7 +1,14 @@
-"""Images as kernels read them: texels of colours, of spectra, of bands, or of numbers."""
+"""Images as kernels read them: texels of colours, of spectra, of bands, or of numbers.
+
+The file of an image may change while a scene is rendered: all samples show the version that was
+read.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +18,8 @@ from clpt.arrays import Floats32
 from clpt.errors import SceneError
 from clpt.files import budget
 from clpt.images.spectral_exr import SpectralImage
+from clpt.render.records.tables import version
+from clpt.scene.fingerprint import file_digest
 from clpt.scene.roles import REAL, REFLECTANCE, Role
 from clpt.spectra import Tabulated
 
@@ -100,3 +109,39 @@ def _palette(colours: Floats32) -> tuple[Floats32, Any]:
     place = np.zeros(counts, np.int64)
     place[used] = np.arange(len(used))
     return colours[chosen[used]], place[number]
+
+
+@dataclass(frozen=True)
+class ImageFiles:
+    """The versions of a scene's files, and the digests of their bytes, by path.
+
+    They are noted before a scene is lowered; `check` compares them afterwards.
+    """
+
+    versions: Mapping[str, str] = field(default_factory=dict)
+    digests: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, paths: Iterable[str], former: ImageFiles) -> ImageFiles:
+        """Note files; former: the files of the scene before, which are not read again.
+
+        Files that cannot be read are left out: lowering raises their errors.
+        """
+        versions: dict[str, str] = {}
+        digests: dict[str, str] = {}
+        for path in sorted(paths):
+            versions[path] = version(path)
+            if former.versions.get(path) == versions[path]:
+                digests[path] = former.digests[path]
+                continue
+            try:
+                digests[path] = file_digest(Path(path))
+            except SceneError:
+                del versions[path]
+        return cls(versions, digests)
+
+    def check(self) -> None:
+        """Raise SceneError for a file that has changed since, perhaps while it was read."""
+        for path, before in self.versions.items():
+            if version(path) != before:
+                raise SceneError("changed while the scene was read; try again", file=path)

@@ -41,9 +41,9 @@ from clpt.errors import SceneError
 from clpt.render.records import Features
 from clpt.render.wavefront.bounce_loop import OnBatch
 from clpt.render.wavefront.noise import DenoisedNoise, NoiseMeter, divide
+from clpt.render.wavefront.path_buffers import FOREVER
 from clpt.render.wavefront.tracer import Selection, Tracer
 from clpt.render.wavefront.wavefront import Wavefront
-from clpt.render.wavefront.work_list import FOREVER
 from clpt.scene import checked_noise
 from clpt.scene.integrators import PIXELWISE
 

@@ -15,7 +15,7 @@ from clpt.arrays import Words
 from clpt.device.buffers import Buffers
 from clpt.render.film.state import NO_LAYERS, NO_LIGHT_LAYERS, NO_MATTES, SAMPLES_WORD
 from clpt.render.records import GROUP_WORDS, SUM_WORDS, Features
-from clpt.render.wavefront import work_list
+from clpt.render.wavefront import path_buffers
 from clpt.scene.layers import MATTE_SLOTS
 
 NONE = {"layers": NO_LAYERS, "light_layers": NO_LIGHT_LAYERS, "mattes": NO_MATTES}
@@ -48,8 +48,8 @@ class Film:
         self.halves = int(settings["halves"])
         self._parts = self.halves * int(settings["octaves"])
         self._settings, self._padded_pixels = settings, int(settings["padded_pixels"])
-        x, y = work_list.pixels(settings)
-        self._inside = work_list.inside(settings)
+        x, y = path_buffers.pixels(settings)
+        self._inside = path_buffers.inside(settings)
         self._at = (y * self.size[0] + x)[self._inside]  # in a picture, of each of these
         pixels, advice = math.prod(self.size), "lower the image's size"
         sums = {"film": self._words * self._word_bytes}
@@ -165,7 +165,7 @@ class Film:
         """Return a buffer whose pixels have their words side by side as pictures, (count, h, w)."""
         stored = np.empty((self._padded_pixels, count), np.uint32)
         self.stream.read((self._held if held else self.sums)[name], stored)
-        return np.stack([work_list.picture(self._settings, words) for words in stored.T])
+        return np.stack([path_buffers.picture(self._settings, words) for words in stored.T])
 
     def _planes(self, name: str, count: int, held: bool) -> Words:
         """Return the first streams of a buffer as pictures, (count, h, w) uint32."""
@@ -178,7 +178,7 @@ class Film:
             stored = np.empty((min(at_once, count - i), self._padded_pixels), np.uint32)
             self.stream.read(sums[name], stored, i * size)
             for plane, words in zip(pixels[i:], stored, strict=False):
-                plane[:] = work_list.picture(self._settings, words)
+                plane[:] = path_buffers.picture(self._settings, words)
         return pixels
 
     def set_words(self, arrays: Mapping[str, Words]) -> None:

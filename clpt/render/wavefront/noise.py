@@ -1,4 +1,4 @@
-"""The noise in each cell of a film (clpt.render.wavefront.work_list), and that after denoising.
+"""The noise in each cell of a film (clpt.render.wavefront.path_buffers), and that after denoising.
 
 To measure the latter both halves of the samples are denoised. The noise of a half is independent of
 the other half, so the distance of a denoised half from the other half measures its error, blur
@@ -27,8 +27,8 @@ from clpt.denoise.oidn import LUMINANCE, Oidn
 from clpt.denoise.statistical import Statistical
 from clpt.render.film.pictures import Pictures
 from clpt.render.flow import programs
+from clpt.render.wavefront.path_buffers import SIDE
 from clpt.render.wavefront.wavefront import Wavefront
-from clpt.render.wavefront.work_list import SIDE
 
 DARK = 0.01  # of the picture's mean luminance: a darker tile counts as if it were as bright
 

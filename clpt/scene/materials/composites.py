@@ -28,7 +28,7 @@ NO_SURFACE = Null()
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TwoSided(Material):
-    """Gives materials with only a front to both sides of a surface."""
+    """Puts materials that have only a front on both sides of a surface."""
 
     is_composite = True
     two_sided = True
@@ -48,7 +48,7 @@ class Mask(Material):
 
     is_composite = True
 
-    material: Material = host(Diffuse(), "what is there where it is opaque", form="material")
+    material: Material = host(Diffuse(), "the material where it is opaque", form="material")
     opacity: TexturedNumber = real(
         0.5, "share of light that meets the material", "", 0.0, 1.0, textured=True
     )
@@ -82,8 +82,8 @@ class NormalMapped(Material):
     reversible = False
     slot: ClassVar[str] = ""  # a map of each slot may be around a leaf
 
-    material: Material = host(Diffuse(), "what is shaded with the bent normal", form="material")
-    scale: float = real(1.0, "factor on what the map bends")
+    material: Material = host(Diffuse(), "the material under the bent normal", form="material")
+    scale: float = real(1.0, "factor on the slopes of the map")
     flip_invalid: bool = flag(True, "turn a normal round that faces away from the viewer")
     shadowing: bool = flag(True, "soften the edge where the bent surface turns dark")
 
@@ -119,7 +119,7 @@ class BumpMap(NormalMapped):
 
     slot = "bump"
 
-    height: TexturedNumber = real(0.0, "what it is raised by", "m", textured=True)
+    height: TexturedNumber = real(0.0, "height of the surface", "m", textured=True)
 
 
 def parts(material: Material) -> Iterator[Material]:

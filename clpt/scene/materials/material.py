@@ -84,7 +84,7 @@ def alpha_of(roughness: object, *shares: object) -> float:
 class Layer(Kind):
     """A film, thin enough for the light reflected at its two faces to interfere.
 
-    Up to 100 um thick; from about 10 um on, its fringes are finer than an eye can tell.
+    It may be up to 100 um thick. From about 10 um on its fringes are too fine for the eye.
     """
 
     shorthands = (METAL,)

@@ -15,10 +15,10 @@ from clpt.spectra import Constant
 TRANSMISSION_COLOR = Shorthand(
     {
         "transmission_color": Param(
-            roles.REFLECTANCE, "what is let through, or with a depth its colour there",
+            roles.REFLECTANCE, "colour of transmitted light, at the surface or at the depth",
             low=0.0, high=1.0, textured=True,
         ),
-        "transmission_depth": Param(roles.REAL, "where light has it; 0: at once", "m", 0.0),
+        "transmission_depth": Param(roles.REAL, "depth of that colour; 0: the surface", "m", 0.0),
     },
     ("transmission_tint", "absorption"),
     insides.spelled,
@@ -29,7 +29,8 @@ TRANSMISSION_COLOR = Shorthand(
 class Principled(Material):
     """The principled model of Burley 2012 and 2015, as Mitsuba 3 defines it; front side.
 
-    Both sides where `spec_trans` is above zero. The microfacets have the square of `roughness`.
+    It has both sides where `spec_trans` is above 0. The alpha of its microfacets is the square of
+    `roughness`.
     """
 
     shorthands = (ANISOTROPY, TRANSMISSION)
@@ -48,7 +49,9 @@ class Principled(Material):
         0.0, "how much it is stretched along the tangent", lobe=True
     )
     metallic: TexturedNumber = share(0.0, "share of the metal", lobe=True)
-    spec_trans: TexturedNumber = share(0.0, "share of the rest that lets light through", lobe=True)
+    spec_trans: TexturedNumber = share(
+        0.0, "share of transmission, of the part that is no metal", lobe=True
+    )
     eta: IndexLike = index(1.5, "inside index over the outside's")
     spec_tint: TexturedNumber = share(
         0.0, "how much of the base's colour the dielectric reflection has", lobe=True
@@ -105,7 +108,7 @@ class PrincipledThin(Material):
     )
     diff_trans: TexturedNumber = real(
         0.0,
-        "diffuse light that goes through; 2: all of it",
+        "share of diffuse light that goes through; 2: all light",
         low=0.0,
         high=2.0,
         textured=True,
@@ -129,8 +132,8 @@ class PrincipledThin(Material):
 class GltfSurface(Material):
     """glTF 2.0's material with its extensions, see docs/gltf.md; front side.
 
-    Both sides where light goes through; `thin`: a sheet with two equal sides. The
-    microfacets have the square of a `roughness`, at least 0.001.
+    It has both sides where light goes through. `thin` makes it a sheet with two equal sides. The
+    alpha of its microfacets is the square of a `roughness`, at least 0.001.
     """
 
     uses_lobe_sample = True
@@ -138,12 +141,12 @@ class GltfSurface(Material):
     chromatic = True
     needs_wavelengths = True
 
-    base_color: Textured = reflectance(1.0, "colour of base, metal, and of what is let through")
+    base_color: Textured = reflectance(1.0, "colour of base and metal, and of transmitted light")
     metallic: TexturedNumber = share(0.0, "share of the metal", lobe=True)
-    roughness: TexturedNumber = share(1.0, "of reflection and of what is let through")
+    roughness: TexturedNumber = share(1.0, "of reflection and of transmission")
     multiple_scattering: float = real(
         0.0,
-        "share that is kept of what facets reflect to each other, as rough metals do",
+        "share of the light between facets that is kept, as at rough metals",
         low=0.0,
         high=1.0,
         lobe=True,
@@ -168,7 +171,7 @@ class GltfSurface(Material):
     clearcoat_roughness: TexturedNumber = share(0.0, "its roughness")
     clearcoat_apart: float = real(
         0.0,
-        "1: the coat has normals of its own, not those of a normal map around the material",
+        "1: the coat has its own normals, and ignores a normal map around the material",
         low=0.0,
         high=1.0,
         lobe=True,
@@ -182,12 +185,12 @@ class GltfSurface(Material):
     sheen_color: Textured = reflectance(0.0, "colour of fibres under the coat", lobe=True)
     sheen_roughness: TexturedNumber = share(0.5, "how much fibres lean; at least 0.25")
     transmission: TexturedNumber = share(
-        0.0, "share of what enters the base that is let through", lobe=True
+        0.0, "share of the light in the base that is transmitted", lobe=True
     )
     thin: bool = flag(False, "whether light goes straight through, as there is no volume")
     absorption: SpectrumLike = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
     diffuse_transmission: TexturedNumber = share(
-        0.0, "share of what is scattered that goes through", lobe=True
+        0.0, "share of scattered light that goes through", lobe=True
     )
     diffuse_transmission_color: Textured = reflectance(1.0, "its colour")
     iridescence: TexturedNumber = share(0.0, "strength of a thin film on the facets", lobe=True)
@@ -225,8 +228,8 @@ class GltfSurface(Material):
 class Openpbr(Material):
     """OpenPBR Surface 1.1, see docs/materials.md; front side.
 
-    Both sides where light goes through; `thin_walled`: a sheet, both sides of which are alike. The
-    parameters are those of the specification; `specular_ior` counts as at least the coat's.
+    It has both sides where light goes through. `thin_walled` makes it a sheet with two equal sides.
+    The parameters are those of the specification. `specular_ior` counts as at least the coat's.
     """
 
     shorthands = (TRANSMISSION_COLOR,)
@@ -266,24 +269,26 @@ class Openpbr(Material):
     )
     specular_ior: IndexLike = index(1.5, "index of the dielectric")
     transmission_weight: TexturedNumber = share(
-        0.0, "share of what enters the dielectric that is let through", lobe=True
+        0.0, "share of the light in the dielectric that is transmitted", lobe=True
     )
-    transmission_tint: Textured = reflectance(1.0, "factor on what is let through, at the surface")
+    transmission_tint: Textured = reflectance(1.0, "factor on transmitted light, at the surface")
     absorption: SpectrumLike = coefficient(0.0, "of the inside: exp(-absorption distance) passes")
     subsurface_weight: TexturedNumber = share(
-        0.0, "share of the rest that is scattered below the surface", lobe=True
+        0.0, "share of the remaining light that is scattered below the surface", lobe=True
     )
-    subsurface_color: Textured = reflectance(0.8, "albedo of what is scattered there")
+    subsurface_color: Textured = reflectance(0.8, "albedo of the scattering there")
     subsurface_scatter_anisotropy: TexturedNumber = real(
-        0.0, "thin-walled: 1: all of it goes through, -1: none", "", -1.0, 1.0, textured=True
+        0.0, "thin-walled: 1: all light goes through; -1: none", "", -1.0, 1.0, textured=True
     )
     subsurface_inside: bool = flag(
-        False, "whether it goes into a body, which the shape's `interior` scatters"
+        False, "True: light goes into a body, and the shape's `interior` scatters it"
     )
     coat_weight: TexturedNumber = share(0.0, "share of the surface that has a coat", lobe=True)
-    coat_color: Textured = reflectance(1.0, "what is left of light that goes in and out head-on")
+    coat_color: Textured = reflectance(
+        1.0, "share of the light that passes the coat twice, head-on"
+    )
     coat_roughness: TexturedNumber = share(
-        0.0, "of the coat's facets; it makes those below rougher"
+        0.0, "of the coat's facets; it also makes the layers below rougher"
     )
     coat_roughness_anisotropy: TexturedNumber = share(0.0, "how much rougher along the tangent")
     coat_ior: TexturedNumber = real(1.6, "index of the coat", low=1.0, high=3.0, textured=True)

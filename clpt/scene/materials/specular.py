@@ -204,7 +204,8 @@ class RoughPlastic(Material):
 class CoatedConductor(Material):
     """A rough metal under a rough, clear dielectric coat; front side.
 
-    Closed form: see docs/materials.md for how far it is from a random walk between the two.
+    It is a closed form. docs/materials.md has its difference from a random walk between metal and
+    coat.
     """
 
     shorthands = (METAL, *ROUGH)
@@ -247,8 +248,9 @@ class CoatedConductor(Material):
 class Grating(Material):
     """A diffraction grating: every order leaves in its own direction, by wavelength.
 
-    Its grooves follow each other along the tangent (u of the surface; a disk's radius; a mesh needs
-    uvs), turned by `angle`. Reflective: a metal's front. Transmissive: a thin plate, both sides.
+    Its grooves repeat along the tangent, which `angle` turns. The tangent is that of u. On a disk
+    it is the radius. A mesh needs uvs. A reflective grating is the front of a metal. A transmissive
+    grating is a thin plate with both sides.
     """
 
     shorthands = (METAL,)
@@ -307,9 +309,9 @@ class Grating(Material):
 class Hair(Material):
     """A fibre that light goes through (Chiang et al. 2016), as Mitsuba 3 and pbrt 4 have it.
 
-    For `curves`, whose v runs along: all that a fibre does to light happens where it enters, and
-    its far side is passed as if it were not there. There is no thickness: `sigma_a` is absorbed
-    within a fibre's radius. What is let through is not reciprocal.
+    It is for `curves`, whose v runs along the fibre. Scattering happens where light enters the
+    fibre. The far side of the fibre has no effect. `sigma_a` is the absorption per radius of the
+    fibre, so the thickness does not matter. Transmission is not reciprocal.
     """
 
     uses_lobe_sample = True

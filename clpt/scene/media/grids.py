@@ -47,12 +47,13 @@ MOST_PARTS = 8  # of a mixture
 class Cloud(Lattice, Homogeneous):
     """A homogeneous medium whose coefficients are multiplied by the density of a cloud.
 
-    That is PBRT's, from Perlin's noise: five octaves, at places that two more shift. In the cloud's
-    own space y is the height. Up to 1/2 it fills with density, and at 1 it ends. `to_world` takes
-    that space to the world, `low` and `high` are the corners of the cloud's box there.
+    The density is that of PBRT's cloud: five octaves of Perlin's noise, at points that two more
+    octaves shift. In the cloud's own space y is the height. The density is full up to 1/2, and ends
+    at 1. `to_world` converts this space to the world. `low` and `high` are the corners of the
+    cloud's box in its space.
 
-    The density is worked out on the device at the points of a lattice, `resolution` along the
-    longest side of the box. That takes two bytes a point.
+    The device computes the density at the points of a lattice. `resolution` is the number of points
+    along the longest side of the box. A point takes two bytes.
 
     Raises SceneError for a box without an inside, and for a lattice too fine.
     """
@@ -110,13 +111,15 @@ class Cloud(Lattice, Homogeneous):
 class Grid(Lattice, Homogeneous):
     """A homogeneous medium whose coefficients are multiplied by a density on a grid.
 
-    The density (nx, ny, nz) is that at the centres of the cells of a box, trilinear between these;
-    beyond the outermost centres it is constant, and outside of the box it is 0. It is an array of
-    numpy or of pyopencl, or a `Volume`, whose box `to_world` then moves; by default it is 1.
+    The density (nx, ny, nz) holds values at the centres of the cells of a box. Between centres it
+    is trilinear. Beyond the outermost centres it is constant, and outside of the box it is 0. It is
+    an array of numpy or of pyopencl, or a `Volume`. `to_world` moves the box of a `Volume`. By
+    default the density is 1.
 
-    `emission_grid` and `temperature` are the same for its light. An array has the box of the
-    density, and the coarser of both is made as fine as the other. A `Volume` is taken at the points
-    of the density. Where there is a `temperature`, in kelvin, a black body of it is the emission.
+    `emission_grid` and `temperature` are such grids for the emission. An array fills the box of the
+    density. The coarser of both grids is refined to the points of the other grid. A `Volume` is
+    sampled at the points of the density. `temperature` is in kelvin. With it the emission is that
+    of a black body.
 
     Raises SceneError for a density with less or more than three axes, or with numbers that are
     negative or not finite.
@@ -129,11 +132,11 @@ class Grid(Lattice, Homogeneous):
     )
     bits: int = host(16, "of a number of the density on the device: 16 or 8")
     albedo_grid: NDArray[Any] | Volume | None = host(
-        None, "colours (nx, ny, nz, 3) that multiply what is scattered; the rest is absorbed",
+        None, "colours (nx, ny, nz, 3) that multiply the scattering; the lost light is absorbed",
         form="colour_volume",
     )  # fmt: skip
     albedo_with_density: bool = host(
-        False, "whether what is scattered, density times `albedo_grid`, is trilinear; else each is"
+        False, "True: density times `albedo_grid` is interpolated; False: each by itself"
     )
     color_grid: NDArray[Any] | Volume | None = host(
         None, "colours (nx, ny, nz, 3) up to 1 that multiply the extinction",
@@ -143,7 +146,7 @@ class Grid(Lattice, Homogeneous):
     temperature: Any = host(
         None, "of a black body that is the emission, (nx, ny, nz)", "K", form="volume"
     )
-    brightness: float = real(1.0, "factor of what a temperature emits", low=0.0)
+    brightness: float = real(1.0, "factor on the emission of a temperature", low=0.0)
     normalised: bool = host(
         False, "whether a black body of any temperature has 1 at its brightest wavelength"
     )
@@ -211,11 +214,11 @@ class Grid(Lattice, Homogeneous):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Soot(Grid):
-    """The soot of a flame: particles far smaller than the wavelength, which absorb and glow.
+    """The soot of a flame: particles far smaller than the wavelength, which absorb and emit.
 
-    A metre of it absorbs 6 pi E f / lambda (Rayleigh), with the share f of the volume that is soot
-    and E of 0.26, of the index 1.57 - 0.56i (Smyth and Shaddix 1996). The coefficients are those of
-    what is there beside it.
+    The absorption is 6 pi E f / lambda (Rayleigh). f is the share of soot in the volume. E is 0.26,
+    by the index 1.57 - 0.56i (Smyth and Shaddix 1996). The other coefficients are those of the
+    matter around the soot.
     """
 
     share: float = real(
@@ -239,12 +242,12 @@ class Soot(Grid):
 class Mixture(Lattice):
     """Several media in the same place: coefficients add up, and each keeps its phase function.
 
-    Each part is `homogeneous`, and then everywhere in the box, or a `grid` with a density of its
-    own. Grids have the same box, which `to_world` moves. Along each axis there are as many points
-    as the finest of them has. A point takes 2 bytes, and 4 more for each part.
+    A `homogeneous` part fills the box. A `grid` has its own density. All grids have the same box,
+    which `to_world` moves. Along each axis the number of points is that of the finest grid. A point
+    takes 2 bytes, and 4 more for each part.
 
-    Raises SceneError for parts that give out light, that have a dye, colours on a grid or another
-    box than the first grid, and for a `phase` beside those of the parts.
+    Raises SceneError for parts that emit, that have a dye, colours on a grid or another box than
+    the first grid, and for a `phase` of the mixture.
     """
 
     is_mixture = True

@@ -46,7 +46,7 @@ class Medium(Kind):
     is_mixture: ClassVar[bool] = False  # `parts` are other media
 
     name: str = host("", "for messages and for references in scene files")
-    phase: Phase = host(Isotropic(), "what a point of it sends where", form="phase")
+    phase: Phase = host(Isotropic(), "directions into which a point scatters", form="phase")
 
     # of a kind without such a parameter
     dye = cast("Reradiation | None", None)
@@ -110,7 +110,7 @@ class Homogeneous(Medium):
     albedo: SpectrumLike = reflectance(1.0, "share of `sigma_t` that is scattered", textured=False)
     scale: float = real(1.0, "factor of all coefficients", low=0.0)
     emission: SpectrumLike = emitted(
-        0.0, "what it emits where it absorbs all light; a metre emits sigma_a of it", RADIANCE
+        0.0, "radiance of an opaque body; a metre emits sigma_a times it", RADIANCE
     )
 
     @classmethod
@@ -179,12 +179,12 @@ class Homogeneous(Medium):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Dyed(Homogeneous):
-    """A homogeneous medium with a dye in it, which gives out light at longer wavelengths.
+    """A homogeneous medium with a dye, which emits light at longer wavelengths.
 
-    A metre absorbs `strength` times the dye's `absorption`, beside what the medium does. For the
-    photons absorbed the dye gives out its quantum yield, by its emission, in all directions alike
-    (Mojzik et al. 2018). Elastic scattering beside it is alike in all directions too. In RGB mode
-    the dye only absorbs.
+    The dye adds the absorption `strength` times its `absorption` to that of the medium. For each
+    absorbed photon it emits `quantum_yield` photons on average. They follow its emission, uniformly
+    in all directions (Mojzik et al. 2018). Elastic scattering is uniform too. In RGB mode the dye
+    only absorbs.
 
     Raises SceneError for another re-radiation than that of a dye, and for a `phase` beside it.
     """

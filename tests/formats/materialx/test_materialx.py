@@ -15,7 +15,7 @@ import clpt
 from clpt import images
 from clpt.errors import SceneError
 from clpt.formats import materialx
-from clpt.formats.materialx import document, noise, solids
+from clpt.formats.materialx import document, noise
 from clpt.formats.materialx.graph import Domain, Graph, category, width
 from clpt.formats.materialx.nodes import FUNCTIONS
 from clpt.scene.materials import (
@@ -400,7 +400,7 @@ NODES: list[tuple[str, dict[str, Any], Any]] = [
 
 @pytest.mark.parametrize(("kind", "values", "expected"), NODES, ids=[row[0] for row in NODES])
 def test_nodes(kind: str, values: dict[str, Any], expected: Any) -> None:
-    graph = Graph(_Told(), FUNCTIONS, document.inner, solids.texture)
+    graph = Graph(_Told(), FUNCTIONS, document.inner, noise.texture)
     found = graph.output(_Shader(kind, values), "out", Domain(np.zeros((1, 1, 2))))
     np.testing.assert_allclose(found.reshape(-1), np.atleast_1d(expected), atol=1e-6)
 

@@ -12,7 +12,7 @@ from clpt import transforms
 from clpt.errors import SceneError
 from clpt.formats import load
 from clpt.formats.pbrt import reader
-from clpt.formats.pbrt.lexer import Lexer
+from clpt.formats.pbrt.params import Lexer
 
 QUAD = '"point3 P" [0 0 0 1 0 0 1 1 0 0 1 0] "integer indices" [0 1 2 0 2 3]'
 

@@ -15,7 +15,7 @@ import clpt
 from clpt import transforms
 from clpt.cli import cli
 from clpt.geometry import triangles
-from clpt.scene import Film, Scene, cameras, lights, materials, media, shapes
+from clpt.scene import Film, Scene, cameras, lights, materials, media, phases, shapes
 from clpt.scene.motion import Keys, Shutter
 from clpt.scene.params import params
 from clpt.scene.textures import Bitmap, Checkerboard, Product
@@ -128,7 +128,7 @@ def test_glass_keeps_index_dispersion_and_absorption(tmp_path: Path) -> None:
 def test_milk_in_a_glass_comes_back(tmp_path: Path) -> None:
     milk = media.Homogeneous(
         sigma_a=RGBUnbounded(0.1, 0.2, 0.4), sigma_s=RGBUnbounded(5.0, 4.0, 3.0),
-        phase=media.HenyeyGreenstein(g=0.4),
+        phase=phases.HenyeyGreenstein(g=0.4),
     )  # fmt: skip
     body = shapes.Sphere(material=materials.Dielectric(int_ior=1.33), interior=milk)
     read, lost = again(with_shape(body), tmp_path)

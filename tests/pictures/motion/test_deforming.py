@@ -13,7 +13,7 @@ import pytest
 import clpt
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.render.edit.blurring import between
+from clpt.render.edit.scene_edit import between
 from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene, cameras, integrators, lights, materials, shapes, textures
 from clpt.scene.motion import Deformation, Keys, Shutter

@@ -12,7 +12,7 @@ import pytest
 import clpt
 from clpt import transforms
 from clpt.errors import SceneError
-from clpt.render.edit.blurring import between
+from clpt.render.edit.scene_edit import between
 from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Scene, lights, materials, shapes
 from clpt.scene.motion import Deformation, Keys, Shutter

@@ -14,7 +14,7 @@ import pytest
 import clpt
 from clpt.errors import SceneError
 from clpt.render.flow.scene_to_tables import lower
-from clpt.render.textures.image_files import ImageFiles
+from clpt.render.textures.texels import ImageFiles
 from clpt.scene import Scene, cameras, lights, materials, media, shapes, textures
 from clpt.scene.fingerprint import fingerprint
 from clpt.scene.volumes import Volume

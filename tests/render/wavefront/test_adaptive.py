@@ -20,7 +20,7 @@ from clpt.errors import SceneError
 from clpt.render.flow.scene_to_tables import lower
 from clpt.render.records import Features, TransportFeatures
 from clpt.render.wavefront.adaptive import LEAST, LightRounds, _partners, checked
-from clpt.render.wavefront.work_list import FOREVER, SIDE, inside, pixels, table
+from clpt.render.wavefront.path_buffers import FOREVER, SIDE, inside, pixels, work_table
 from clpt.scene import Film, Scene, materials
 from clpt.scene.cameras import Perspective
 from clpt.scene.integrators import PIXELWISE, Box, Mitchell, ParticleTracer, Path, Vcm
@@ -351,7 +351,7 @@ def test_work_list():
     order = inside(settings)
     x, y = pixels(settings)
     assert {*zip(x[order], y[order], strict=True)} == {(i, j) for i in range(10) for j in range(7)}
-    work_list = table(settings, order, order + 1000)
+    work_list = work_table(settings, order, order + 1000)
     dealt = []
     for slot in range(32):
         pixel = work_list[2 * 96 + slot]
@@ -360,7 +360,7 @@ def test_work_list():
             pixel = work_list[pixel]
     assert sorted(dealt) == list(order)
     assert (work_list[96:192][order] == order + 1000).all()
-    assert (table(settings, order)[96:192] == FOREVER).all()
+    assert (work_table(settings, order)[96:192] == FOREVER).all()
 
 
 @pytest.mark.parametrize("side", [1, 2, 15, 16, 17, 33])

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The process that renders: another Python, so that a driver's crash leaves Blender alive."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import secrets
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from multiprocessing.connection import Connection, Listener
+from pathlib import Path
+from typing import Any
+
+WORKER = Path(__file__).with_name("worker.py")
+STARTS_WITHIN = 60.0  # [s]
+PYTHON = "CLPT_PYTHON"  # the environment variable that names a Python with clpt
+
+
+class ProcessError(Exception):
+    """The process could not start, or ended; the message is for people."""
+
+
+class Process:
+    """A process of clpt and the connection to it."""
+
+    def __init__(self, python: str = ""):
+        key = secrets.token_bytes(32)
+        with Listener(("127.0.0.1", 0), authkey=key) as listener:
+            listener._listener._socket.settimeout(0.5)  # accept() has no limit of its own
+            command = [python or interpreter(), str(WORKER), str(listener.address[1])]
+            try:
+                self.child = subprocess.Popen(command, stdin=subprocess.PIPE)
+            except OSError as error:
+                raise ProcessError(f"{command[0]} does not start: {error.strerror}") from None
+            assert self.child.stdin is not None
+            with suppress(BrokenPipeError):  # a child that has ended is told below
+                self.child.stdin.write(key)
+                self.child.stdin.close()
+            self.connection = self._accept(listener)
+
+    def _accept(self, listener: Listener) -> Connection:
+        end = time.monotonic() + STARTS_WITHIN
+        while time.monotonic() < end:
+            try:
+                return listener.accept()
+            except TimeoutError:
+                if self.child.poll() is not None:
+                    break
+        self.stop()
+        raise ProcessError("clpt does not start; name a Python that has clpt in the preferences")
+
+    def send(self, message: dict[str, Any]) -> None:
+        """Send a message. Raises ProcessError if the process has ended."""
+        try:
+            self.connection.send_bytes(json.dumps(message).encode())
+        except OSError:
+            raise ProcessError("clpt has ended") from None
+
+    def receive(self, wait: float) -> tuple[dict[str, Any], bytes] | None:
+        """Return a message and the pixels after it, None if none comes within `wait` [s].
+
+        Raises ProcessError if the process has ended, or tells an error.
+        """
+        try:
+            if not self.connection.poll(wait):
+                return None
+            message = json.loads(self.connection.recv_bytes())
+            pixels = self.connection.recv_bytes() if message.get("pixels") else b""
+        except (EOFError, OSError):
+            raise ProcessError("clpt has ended; its message is in the terminal") from None
+        if "error" in message:
+            raise ProcessError(message["error"])
+        return message, pixels
+
+    def stop(self) -> None:
+        """End the process, if it has not ended."""
+        if hasattr(self, "connection"):
+            self.connection.close()
+        try:
+            self.child.wait(2.0)
+        except subprocess.TimeoutExpired:
+            self.child.kill()
+            self.child.wait()
+
+
+def interpreter() -> str:
+    """Return the Python that has clpt: CLPT_PYTHON, or Blender's. Raises ProcessError."""
+    if os.environ.get(PYTHON):
+        return os.environ[PYTHON]
+    if importlib.util.find_spec("clpt") is not None:
+        return sys.executable
+    raise ProcessError("no Python with clpt is known; name it in the preferences of the add-on")

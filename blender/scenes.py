@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The evaluated scene of Blender as a scene file of clpt, with its meshes and images beside it."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from . import meshes
+from .nodes import Json, Tree, _source
+
+SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
+TO_CLPT = Matrix.Diagonal((-1.0, 1.0, -1.0, 1.0))  # cameras and lamps look along +z there
+# A dome of clpt has +y up and +z in its middle; of Blender +z up and +x in its middle.
+DOME = [[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+SILENT = {"CAMERA", "EMPTY", "ARMATURE", "LATTICE", "LIGHT_PROBE", "SPEAKER"}
+
+Rows = list[list[float]]  # of a matrix
+
+
+class Writer:
+    """Writes a scene once. told: what is left out or approximated, for people."""
+
+    def __init__(self, depsgraph: bpy.types.Depsgraph, folder: Path, width: int, height: int):
+        self.depsgraph, self.folder = depsgraph, folder
+        self.width, self.height = width, height
+        self.told: dict[str, None] = {}
+        self.tree = Tree(self.image, self.tell)
+        self.images: dict[str, Json | None] = {}
+        self.materials: dict[str, tuple[str, Any]] = {}
+        self.named: dict[str, Json] = {}
+        self.groups: dict[str, list[Json]] = {}
+
+    def tell(self, text: str) -> None:
+        self.told.setdefault(text)
+
+    def write(self) -> Path:
+        """Write all; return the scene file."""
+        shapes: list[Json] = []
+        lights: list[Json] = []
+        parts: dict[int, list[Json]] = {}
+        places: dict[int, list[Rows]] = {}
+        for instance in self.depsgraph.object_instances:
+            if not instance.show_self:
+                continue
+            source = instance.object  # it is gone after its turn
+            if source.type in SURFACES:
+                key = source.data.as_pointer()
+                if key not in parts:
+                    parts[key] = self._parts(len(parts), source)
+                places.setdefault(key, []).append([list(row) for row in instance.matrix_world])
+            elif source.type == "LIGHT":
+                self._lamp(source, instance.matrix_world.copy(), lights, shapes)
+            elif source.type not in SILENT:
+                self.tell(f"objects of the type {source.type.title()} are left out")
+        for key, matrices in places.items():
+            shapes += self._placed(parts[key], matrices)
+        lights += self._world()
+        content = {
+            "version": 2,
+            "camera": self._camera(),
+            "film": {"width": self.width, "height": self.height},
+            "materials": self.named,
+            "groups": self.groups,
+            "shapes": shapes,
+            "lights": lights,
+        }
+        file = self.folder / "scene.json"
+        file.write_text(json.dumps(content), "utf-8")
+        return file
+
+    def _placed(self, parts: list[Json], matrices: list[Rows]) -> list[Json]:
+        """Return the shapes of a mesh at all its places: instances of a group where it has many."""
+        if len(matrices) == 1:
+            return [{**part, "to_world": matrices[0]} for part in parts]
+        if not parts:
+            return []
+        name = f"group{len(self.groups)}"
+        self.groups[name] = parts
+        return [{"type": "instance", "group": name, "to_world": matrix} for matrix in matrices]
+
+    def _parts(self, number: int, source: Any) -> list[Json]:
+        """Return the shapes of an object in its own space, one for each material."""
+        is_mesh = isinstance(source.data, bpy.types.Mesh)
+        try:
+            mesh = source.data if is_mesh else source.to_mesh()
+        except RuntimeError:  # such as curves without a surface
+            return []
+        files = meshes.write(mesh, self.folder, f"mesh{number}")
+        slots = [slot.material for slot in source.material_slots] or list(mesh.materials)
+        parts = [self._part(file, slots, slot, source.name) for slot, file in files.items()]
+        if not is_mesh:
+            source.to_mesh_clear()
+        return parts
+
+    def _part(self, file: str, slots: list[Any], slot: int, name: str) -> Json:
+        material = slots[slot] if slot < len(slots) else None
+        key = "none" if material is None else material.name_full
+        if key not in self.materials:
+            described, radiance = self.tree.material(material)
+            self.named[key] = described
+            self.materials[key] = key, radiance
+        named, radiance = self.materials[key]
+        part: Json = {"type": "mesh", "file": file, "material": named, "name": name}
+        if radiance is not None:
+            part["emission"] = {"type": "area", "radiance": radiance, "two_sided": True}
+        return part
+
+    def image(self, image: bpy.types.Image) -> Json | None:
+        """Return an image as a bitmap; its file as it is, or what Blender has in memory."""
+        key = image.name_full
+        if key not in self.images:
+            self.images[key] = self._image(image)
+        return self.images[key]
+
+    def _image(self, image: bpy.types.Image) -> Json | None:
+        data = image.colorspace_settings.name == "Non-Color"
+        path = Path(bpy.path.abspath(image.filepath, library=image.library))
+        if image.source == "FILE" and not image.packed_file and path.is_file():
+            return {"type": "bitmap", "image": str(path), "raw": data}
+        width, height = image.size
+        if width * height == 0:
+            self.tell(f"image {image.name!r} is missing")
+            return None
+        pixels = np.empty(width * height * 4, np.float32)
+        image.pixels.foreach_get(pixels)
+        pixels = pixels.reshape(height, width, 4)[::-1]
+        if not (image.is_float or data):
+            pixels = np.concatenate([_linear(pixels[..., :3]), pixels[..., 3:]], axis=2)
+        file = self.folder / f"image{len(self.images)}.npy"
+        np.save(file, np.ascontiguousarray(pixels))
+        return {"type": "bitmap", "image": str(file), "raw": True}
+
+    def _lamp(self, source: Any, matrix: Matrix, lights: list[Json], shapes: list[Json]) -> None:
+        """Add a lamp; a strength of w watts is w / (4 pi) W/sr of a point."""
+        lamp = source.data
+        color = [c * lamp.energy * 2.0**lamp.exposure for c in lamp.color]
+        if lamp.use_temperature:
+            color = [c * t for c, t in zip(color, lamp.temperature_color, strict=True)]
+        if lamp.node_tree is not None and lamp.use_nodes:
+            self.tell("nodes of lamps are not read")
+        rigid = Matrix.LocRotScale(*matrix.decompose()[:2], (1.0, 1.0, 1.0))
+        place = [list(row) for row in rigid @ TO_CLPT]
+        if lamp.type == "SUN":
+            direction = [-value for value in rigid.col[2][:3]]
+            lights.append({"type": "directional", "direction": direction, "irradiance": color})
+        elif lamp.type == "POINT" and lamp.shadow_soft_size > 0.0:
+            area = 4.0 * math.pi * lamp.shadow_soft_size**2
+            shapes.append({
+                "type": "sphere", "radius": lamp.shadow_soft_size,
+                "center": list(rigid.translation), "material": "lamp",
+                "emission": {"type": "area", "radiance": [c / (math.pi * area) for c in color]},
+            })  # fmt: skip
+            self.named["lamp"] = {"type": "null"}
+        elif lamp.type == "POINT":
+            lights.append({
+                "type": "point", "position": list(rigid.translation),
+                "intensity": [c / (4.0 * math.pi) for c in color],
+            })  # fmt: skip
+        elif lamp.type == "SPOT":
+            edge = math.cos(0.5 * lamp.spot_size)
+            full = math.degrees(math.acos(min(edge + (1.0 - edge) * lamp.spot_blend, 1.0)))
+            lights.append({
+                "type": "spot", "to_world": place, "edge": "smooth", "beam_width": full,
+                "cutoff": math.degrees(0.5 * lamp.spot_size),
+                "intensity": [c / (4.0 * math.pi) for c in color],
+            })  # fmt: skip
+        else:
+            self._area(lamp, color, matrix, shapes)
+
+    def _area(self, lamp: Any, color: list[float], matrix: Matrix, shapes: list[Json]) -> None:
+        round_ = lamp.shape in ("DISK", "ELLIPSE")
+        width = lamp.size
+        height = lamp.size_y if lamp.shape in ("RECTANGLE", "ELLIPSE") else lamp.size
+        place = matrix @ TO_CLPT @ Matrix.Diagonal((0.5 * width, 0.5 * height, 1.0, 1.0))
+        across, along = place.col[0].xyz, place.col[1].xyz
+        area = across.cross(along).length * (math.pi if round_ else 4.0)
+        self.named["lamp"] = {"type": "null"}
+        shapes.append({
+            "type": "disk" if round_ else "rectangle", "to_world": [list(row) for row in place],
+            "material": "lamp",
+            "emission": {"type": "area", "radiance": [c / (math.pi * area) for c in color]},
+        })  # fmt: skip
+
+    def _world(self) -> list[Json]:
+        world = self.depsgraph.scene.world
+        if world is None:
+            return []
+        if not world.use_nodes or world.node_tree is None:
+            return [{"type": "constant", "radiance": list(world.color)}]
+        output = world.node_tree.get_output_node("CYCLES")
+        source = None if output is None else _source(output.inputs["Surface"])
+        if source is None or source.type != "BACKGROUND":
+            if source is not None:
+                self.tell(f"{source.bl_label} of the world is not read: it is dark")
+            return []
+        strength = self.tree.number(source, "Strength", 1.0)
+        strength = strength if isinstance(strength, float) else 1.0
+        texture = _source(source.inputs["Color"])
+        if texture is None or texture.type != "TEX_ENVIRONMENT" or texture.image is None:
+            if texture is not None:
+                self.tell(f"{texture.bl_label} of the world is not read; its color stands for it")
+            color = list(source.inputs["Color"].default_value)[:3]
+            radiance = [c * strength for c in color]
+            return [{"type": "constant", "radiance": radiance}] if any(radiance) else []
+        return [self._dome(texture, strength)]
+
+    def _dome(self, texture: Any, strength: float) -> Json:
+        bitmap = self.image(texture.image) or {"image": ""}
+        turn, source = Matrix.Identity(4), _source(texture.inputs["Vector"])
+        if source is not None and source.type == "MAPPING":
+            angles = list(source.inputs["Rotation"].default_value)
+            turn = Matrix.Rotation(angles[2], 4, "Z")
+        place = turn.inverted() @ Matrix(DOME)
+        return {
+            "type": "envmap", "image": bitmap["image"], "scale": strength,
+            "to_world": [list(row) for row in place],
+        }  # fmt: skip
+
+    def _camera(self) -> Json:
+        source = self.depsgraph.scene.camera
+        if source is None:
+            self.tell("there is no camera; it stands at (7, -7, 5)")
+            return {"type": "perspective", "to_world": [
+                {"look_at": {"origin": [7, -7, 5], "target": [0, 0, 0], "up": [0, 0, 1]}}
+            ]}  # fmt: skip
+        source = source.evaluated_get(self.depsgraph)
+        camera, matrix = source.data, source.matrix_world
+        rigid = Matrix.LocRotScale(*matrix.decompose()[:2], (1.0, 1.0, 1.0)) @ TO_CLPT
+        window = source.calc_matrix_camera(self.depsgraph, x=self.width, y=self.height)
+        described: Json = {"near": camera.clip_start, "far": camera.clip_end}
+        if camera.type == "ORTHO":
+            half = 1.0 / window[0][0]
+            place = rigid @ Matrix.Diagonal((half, half, 1.0, 1.0))
+            described |= {"type": "orthographic"}
+        else:
+            if camera.type != "PERSP":
+                self.tell(f"the camera {camera.type.title()} is read as a perspective")
+            place = rigid
+            described |= {
+                "type": "perspective", "fov_axis": "x",
+                "fov": math.degrees(2.0 * math.atan(1.0 / window[0][0])),
+                "offset_x": 0.5 * window[0][2], "offset_y": -0.5 * window[1][2],
+            }  # fmt: skip
+            if camera.dof.use_dof:
+                focus = camera.dof.focus_distance
+                if camera.dof.focus_object is not None:
+                    there = camera.dof.focus_object.matrix_world.translation
+                    focus = (there - matrix.translation).length
+                radius = 0.5e-3 * camera.lens / camera.dof.aperture_fstop
+                described |= {
+                    "type": "thin_lens",
+                    "aperture_radius": radius,
+                    "focus_distance": focus,
+                }
+        return {**described, "to_world": [list(row) for row in place]}
+
+
+def _linear(encoded: np.ndarray) -> np.ndarray:
+    """Return sRGB as linear Rec. 709 (IEC 61966-2-1)."""
+    low = encoded / 12.92
+    return np.where(encoded <= 0.04045, low, ((encoded + 0.055) / 1.055) ** 2.4).astype(np.float32)

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Renders scene files for Blender: python worker.py PORT, with the connection's key at stdin."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+import time
+from multiprocessing.connection import Client, Connection
+from typing import Any
+
+import numpy as np
+
+import clpt
+
+SHOWN_EVERY = 0.5  # [s] of pictures on the way
+
+
+def main() -> None:
+    """Answer messages until Blender closes the connection."""
+    key = sys.stdin.buffer.read()
+    with Client(("127.0.0.1", int(sys.argv[1])), authkey=key) as connection:
+        while True:
+            try:
+                message = json.loads(connection.recv_bytes())
+            except (EOFError, OSError):
+                return
+            try:
+                _render(connection, message)
+            except (EOFError, OSError):
+                return
+            except Exception as error:  # whatever happens, Blender is told
+                _send(connection, {"error": f"{type(error).__name__}: {error}"})
+
+
+def _send(
+    connection: Connection, message: dict[str, Any], pixels: np.ndarray | None = None
+) -> None:
+    connection.send_bytes(json.dumps({**message, "pixels": pixels is not None}).encode())
+    if pixels is not None:
+        connection.send_bytes(pixels.tobytes())
+
+
+def _render(connection: Connection, message: dict[str, Any]) -> None:
+    """Render a file until its samples are there, its noise is low, or Blender says stop."""
+    scene = clpt.load(message["file"])
+    size = {"width": message["width"], "height": message["height"]}
+    scene.film = dataclasses.replace(scene.film, mode=message["mode"], **size)
+    total, shown = int(message["samples"]), time.monotonic()
+    with clpt.Renderer(scene) as renderer:
+        _send(connection, {"samples": 0, "warnings": scene.warnings})
+        while renderer.samples < total:
+            renderer.run(1 if renderer.samples == 0 else min(4, total - renderer.samples))
+            if connection.poll() and json.loads(connection.recv_bytes()).get("stop"):
+                break
+            if time.monotonic() - shown > SHOWN_EVERY:
+                _send(connection, {"samples": renderer.samples}, _pixels(renderer))
+                shown = time.monotonic()
+        _send(connection, {"samples": renderer.samples, "done": True}, _pixels(renderer))
+
+
+def _pixels(renderer: Any) -> np.ndarray:
+    """Return the picture as Blender has it: (h, w, 4) float32, the bottom row first."""
+    image = np.asarray(renderer.image(), np.float32)
+    rgba = np.ones((*image.shape[:2], 4), np.float32)
+    rgba[..., : image.shape[2]] = image
+    return np.ascontiguousarray(rgba[::-1])
+
+
+if __name__ == "__main__":
+    main()

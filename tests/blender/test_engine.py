@@ -1,0 +1,155 @@
+"""The render engine of Blender, beside Cycles in the same process (`pip install bpy`)."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clpt import images
+
+bpy: Any = pytest.importorskip("bpy")
+blender: Any = pytest.importorskip("blender")
+
+pytestmark = pytest.mark.slow
+SIZE = 48, 36
+
+
+@pytest.fixture(autouse=True, scope="module")
+def registered() -> Any:
+    blender.register()
+    yield
+    blender.unregister()
+
+
+@pytest.fixture(autouse=True)
+def empty(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLPT_PYTHON", sys.executable)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+def picture(engine: str, folder: Path, samples: int = 256, bounces: int = 0) -> np.ndarray:
+    """Return the picture of Blender's scene (h, w, 3) by an engine, without tone curves."""
+    scene = bpy.context.scene
+    scene.render.engine = engine
+    if engine == "CYCLES":
+        scene.cycles.samples, scene.cycles.device = samples, "CPU"
+        scene.cycles.use_denoising, scene.cycles.max_bounces = False, bounces
+    else:
+        scene.clpt.samples, scene.clpt.mode = samples, "rgb"
+    scene.render.resolution_x, scene.render.resolution_y = SIZE
+    scene.render.resolution_percentage = 100
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
+    scene.render.filepath = str(folder / f"{engine}.exr")
+    bpy.ops.render.render(write_still=True)
+    return np.asarray(images.read(scene.render.filepath))[..., :3]
+
+
+def link(name: str, data: Any, place: tuple[float, ...], turn: tuple[float, ...]) -> Any:
+    thing = bpy.data.objects.new(name, data)
+    thing.location, thing.rotation_euler = place, turn
+    bpy.context.scene.collection.objects.link(thing)
+    return thing
+
+
+def floor_and_camera() -> None:
+    bpy.ops.mesh.primitive_plane_add(size=20)
+    material = bpy.data.materials.new("floor")
+    material.use_nodes = True
+    nodes = material.node_tree.nodes
+    nodes.clear()
+    output = nodes.new("ShaderNodeOutputMaterial")
+    diffuse = nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs[0].default_value = (0.5, 0.4, 0.2, 1.0)
+    material.node_tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
+    bpy.context.object.data.materials.append(material)
+    camera = bpy.data.cameras.new("camera")
+    camera.shift_x, camera.shift_y = 0.1, 0.05
+    bpy.context.scene.camera = link("camera", camera, (0.0, -6.0, 5.0), (0.88, 0.0, 0.0))
+
+
+LAMPS = {
+    "sun": ("SUN", {"energy": 3.0, "angle": 0.0}),
+    "point": ("POINT", {"energy": 100.0, "shadow_soft_size": 0.0}),
+    "warm": (
+        "POINT",
+        {"energy": 50.0, "shadow_soft_size": 0.0, "use_temperature": True, "temperature": 3000.0,
+         "exposure": 1.0},
+    ),
+    "spot": (
+        "SPOT", {"energy": 100.0, "shadow_soft_size": 0.0, "spot_size": 1.2, "spot_blend": 0.4}
+    ),
+    "square": ("AREA", {"energy": 100.0, "size": 1.5}),
+    "rectangle": ("AREA", {"energy": 100.0, "shape": "RECTANGLE", "size": 1.5, "size_y": 0.7}),
+    "disk": ("AREA", {"energy": 100.0, "shape": "DISK", "size": 1.5}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LAMPS)
+def test_lamps_shine_as_in_cycles(name: str, tmp_path: Path) -> None:
+    """Means within .2 %: both have noise of less than .1 %."""
+    kind, settings = LAMPS[name]
+    floor_and_camera()
+    lamp = bpy.data.lights.new(name, kind)
+    for key, value in settings.items():
+        setattr(lamp, key, value)
+    link(name, lamp, (0.5, 0.0, 3.0), (0.3, 0.2, 0.0))
+    ours, cycles = (picture(engine, tmp_path) for engine in ("CLPT", "CYCLES"))
+    assert ours.mean(axis=(0, 1)) == pytest.approx(cycles.mean(axis=(0, 1)), rel=2e-3)
+    left, right = (half.mean() for half in np.split(ours, 2, axis=1))
+    assert left / right == pytest.approx(
+        np.divide(*(half.mean() for half in np.split(cycles, 2, axis=1))), rel=5e-3
+    )
+
+
+def test_the_first_scene_of_blender(tmp_path: Path) -> None:
+    """Each quarter of the picture of the cube within 2 % of Cycles'."""
+    bpy.ops.wm.read_factory_settings()
+    ours, cycles = (picture(engine, tmp_path, 128, 4) for engine in ("CLPT", "CYCLES"))
+    for rows in np.split(np.stack([ours, cycles]), 2, axis=1):
+        for quarter in np.split(rows, 2, axis=2):
+            mine, theirs = quarter.mean(axis=(1, 2, 3))
+            assert mine == pytest.approx(theirs, rel=0.02)
+
+
+def test_a_turned_dome(tmp_path: Path) -> None:
+    """A bright spot in the surroundings lies where Cycles has it, turned by a Mapping node."""
+    world = bpy.data.worlds.new("world")
+    bpy.context.scene.world = world
+    world.use_nodes = True
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    image = bpy.data.images.new("sky", 128, 64, float_buffer=True)
+    pixels = np.full((64, 128, 4), 0.1, np.float32)
+    pixels[28:36, 80:88, :3] = (5.0, 2.0, 1.0)
+    image.pixels = pixels.ravel()
+    texture = nodes.new("ShaderNodeTexEnvironment")
+    texture.image = image
+    mapping, where = nodes.new("ShaderNodeMapping"), nodes.new("ShaderNodeTexCoord")
+    mapping.inputs["Rotation"].default_value = (0.0, 0.0, 0.6)
+    links.new(where.outputs["Generated"], mapping.inputs["Vector"])
+    links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+    links.new(texture.outputs["Color"], nodes["Background"].inputs["Color"])
+    nodes["Background"].inputs["Strength"].default_value = 2.0
+    camera = bpy.data.cameras.new("camera")
+    camera.angle = 2.6
+    bpy.context.scene.camera = link("camera", camera, (0.0, 0.0, 0.0), (1.5708, 0.0, -2.0))
+    bpy.ops.mesh.primitive_cube_add(size=0.1, location=(0.0, 0.0, -50.0))
+    ours, cycles = (picture(engine, tmp_path, 16) for engine in ("CLPT", "CYCLES"))
+    bright = [np.argwhere(shown[..., 0] > 5.0).mean(axis=0) for shown in (ours, cycles)]
+    assert np.allclose(bright[0], bright[1], atol=0.7)
+    assert ours.mean() == pytest.approx(cycles.mean(), rel=0.02)
+
+
+def test_a_fault_is_a_line_and_blender_lives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    floor_and_camera()
+    monkeypatch.setenv("CLPT_PYTHON", "/bin/false")
+    with pytest.raises(RuntimeError, match="clpt does not start"):
+        picture("CLPT", tmp_path)
+    monkeypatch.setenv("CLPT_PYTHON", sys.executable)
+    assert picture("CLPT", tmp_path, 4).shape == (SIZE[1], SIZE[0], 3)
