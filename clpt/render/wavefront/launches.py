@@ -24,8 +24,8 @@ AIM_SECONDS = LOOP_SECONDS / 2  # of a launch at most, by the time of the launch
 LEAST_LAUNCH = 1 / 2  # of the usual launch: shorter launches cost too much
 LAUNCHES = 3  # launches that a run waits for, about, before it ends
 FIRST_PART = 16  # the first launches take this part of the slots
-POLLS = 8  # looks at an event, about, in the time that it takes
-SHORTEST, LONGEST = 2e-5, 5e-3  # between two looks [s]
+POLLS = 2  # the next look at an event comes after this part of the time so far
+SHORTEST, LONGEST = 5e-5, 5e-3  # between two looks [s]
 
 Reads = deque[tuple[NDArray[np.uint64], cl.Event]]  # of counters, and the ends of the reads
 
