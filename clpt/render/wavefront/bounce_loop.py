@@ -239,14 +239,14 @@ class BounceLoop:
             begin.set_args(restart=0, leave=leave.argument)
         stopped = math.inf  # when the run was told to stop [s]
         reads: launches.Reads = deque()
-        before = time.perf_counter()
+        before, took = time.perf_counter(), 0.0
         while True:
             self._enqueue_batch()
             reads.append(self.paths.read_counters())
             self.stream.flush()
             if len(reads) < 2:
                 continue
-            counters, was_cut = launches.wait(reads, leave)
+            counters, was_cut = launches.wait(reads, leave, took)
             try:
                 goes_on = on_batch(counters)
             except BaseException:

@@ -24,8 +24,9 @@ AIM_SECONDS = LOOP_SECONDS / 2  # of a launch at most, by the time of the launch
 LEAST_LAUNCH = 1 / 2  # of the usual launch: shorter launches cost too much
 LAUNCHES = 3  # launches that a run waits for, about, before it ends
 FIRST_PART = 16  # the first launches take this part of the slots
-POLLS = 2  # the next look at an event comes after this part of the time so far
-SHORTEST, LONGEST = 5e-5, 5e-3  # between two looks [s]
+FIRST_LOOK = 0.9  # of the time of the launch before: the second look at an event
+POLLS = 8  # then the next look comes after this part of the time so far
+SHORTEST = 5e-5  # between two looks [s]
 
 Reads = deque[tuple[NDArray[np.uint64], cl.Event]]  # of counters, and the ends of the reads
 
@@ -88,14 +89,14 @@ def next_size(
     return Size(limits.share, max(1, min(wanted, 2 * bounces, fitting // limits.share)))
 
 
-def wait(reads: Reads, cut: device.Flag) -> tuple[NDArray[np.uint64], bool]:
+def wait(reads: Reads, cut: device.Flag, expected: float = 0.0) -> tuple[NDArray[np.uint64], bool]:
     """Wait for the first read; return its counters, and whether launches were cut.
 
-    A launch is cut after LOOP_SECONDS, where the device sees the flag. Then all reads are awaited,
+    expected: the time of the launch before [s]: looks at an event take time of the device. A launch is cut after LOOP_SECONDS, where the device sees the flag. Then all reads are awaited,
     and the last counters are returned.
     """
     counters, event = reads.popleft()
-    if cut.argument is None or _ends(event, LOOP_SECONDS):
+    if cut.argument is None or _ends(event, LOOP_SECONDS, FIRST_LOOK * expected):
         device.wait(event)
         return counters, False
     cut.raise_()
@@ -107,12 +108,16 @@ def wait(reads: Reads, cut: device.Flag) -> tuple[NDArray[np.uint64], bool]:
     return counters, True
 
 
-def _ends(event: cl.Event, seconds: float) -> bool:
-    """Wait for an event, for some seconds at most; return whether it has ended or failed."""
+def _ends(event: cl.Event, seconds: float, pause: float) -> bool:
+    """Wait for an event, for some seconds at most; return whether it has ended or failed.
+
+    pause: before the second look [s].
+    """
     start = time.perf_counter()
     while event.command_execution_status > cl.command_execution_status.COMPLETE:
         elapsed = time.perf_counter() - start
         if elapsed > seconds:
             return False
-        time.sleep(min(max(elapsed / POLLS, SHORTEST), LONGEST))
+        time.sleep(min(max(pause, elapsed / POLLS, SHORTEST), seconds))
+        pause = 0.0
     return True
