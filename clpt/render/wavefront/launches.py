@@ -92,8 +92,9 @@ def next_size(
 def wait(reads: Reads, cut: device.Flag, expected: float = 0.0) -> tuple[NDArray[np.uint64], bool]:
     """Wait for the first read; return its counters, and whether launches were cut.
 
-    expected: the time of the launch before [s]: looks at an event take time of the device. A launch is cut after LOOP_SECONDS, where the device sees the flag. Then all reads are awaited,
-    and the last counters are returned.
+    expected: the time of the launch before [s]: looks at an event take time of the device. A launch
+    is cut after LOOP_SECONDS, where the device sees the flag. Then all reads are awaited, and the
+    last counters are returned.
     """
     counters, event = reads.popleft()
     if cut.argument is None or _ends(event, LOOP_SECONDS, FIRST_LOOK * expected):
