@@ -51,7 +51,7 @@ class ClptEngine(bpy.types.RenderEngine):
         with tempfile.TemporaryDirectory(prefix="clpt_") as folder:
             try:
                 self.update_stats("", "clpt: the scene is read")
-                writer = scenes.Writer(depsgraph, Path(folder), width, height)
+                writer = scenes.Writer(depsgraph, Path(folder), width, height, self.frame_set)
                 file = writer.write()
                 for line in writer.told:
                     self.report({"WARNING"}, f"clpt: {line}")

@@ -240,3 +240,40 @@ def test_passes_are_those_of_cycles(tmp_path: Path) -> None:
         ours, cycles = (shown[engine][f"ViewLayer.{name}"] for engine in ("CLPT", "CYCLES"))
         assert np.median(np.abs(ours - cycles)) < 1e-3, name
         assert np.mean(np.abs(ours - cycles) < 0.02) > 0.8, name
+
+
+def test_what_moves_is_blurred_as_in_cycles(tmp_path: Path) -> None:
+    """A glowing square that crosses the picture while the shutter is open: its row of pixels."""
+    floor_and_camera()
+    bpy.data.objects["Plane"].location = (0.0, 0.0, -200.0)
+    bpy.ops.mesh.primitive_plane_add(size=1.0)
+    square = bpy.context.object
+    glow = bpy.data.materials.new("glow")
+    glow.use_nodes = True
+    surface = glow.node_tree.nodes["Principled BSDF"]
+    surface.inputs["Emission Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    surface.inputs["Emission Strength"].default_value = 2.0
+    square.data.materials.append(glow)
+    for frame, x in ((0, -2.0), (2, 2.0)):
+        square.location = (x, 0.0, 0.0)
+        square.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(1)
+    bpy.context.scene.render.use_motion_blur = True
+    bpy.context.scene.render.motion_blur_shutter = 1.0
+    ours, cycles = (picture(engine, tmp_path, 256) for engine in ("CLPT", "CYCLES"))
+    rows = [shown[..., 0].sum(axis=0) for shown in (ours, cycles)]
+    assert rows[0].sum() == pytest.approx(rows[1].sum(), rel=0.02)
+    assert np.abs(rows[0] - rows[1]).max() < 0.1 * rows[1].max()
+
+
+def test_a_transparent_film_has_alpha(tmp_path: Path) -> None:
+    bpy.ops.wm.read_factory_settings()
+    scene = bpy.context.scene
+    scene.render.film_transparent = True
+    scene.render.image_settings.color_mode = "RGBA"
+    alphas = []
+    for engine in ("CLPT", "CYCLES"):
+        picture(engine, tmp_path, 32)
+        channels = images.read_channels(scene.render.filepath)
+        alphas.append(next(v for name, v in channels.items() if name.endswith("A")).mean())
+    assert 0.05 < alphas[1] < 0.5 and alphas[0] == pytest.approx(alphas[1], abs=0.005)
