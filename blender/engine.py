@@ -52,7 +52,7 @@ class ClptEngine(bpy.types.RenderEngine):
             process.send(
                 {
                     "file": str(file), "width": width, "height": height, "mode": settings.mode,
-                    "samples": settings.samples,
+                    "samples": settings.samples, "denoise": settings.denoise,
                 }
             )  # fmt: skip
             done = asked = False

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes of Blender as .ply: triangles with normals and texture coordinates, by material."""
+"""Meshes of Blender as .ply, by material, and hair as text: strands of Bezier pieces."""
 
 from __future__ import annotations
 
@@ -71,3 +71,34 @@ def _write(file: Path, rows: np.ndarray, faces: np.ndarray) -> None:
         stream.write(header.encode("ascii"))
         stream.write(rows.tobytes())
         stream.write(table.tobytes())
+
+
+def write_strands(curves: bpy.types.Curves, file: Path) -> bool:
+    """Write hair, whose points are joined by Catmull-Rom pieces; return whether there is any.
+
+    A piece from p1 to p2 is the Bezier p1, p1 + (p2 - p0) / 6, p2 - (p3 - p1) / 6, p2; at the ends
+    of a strand its first and last point count twice.
+    """
+    lengths = np.empty(len(curves.curves), np.int32)
+    curves.curves.foreach_get("points_length", lengths)
+    places = np.empty(len(curves.points) * 3, np.float32)
+    curves.points.foreach_get("position", places)
+    radii = np.full(len(curves.points), 0.005, np.float32)
+    radius = curves.attributes.get("radius")
+    if radius is not None:
+        radius.data.foreach_get("value", radii)
+    rows = np.column_stack([places.reshape(-1, 3), radii])
+    strands, start = [], 0
+    for length in lengths.tolist():
+        points, start = rows[start : start + length], start + length
+        if length < 2:
+            continue
+        around = np.vstack([points[:1], points, points[-1:]])
+        step = (around[2:] - around[:-2]) / 6.0
+        pieces = np.stack([points[:-1], points[:-1] + step[:-1], points[1:] - step[1:]], axis=1)
+        strands.append(np.vstack([pieces.reshape(-1, 4), points[-1:]]))
+    with file.open("w") as stream:
+        for strand in strands:
+            np.savetxt(stream, strand, "%.7g")
+            stream.write("\n")
+    return bool(strands)

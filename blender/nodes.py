@@ -33,6 +33,8 @@ class Tree:
         """Return a material and the radiance that it emits, None if it is dark."""
         if material is None:
             return {"type": "diffuse", "reflectance": GREY}, None
+        if material.clpt.kind != "NODES":
+            return named(material.clpt), None
         if not material.use_nodes or material.node_tree is None:
             return {"type": "diffuse", "reflectance": list(material.diffuse_color)[:3]}, None
         output = material.node_tree.get_output_node("CYCLES")
@@ -112,6 +114,19 @@ class Tree:
                 }  # fmt: skip
         self.tell(f"{source.bl_label} as a normal is not read")
         return material
+
+
+def named(settings: bpy.types.PropertyGroup) -> Json:
+    """Return the glass or the metal that a material's panel names, with its film."""
+    rough = settings.roughness > 0.0
+    facets = {"roughness": settings.roughness} if rough else {}
+    film = {"layers": [{"eta": settings.film_ior, "thickness": settings.film_thickness}]}
+    layers = film if settings.film_thickness > 0.0 else {}
+    if settings.kind == "GLASS":
+        kind = "rough_dielectric" if rough else "dielectric"
+        return {"type": kind, "int_ior": settings.glass, "ext_ior": "air", **facets, **layers}
+    kind = "rough_conductor" if rough else "conductor"
+    return _both({"type": kind, "metal": settings.metal, **facets, **layers})
 
 
 def _source(socket: Any) -> bpy.types.Node | None:

@@ -50,7 +50,7 @@ class Writer:
             if not instance.show_self:
                 continue
             source = instance.object  # it is gone after its turn
-            if source.type in SURFACES:
+            if source.type in SURFACES or source.type == "CURVES":
                 key = source.data.as_pointer()
                 if key not in parts:
                     parts[key] = self._parts(len(parts), source)
@@ -87,6 +87,8 @@ class Writer:
 
     def _parts(self, number: int, source: Any) -> list[Json]:
         """Return the shapes of an object in its own space, one for each material."""
+        if source.type == "CURVES":
+            return self._hair(number, source)
         is_mesh = isinstance(source.data, bpy.types.Mesh)
         try:
             mesh = source.data if is_mesh else source.to_mesh()
@@ -98,6 +100,13 @@ class Writer:
         if not is_mesh:
             source.to_mesh_clear()
         return parts
+
+    def _hair(self, number: int, source: Any) -> list[Json]:
+        file = f"hair{number}.txt"
+        if not meshes.write_strands(source.data, self.folder / file):
+            return []
+        part = self._part(file, [slot.material for slot in source.material_slots], 0, source.name)
+        return [{**part, "type": "curves", "basis": "bezier"}]
 
     def _part(self, file: str, slots: list[Any], slot: int, name: str) -> Json:
         material = slots[slot] if slot < len(slots) else None
@@ -149,19 +158,25 @@ class Writer:
         place = [list(row) for row in rigid @ TO_CLPT]
         if lamp.type == "SUN":
             direction = [-value for value in rigid.col[2][:3]]
-            lights.append({"type": "directional", "direction": direction, "irradiance": color})
+            lights.append(
+                {
+                    "type": "directional",
+                    "direction": direction,
+                    "irradiance": self._emitted(lamp, color, 1.0),
+                }
+            )
         elif lamp.type == "POINT" and lamp.shadow_soft_size > 0.0:
             area = 4.0 * math.pi * lamp.shadow_soft_size**2
             shapes.append({
                 "type": "sphere", "radius": lamp.shadow_soft_size,
                 "center": list(rigid.translation), "material": "lamp",
-                "emission": {"type": "area", "radiance": [c / (math.pi * area) for c in color]},
+                "emission": self._surface(lamp, color, area),
             })  # fmt: skip
             self.named["lamp"] = {"type": "null"}
         elif lamp.type == "POINT":
             lights.append({
                 "type": "point", "position": list(rigid.translation),
-                "intensity": [c / (4.0 * math.pi) for c in color],
+                "intensity": self._emitted(lamp, color, 0.25 / math.pi),
             })  # fmt: skip
         elif lamp.type == "SPOT":
             edge = math.cos(0.5 * lamp.spot_size)
@@ -169,10 +184,21 @@ class Writer:
             lights.append({
                 "type": "spot", "to_world": place, "edge": "smooth", "beam_width": full,
                 "cutoff": math.degrees(0.5 * lamp.spot_size),
-                "intensity": [c / (4.0 * math.pi) for c in color],
+                "intensity": self._emitted(lamp, color, 0.25 / math.pi),
             })  # fmt: skip
         else:
             self._area(lamp, color, matrix, shapes)
+
+    def _emitted(self, lamp: Any, color: list[float], factor: float) -> Any:
+        """Return what a lamp emits: its color, or its standard spectrum of the same luminance."""
+        if not lamp.clpt.spectrum:
+            return [c * factor for c in color]
+        luminance = 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2]
+        return {"type": "illuminant", "name": lamp.clpt.spectrum, "scale": luminance * factor}
+
+    def _surface(self, lamp: Any, color: list[float], area: float) -> Json:
+        """Return the emission of a lamp's surface [m^2]; it is even, and of its front."""
+        return {"type": "area", "radiance": self._emitted(lamp, color, 1.0 / (math.pi * area))}
 
     def _area(self, lamp: Any, color: list[float], matrix: Matrix, shapes: list[Json]) -> None:
         round_ = lamp.shape in ("DISK", "ELLIPSE")
@@ -185,13 +211,15 @@ class Writer:
         shapes.append({
             "type": "disk" if round_ else "rectangle", "to_world": [list(row) for row in place],
             "material": "lamp",
-            "emission": {"type": "area", "radiance": [c / (math.pi * area) for c in color]},
+            "emission": self._surface(lamp, color, area),
         })  # fmt: skip
 
     def _world(self) -> list[Json]:
         world = self.depsgraph.scene.world
         if world is None:
             return []
+        if world.clpt.use_sky:
+            return [self._sky(world.clpt)]
         if not world.use_nodes or world.node_tree is None:
             return [{"type": "constant", "radiance": list(world.color)}]
         output = world.node_tree.get_output_node("CYCLES")
@@ -210,6 +238,14 @@ class Writer:
             radiance = [c * strength for c in color]
             return [{"type": "constant", "radiance": radiance}] if any(radiance) else []
         return [self._dome(texture, strength)]
+
+    def _sky(self, sky: Any) -> Json:
+        return {
+            "type": "sky", "sun_elevation": math.degrees(sky.elevation),
+            "sun_azimuth": math.degrees(sky.azimuth), "aerosol": sky.haze,
+            "altitude": sky.altitude, "ground": list(sky.ground), "sky_scale": sky.strength,
+            "sun_scale": sky.strength, "to_world": DOME,
+        }  # fmt: skip
 
     def _dome(self, texture: Any, strength: float) -> Json:
         bitmap = self.image(texture.image) or {"image": ""}

@@ -48,21 +48,23 @@ def _render(connection: Connection, message: dict[str, Any]) -> None:
     size = {"width": message["width"], "height": message["height"]}
     scene.film = dataclasses.replace(scene.film, mode=message["mode"], **size)
     total, shown = int(message["samples"]), time.monotonic()
-    with clpt.Renderer(scene) as renderer:
+    denoise = "oidn" if message.get("denoise") else None
+    with clpt.Renderer(scene, denoise=denoise) as renderer:
         _send(connection, {"samples": 0, "warnings": scene.warnings})
         while renderer.samples < total:
             renderer.run(1 if renderer.samples == 0 else min(4, total - renderer.samples))
             if connection.poll() and json.loads(connection.recv_bytes()).get("stop"):
                 break
             if time.monotonic() - shown > SHOWN_EVERY:
-                _send(connection, {"samples": renderer.samples}, _pixels(renderer))
+                _send(connection, {"samples": renderer.samples}, _pixels(renderer.image()))
                 shown = time.monotonic()
-        _send(connection, {"samples": renderer.samples, "done": True}, _pixels(renderer))
+        image = renderer.denoised() if denoise else renderer.image()
+        _send(connection, {"samples": renderer.samples, "done": True}, _pixels(image))
 
 
-def _pixels(renderer: Any) -> np.ndarray:
+def _pixels(picture: Any) -> np.ndarray:
     """Return the picture as Blender has it: (h, w, 4) float32, the bottom row first."""
-    image = np.asarray(renderer.image(), np.float32)
+    image = np.asarray(picture, np.float32)
     rgba = np.ones((*image.shape[:2], 4), np.float32)
     rgba[..., : image.shape[2]] = image
     return np.ascontiguousarray(rgba[::-1])

@@ -153,3 +153,57 @@ def test_a_fault_is_a_line_and_blender_lives(
         picture("CLPT", tmp_path)
     monkeypatch.setenv("CLPT_PYTHON", sys.executable)
     assert picture("CLPT", tmp_path, 4).shape == (SIZE[1], SIZE[0], 3)
+
+
+def test_measured_surfaces_and_standard_lamps(tmp_path: Path) -> None:
+    """Gold is yellow, a sodium lamp orange, a prism's light has colors, and a sky is blue."""
+    floor_and_camera()
+    lamp = bpy.data.lights.new("lamp", "POINT")
+    lamp.energy = 200.0
+    link("lamp", lamp, (0.5, 0.0, 3.0), (0.0, 0.0, 0.0))
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=1.0, location=(0.0, 0.0, 1.0))
+    ball = bpy.data.materials.new("ball")
+    ball.clpt.kind, ball.clpt.metal, ball.clpt.roughness = "METAL", "gold", 0.3
+    bpy.context.object.data.materials.append(ball)
+    shown = picture("CLPT", tmp_path, 32)
+    white = shown.mean(axis=(0, 1))
+    middle = shown[10:16, 18:26].mean(axis=(0, 1))
+    assert middle[0] > 1.3 * middle[2]
+    lamp.clpt.spectrum = "sodium"
+    orange = picture("CLPT", tmp_path, 32).mean(axis=(0, 1))
+    assert orange[2] < 0.1 * orange[0] and white[2] > 0.15 * white[0]
+    ball.clpt.kind, ball.clpt.glass = "GLASS", "n-sf11"
+    ball.clpt.film_thickness, ball.clpt.roughness = 300.0, 0.0
+    world = bpy.data.worlds.new("world")
+    world.clpt.use_sky, world.clpt.strength = True, 1.0
+    bpy.context.scene.world = world
+    lamp.energy = 0.0
+    bpy.context.scene.camera.rotation_euler = (2.2, 0.0, 0.0)
+    sky = picture("CLPT", tmp_path, 32).mean(axis=(0, 1))
+    assert sky[2] > 1.2 * sky[0] > 0.0
+
+
+def test_hair_lies_where_cycles_has_it(tmp_path: Path) -> None:
+    """Thick strands before a bright world, in rgb: shares of the picture that are dark, to 5 %."""
+    floor_and_camera()
+    bpy.data.objects["Plane"].location = (0.0, 0.0, -200.0)
+    world = bpy.data.worlds.new("world")
+    bpy.context.scene.world = world
+    world.use_nodes = True
+    hair = bpy.data.hair_curves.new("hair")
+    hair.add_curves([5, 4, 6])
+    places = np.random.default_rng(3).uniform(-1.0, 1.0, (15, 3)).astype(np.float32)
+    hair.points.foreach_set("position", places.ravel())
+    radius = hair.attributes.get("radius") or hair.attributes.new("radius", "FLOAT", "POINT")
+    radius.data.foreach_set("value", np.full(15, 0.15, np.float32))
+    black = bpy.data.materials.new("black")
+    black.use_nodes = True
+    black.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0, 0, 0, 1)
+    black.node_tree.nodes["Principled BSDF"].inputs["Specular IOR Level"].default_value = 0.0
+    hair.materials.append(black)
+    link("hair", hair, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    bpy.context.scene.camera.data.angle = 0.5
+    bpy.context.scene.cycles_curves.shape = "THICK"
+    ours, cycles = (picture(engine, tmp_path, 64) for engine in ("CLPT", "CYCLES"))
+    dark = [(shown.mean(axis=2) < 0.5 * shown.max()).mean() for shown in (ours, cycles)]
+    assert 0.03 < dark[1] < 0.7 and dark[0] == pytest.approx(dark[1], rel=0.05)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clpt.scene import materials
+from clpt.scene.materials import diffuse
 from clpt.testing.probe import COMPONENTS
 from clpt.testing.settings import directions, settings
 from tests.kernels.harness import Probe
@@ -28,7 +28,7 @@ def example(language: str, number: int = 0) -> str:
 
 @pytest.mark.parametrize("mode", COMPONENTS)
 def test_the_example_is_a_material(mode):
-    scope = dict(vars(materials))
+    scope = dict(vars(diffuse))
     exec(compile(example("python"), str(GUIDE), "exec", dont_inherit=True), scope)
     cls, rng = scope["Translucent"], np.random.default_rng(21)
     cls.source = example("c")
