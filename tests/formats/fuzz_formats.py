@@ -478,6 +478,7 @@ ZMX = (
     b"  GLAS N-BK7\n  DIAM 10\nSURF 2\n  CURV -0.02\n  DISZ 40\n  DIAM 10\nSURF 3\n  DISZ 0\n"
 )
 STRANDS = b"0 0 0 0.1\n0 1 0 0.1\n0 2 0 0.05\n\n1 0 0 0.1\n1 1 0 0.2\n"
+HAIR = b"BINARY_HAIR" + struct.pack("<I10f", 3, 0, 0, 0, 0, 0, 1, float("inf"), 2, 0, 0)
 PLY_BINARY = (
     b"ply\nformat binary_little_endian 1.0\ncomment TextureFile a.png\nelement vertex 3\n"
     b"property float x\nproperty float y\nproperty float z\nproperty uchar red\nelement face 1\n"
@@ -553,6 +554,7 @@ FORMATS: dict[str, Format] = {
         lambda path: read_serialized(path, 0, {}),
     ),
     "strands": Format(".txt", lambda: [STRANDS], words, spheres_curves.read_strands),
+    "hair": Format(".hair", lambda: [HAIR], raw, spheres_curves.read_hair),
     "spheres": Format(
         ".npz",
         lambda: [_made("a.npz", lambda p: np.savez(p, centers=np.ones((3, 3)), radii=np.ones(3)))],
