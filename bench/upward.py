@@ -97,7 +97,7 @@ def rows(on: dev.Device, scene: str, count: int) -> Iterator[dict[str, object]]:
     rays = crossing_rays(vertices[faces], count)
     for layout in COUNTING:
         trees = [built(on, vertices, faces, layout, upward) for upward in (False, True)]
-        visits = [_visits(on, tree, rays) for tree in trees]
+        visited = [visits(on, tree, rays).mean(0) for tree in trees]
         planes, upward = (Tracer(on, tree).run("closest", rays, 1)[0] for tree in trees)
         same = planes["t"] == upward["t"]
         yield {
@@ -106,8 +106,8 @@ def rows(on: dev.Device, scene: str, count: int) -> Iterator[dict[str, object]]:
             "triangles": len(faces),
             "layout": layout,
             "cost": [tree.stats["cost"] for tree in trees],
-            "nodes": [float(seen[0]) for seen in visits],
-            "leaves": [float(seen[1]) for seen in visits],
+            "nodes": [float(seen[0]) for seen in visited],
+            "leaves": [float(seen[1]) for seen in visited],
             "equal": float(same.mean()),
         }
 
@@ -139,8 +139,8 @@ def built(
         return bvh.build(on, vertices, faces, layout=layout)
 
 
-def _visits(on: dev.Device, tree: bvh.Bvh, rays: np.ndarray) -> np.ndarray:
-    """Return the nodes and leaves that a ray visits in the mean."""
+def visits(on: dev.Device, tree: bvh.Bvh, rays: np.ndarray) -> np.ndarray:
+    """Return the nodes and leaves that each ray visits, (n, 2); n is a multiple of 64."""
     text = KERNEL.format(layout=tree.layout, loop=COUNTING[tree.layout])
     program = dev.build(on, dev.assemble("count", {"count": text}))
     flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
@@ -153,7 +153,7 @@ def _visits(on: dev.Device, tree: bvh.Bvh, rays: np.ndarray) -> np.ndarray:
         on.queue, (len(rays),), (64,)
     )
     cl.enqueue_copy(on.queue, counts, buffers["counts"])
-    return counts.mean(0)
+    return counts
 
 
 @click.command(help=__doc__)

@@ -30,7 +30,7 @@ from clpt.layout import SLAB_BLOCK, Record
 from clpt.records import HIT, PATH, PATH_BITS, SHADOW, SLABS
 from clpt.render.flow import programs
 from clpt.render.flow.scene_to_tables import lower
-from clpt.render.wavefront.bounce_loop import Step
+from clpt.render.wavefront.bounce_loop import Step, beginning
 from clpt.render.wavefront.path_buffers import default_slots
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
@@ -63,7 +63,7 @@ class Flight:
         """Empty the film, and restart every slot at its first sample."""
         self.wavefront.clear()
         self.wavefront.paths.restart()
-        self.wavefront.stages[0].bound.set_args(samples=(0, ENDLESS))
+        beginning(self.wavefront.stages).set_args(samples=(0, ENDLESS))
 
     def bounce(self) -> None:
         """Enqueue the stages of a bounce."""

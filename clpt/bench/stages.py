@@ -22,14 +22,19 @@ from clpt.records import SLABS
 from clpt.render.film.state import FILM_WORDS
 from clpt.render.flow import blocks, programs
 from clpt.render.records import Features
-from clpt.render.wavefront.path_buffers import queue_sizes, queue_steps
+from clpt.render.wavefront.path_buffers import QUEUEING, queue_sizes, queue_steps
 from clpt.scene import Scene
 
 _WORD = 4  # bytes
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _CALL = re.compile(r"(?<!\w)(?P<verb>load|store)_(?P<member>\w+)\((?!Slab )")
-_QUEUED = {"append": (0, 1), "shade": (1, 0)}  # words read and written of a queue
-QUEUEING = [kernel for kernel, *_ in queue_steps(1, 1)]
+_QUEUED = {
+    "append": (0, 1),
+    "shade": (1, 0),
+    "generate": (1, 0),
+    "shadow": (1, 0),
+}  # words read and written of a queue
+APPENDING = {"append_begin", *QUEUEING.values()}
 WARM = 4  # bounces before the measurement, so that paths of all depths are in flight
 BOUNCES = 4  # of a round: in a single bounce few paths may begin
 
@@ -54,31 +59,36 @@ def traffic(features: Features, layout: str, *, queued: bool = False) -> dict[st
     An item is a slot with work: in `generate` a path that ends and its successor, in `intersect`
     and `shade_...` a ray and its hit, in `shadow` a shadow ray, in `append` a slot.
     """
-    texts = programs.sources(features, layout, 1, queued=queued)
+    sizes = words_of_members(features)
+    moved = {}
+    for name, source in programs.sources(features, layout, 1, queued=queued).items():
+        read, written = (_QUEUED.get(name.split("_")[0]) if queued else None) or (0, 0)
+        loads, stores = members_moved(source.text, sizes)
+        read += sum(sizes[member] for member in loads)
+        written += sum(sizes[member] for member in stores)
+        moved[name] = Moved(_WORD * read, _WORD * written)
+    return moved
+
+
+def words_of_members(features: Features) -> dict[str, int]:
+    """Return the words of the slabs' members that a scene uses, by names such as `path_beta`."""
     unused = blocks.unused(features)
-    sizes = {
+    return {
         f"{record.name.lower()}_{member.name}": member.words
         - (member.type == "spectrum" and not features.spectra.spectral)
         for record in SLABS
         for member in record.members
         if member.name not in unused
     }
-    moved = {}
-    for name, source in texts.items():
-        queue_words = _QUEUED.get(name.split("_")[0]) if queued else None
-        moved[name] = _moved(source.text, sizes, *(queue_words or (0, 0)))
-    return moved
 
 
-def _moved(text: str, sizes: Mapping[str, int], read: int, written: int) -> Moved:
-    """Return an item's traffic; sizes: words of slabs' members; read, written: further words."""
-    words: dict[str, set[str]] = {"load": set(), "store": set()}
+def members_moved(text: str, sizes: Mapping[str, int]) -> tuple[set[str], set[str]]:
+    """Return the members of `sizes` that a program's text loads, and those that it stores."""
+    members: dict[str, set[str]] = {"load": set(), "store": set()}
     for call in _CALL.finditer(_COMMENT.sub("", text)):
         if call["member"] in sizes:
-            words[call["verb"]].add(call["member"])
-    read += sum(sizes[member] for member in words["load"])
-    written += sum(sizes[member] for member in words["store"])
-    return Moved(_WORD * read, _WORD * written)
+            members[call["verb"]].add(call["member"])
+    return members["load"], members["store"]
 
 
 def measure(
@@ -106,7 +116,7 @@ def measure(
     features, layout = wave.features, wave.scene.strategy.layout
     moved = traffic(features, layout, queued=wave.scene.strategy.queued)
     for name, work in noted.items():
-        if name not in QUEUEING and _selected(name, only):
+        if name not in APPENDING and _selected(name, only):
             yield _figure(flight, copying, name, moved[name].total, work)
     if _selected("append", only):
         yield _queue(flight, copying, rounds)
@@ -157,7 +167,7 @@ def _queue(flight: Flight, copying: Copying, rounds: int) -> Figure:
     features, layout = wave.features, wave.scene.strategy.layout
     kinds = len(features.materials.kinds)
     for step in wave.stages:  # up to unshaded hits
-        if step.bound.kernel.name == "shade" or step.name in QUEUEING:
+        if step.bound.kernel.name in ("shade", "append"):
             break
         flight.stage(step)
     program = device.build(on, programs.append_source(features, layout, wave.lanes))

@@ -30,8 +30,9 @@ class RenderOptions(TypedDict, total=False):
     layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS.
     tree_quality: "high", or "fast", which is built sooner and traced a little slower.
     slots: paths in flight.
-    queued: whether stages that the host enqueues shade along queues by material, which is possible
-    for work-items that shade a single path, as on GPUs. The loop on the device sorts by itself.
+    queued: whether stages that the host enqueues take slots from queues: of a material, of paths
+    that have ended, of shadow rays. It is possible, and the default, for work-items that shade a
+    single path, as on GPUs. The loop on the device sorts by itself.
     looped: whether a kernel on the device runs all bounces.
     first_sample: the number of the first sample, 0 to 2^31 - 1, by default 0. Renderers that take
     other numbers have other samples, and their films merge, see `Renderer.merge`.

@@ -37,5 +37,6 @@ def test_queues() -> None:
     plain, sorted_ = moved("rgb", False), moved("rgb", True)
     assert "append" not in plain
     assert sorted_["append"] == Moved(4 * 3, 4)  # state, prim and material; a slot
-    assert sorted_["shade_diffuse"].read == plain["shade_diffuse"].read + 4
+    for stage in ("shade_diffuse", "generate", "shadow"):
+        assert sorted_[stage].read == plain[stage].read + 4
     assert sorted_["shade_diffuse"].written == plain["shade_diffuse"].written > 0

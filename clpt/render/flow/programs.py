@@ -74,17 +74,26 @@ def sources(
     has the rays of `lanes` paths in flight.
     """
     queued = queued and lanes == 1
-    texts = _stages(features, layout, lanes, interleaved)
+    texts = _stages(features, layout, lanes, interleaved, queued=queued)
     if "flare" in texts:
         return _static(texts)
     texts |= _shading(features, layout, lanes, queued=queued)
     if queued:
         texts["append"] = append_source(features, layout, lanes)
+        if not features.transport.light_paths:
+            files, defines = _shared(features, layout), _defines(features, lanes)
+            texts["append_some"] = _source("append_some", files, defines, 1)
     return _static(texts)
 
 
 def _stages(
-    features: Features, layout: str, lanes: int, interleaved: bool, part: Files | None = None
+    features: Features,
+    layout: str,
+    lanes: int,
+    interleaved: bool,
+    part: Files | None = None,
+    *,
+    queued: bool = False,
 ) -> dict[str, device.Source]:
     """The texts of a bounce but for queues and shading, see `sources`; part: see `_source`."""
     files, defines = _shared(features, layout), _defines(features, lanes)
@@ -97,19 +106,20 @@ def _stages(
         file = "curves" if "curves" in features.geometry.analytic else "trace"
         rays["generated/trace.cl"] = (f"tracing/{file}.cl#interleaved",)
     joins = {**files, **(rays if features.geometry.analytic else {})}
+    in_queue = {**defines, "QUEUED": int(queued)}
     if begin == "flare":
         return {
             begin: make(begin, files, defines, lanes),
             join: make(join, joins, defines, join_lanes),
         }
     texts = {
-        begin: make(begin, files, defines, lanes),
+        begin: make(begin, files, in_queue if begin == "generate" else defines, lanes),
         "intersect": make(
             "intersect", {**files, **rays}, defines, lanes if interleaved else trace_lanes
         ),
     }
     if bounce.joins(features):
-        texts[join] = make(join, joins, defines, join_lanes)
+        texts[join] = make(join, joins, in_queue if join == "shadow" else defines, join_lanes)
     if bounce.deposits(features):
         texts["deposit"] = make("deposit", files, defines, lanes)
     if bounce.trains(features):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -21,7 +21,7 @@ from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.records import Features
 from clpt.render.wavefront import launches, strategy
 from clpt.render.wavefront.device_scene import DeviceScene
-from clpt.render.wavefront.path_buffers import GROUP, PathBuffers, queue_steps
+from clpt.render.wavefront.path_buffers import GROUP, QUEUEING, PathBuffers, queue_steps
 from clpt.render.wavefront.strategy import Strategy
 
 BATCH = 8  # bounces that are enqueued between two reads of the counters
@@ -52,6 +52,11 @@ class Step:
         most = -(-max(-(-items // count), LEAST_ITEMS) // group) * group
         for first in range(0, items, most):
             yield first, min(most, items - first)
+
+
+def beginning(steps: Iterable[Step]) -> device.BoundKernel:
+    """Return the kernel that begins paths, of the steps of a bounce."""
+    return next(step.bound for step in steps if "samples" in step.bound.values)
 
 
 class HasArguments(Protocol):
@@ -228,7 +233,7 @@ class BounceLoop:
 
         leave: is raised for a moment if a launch takes too long.
         """
-        begin = self.loop if self.looped else self.stages[0].bound
+        begin = self.loop if self.looped else beginning(self.stages)
         begin.set_args(samples=numbers)
         if self.looped:
             begin.set_args(restart=0, leave=leave.argument)
@@ -292,22 +297,23 @@ class BounceLoop:
         self.kernels.build(self._texts(self.scene.lowered, chosen))
         steps: list[Step] = []
         for stage in bounce.order(features, chosen.layout, self.lanes, chosen.interleaved):
-            if stage.kernel == "shade" and steps[-1].bound.kernel.name != "shade":
-                steps += self._bind_queues(chosen.queued, len(features.materials.kinds))
-            samples = {} if steps else {"samples": (0, 0)}
+            former = steps[-1].bound.kernel.name if steps else ""
+            if chosen.queued and stage.kernel in QUEUEING and stage.kernel != former:
+                steps += self._bind_queues(stage.kernel, len(features.materials.kinds))
+            samples = {"samples": (0, 0)} if stage.verb == "begin" else {}
             bound = self.kernels.bind(label + stage.program, stage.kernel, **samples)
             steps.append(Step(label + stage.program, bound, *self._sizes(stage.lanes)))
         return steps
 
-    def _bind_queues(self, queued: bool, kinds: int) -> list[Step]:
-        """The kernels that queue slots by material, none where they are not queued."""
-        if not queued:
-            return []
-        append = f"{self._label}append"
-        return [
-            Step(name, self.kernels.bind(append, name), (size,), (group,) if group else None)
-            for name, size, group in queue_steps(self.paths.slots, kinds)
-        ]
+    def _bind_queues(self, kernel: str, kinds: int) -> list[Step]:
+        """The kernels that queue slots for a stage: by material for shading, else in a queue."""
+        shades, steps = kernel == "shade", []
+        queues = queue_steps(self.paths.slots, kinds if shades else 1, QUEUEING[kernel])
+        for name, size, group in queues:
+            program = "append" if shades or name == "append_begin" else "append_some"
+            bound = self.kernels.bind(self._label + program, name)
+            steps.append(Step(name, bound, (size,), (group,) if group else None))
+        return steps
 
     def _texts(self, lowered: Lowered, chosen: Strategy) -> dict[str, device.Source]:
         texts = programs.sources(

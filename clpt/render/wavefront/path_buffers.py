@@ -99,6 +99,8 @@ class CellGrid:
 COUNTERS = COUNTER_NUMBERS.names
 PADDING = 80  # words between runs of all slots: powers of two collide in a cache
 GROUP = 64  # slots are a multiple of it; the local size of kernels with a single lane
+# The kernel that fills the queue of a stage, by the stage's kernel.
+QUEUEING = {"shade": "append", "generate": "append_ended", "shadow": "append_shadows"}
 QUEUE_GROUP = 256  # work-items that append to queues together
 FRESH = PATH_BITS["fresh"]
 CPU_SLOTS = 1 << 14
@@ -126,13 +128,19 @@ def queue_sizes(slots: int, kinds: int, queued: bool) -> dict[str, int]:
     """
     if not queued:
         return {"queue": slots}
+    kinds = max(kinds, 1)  # the stages before and after shading have queue 0
     return {"queue": slots * kinds, "queue_starts": kinds, "queue_counts": kinds}
 
 
-def queue_steps(slots: int, kinds: int) -> list[tuple[str, int, int | None]]:
-    """Return the kernels that fill queues, in order: name, work-items, work-items of a group."""
+def queue_steps(
+    slots: int, kinds: int, kernel: str = "append"
+) -> list[tuple[str, int, int | None]]:
+    """Return the kernels that fill queues, in order: name, work-items, work-items of a group.
+
+    kernel: a name in QUEUEING.
+    """
     appended = -(-slots // QUEUE_GROUP) * QUEUE_GROUP
-    return [("append_begin", kinds, None), ("append", appended, QUEUE_GROUP)]
+    return [("append_begin", kinds, None), (kernel, appended, QUEUE_GROUP)]
 
 
 @dataclass(frozen=True)

@@ -42,8 +42,8 @@ class Strategy:
     """Choices for the kernels that trace and shade the paths of a scene.
 
     layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS; queued: whether stages that the
-    host enqueues shade along queues by material; interleaved: whether a work-item traces the rays
-    of several paths at once.
+    host enqueues take slots from queues; interleaved: whether a work-item traces the rays of
+    several paths at once.
     """
 
     layout: str
@@ -57,7 +57,7 @@ def choose(on: device.Device, lowered: Lowered, tuning: Tuning) -> Strategy:
     Raises SceneError for a layout that cannot hold the scene.
     """
     layout = _layout(on, lowered, tuning.layout)
-    queued = _queued(on, lowered, tuning.queued)
+    queued = _queued(on, tuning.queued)
     return Strategy(layout, queued, _interleaved(on, lowered, layout))
 
 
@@ -83,10 +83,9 @@ def _layout(on: device.Device, lowered: Lowered, layout: str | None) -> str:
     return suited
 
 
-def _queued(on: device.Device, lowered: Lowered, wanted: bool | None) -> bool:
+def _queued(on: device.Device, wanted: bool | None) -> bool:
     """Whether there are queues: only for work-items that shade a single path."""
-    several = len(lowered.features.materials.kinds) > 1
-    return on.lanes == 1 and (several if wanted is None else wanted)
+    return on.lanes == 1 and wanted is not False
 
 
 def can_interleave(features: Features, layout: str, lanes: int) -> bool:

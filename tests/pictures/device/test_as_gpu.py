@@ -33,7 +33,7 @@ def gpu() -> dev.Device:
 def test_forms(gpu: dev.Device, scenes: Path) -> None:
     """One lane, queues that are appended to, compressed nodes; in all but a few pixels the same."""
     scene = with_film(clpt.load(scenes / "instances.xml"), mode="rgb")
-    renderer = clpt.Renderer(scene, gpu, queued=True)  # one kind: it would not be asked for
+    renderer = clpt.Renderer(scene, gpu)
     front = renderer._wavefront
     slots, strategy = front.paths.slots, front.scene.strategy
     assert (front.lanes, strategy.layout, strategy.queued) == (1, "compact", True)
@@ -43,6 +43,9 @@ def test_forms(gpu: dev.Device, scenes: Path) -> None:
     off = np.abs(image - plain).max(axis=2) > 1e-3 * (1e-2 + np.abs(plain).max(axis=2))
     assert off.mean() < 0.005
     np.testing.assert_allclose(image.mean(), plain.mean(), rtol=2e-3)
+    in_place = clpt.Renderer(scene, gpu, queued=False)
+    in_place.run(2)
+    np.testing.assert_array_equal(image, in_place.image())
 
 
 @pytest.mark.slow

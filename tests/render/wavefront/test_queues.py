@@ -182,6 +182,25 @@ def test_appending_gathers_the_same(slots: int) -> None:
         assert (own[counts[number] :] == 0xDEAD).all()
 
 
+@pytest.mark.parametrize("kernel", ["append_ended", "append_shadows"])
+@pytest.mark.parametrize("slots", [64, 1000, 4096])
+def test_stages_get_the_slots_with_work(kernel: str, slots: int) -> None:
+    """Each slot is once in queue 0; its group need not be a number of slots."""
+    rng = np.random.default_rng(slots)
+    host, waits, _ = some(slots)
+    far = np.where(rng.random(slots) < 0.4, 2.5, 0.0).astype(np.float32)
+    host["shadow_words"] = slab_words(SHADOW, slots, 1, t=far.view(np.uint32))
+    expected = np.flatnonzero(far) if kernel == "append_shadows" else np.delete(range(slots), waits)
+    host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queue_sizes(slots, KINDS, True).items()}
+    numbers = {"stride": stride_of(slots), "slots": slots}
+    host["queue_counts"][0] = 0
+    steps = tuple(queue_steps(slots, 1, kernel))[1:]
+    words = on_device(assembled("stage/append_some.cl"), steps, host, **numbers)
+    count = words["queue_counts"][0]
+    np.testing.assert_array_equal(np.sort(words["queue"][:count]), expected)
+    assert (words["queue"][count:] == 0xDEAD).all()
+
+
 def test_nothing_waits() -> None:
     host = slabs(100, 1, *np.zeros((3, 100)))
     host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queue_sizes(100, KINDS, True).items()}
