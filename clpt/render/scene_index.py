@@ -143,6 +143,12 @@ class SceneIndex:
         return bool(self.media) or self.nested
 
     @property
+    def has_insides(self) -> bool:
+        """Whether rays travel through media, or through bodies that overlap or absorb."""
+        parts = (part for shape in self.shapes for part in mt.parts(shape.material))
+        return self.has_media or any(part.absorbs_inside and not part.is_sheet for part in parts)
+
+    @property
     def light_paths(self) -> bool:
         """Whether paths start at lights."""
         return self.integrator.from_lights_alone

@@ -23,6 +23,7 @@ from clpt.scene import (
     paths,
     phases,
     shapes,
+    simulations,
     studio,
     textures,
     trimeshes,
@@ -185,6 +186,49 @@ class Scene:
         built = cls.studio(placed, camera=camera, up=up, name=name)
         built.warnings = list(dict.fromkeys(left_out))
         return built
+
+    @classmethod
+    def from_mujoco(
+        cls,
+        model: simulations.MjModel,
+        state: simulations.MjData,
+        *,
+        camera: str | int | None = None,
+        groups: int = 3,
+    ) -> Scene:
+        """Return a `mujoco.MjModel` in a state, a `mujoco.MjData`: geoms, lights and a camera.
+
+        camera: by name or number; None: the free camera as it begins. groups: of geoms from 0 on
+        that are shown. Textures are left out with a warning.
+
+        Raises SceneError for other objects, and for a camera that the model lacks.
+        """
+        if not hasattr(model, "ngeom") or not hasattr(state, "geom_xpos"):
+            message = f"must be a mujoco.MjModel and its MjData, not {type(model).__name__}"
+            raise SceneError(message, where="model")
+        view = simulations.mujoco_camera(model, state, camera)
+        return cls(
+            camera=view,
+            shapes=list(simulations.mujoco_shapes(model, state, groups)),
+            lights=simulations.mujoco_lights(model, state, view),
+            warnings=simulations.mujoco_warnings(model),
+        )
+
+    @classmethod
+    def from_pyvista(cls, plotter: simulations.Plotter, *, up: Up = "z") -> Scene:
+        """Return the meshes of a `pyvista.Plotter` in the studio, seen by its camera and window.
+
+        Colors of scalars are those of the plotter's tables. up: see `studio`.
+
+        Raises SceneError for an object that is no plotter, and as `studio` does.
+        """
+        if not hasattr(plotter, "renderer") or not hasattr(plotter, "window_size"):
+            message = f"must be a pyvista.Plotter, not {type(plotter).__name__}"
+            raise SceneError(message, where="plotter")
+        placed = list(simulations.pyvista_shapes(plotter))
+        built = cls.studio(placed, camera=simulations.pyvista_camera(plotter), up=up)
+        width, height = plotter.window_size
+        return replace(built, film=replace(built.film, width=int(width), height=int(height)))
 
     def parameters(self) -> dict[str, Any]:
         """Return all parameters by their paths, as "ball.material.reflectance", in their order.

@@ -152,6 +152,7 @@ inline ShapeMedia shape_media(Scene scene, integer shape)
 inline integer medium_left(integer medium) { return sel_i((medium & MEDIUM_FLIES) != 0, (integer)(0), medium); }
 
 /* Twin, where dielectrics absorb and no shape has media. */
+#include "generated/light_media.cl"
 inline Spectrum medium_extinction(Scene scene, integer medium, integer row, Spectrum a, Wavelengths lambdas)
 {
     return a;

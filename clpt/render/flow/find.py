@@ -110,7 +110,7 @@ def _media_at_lights(
     cache: LoweringCache,
 ) -> tuple[SceneIndex, LightMedia]:
     """Return the index with whether paths can start at lights in media, and the lights' media."""
-    if not index.has_media or not index.may_have_light_paths:
+    if not index.has_insides or not index.may_have_light_paths:
         return index, NOWHERE
     media = light_media(index, geometry, sources, sphere, cache)
     return replace(index, lit_media=media.refusal), media
@@ -125,7 +125,7 @@ def _at_the_camera(
         around = bodies_around(scene, matter_of, cache)
         warnings = contested(scene.shapes, matter_of, cache)
     else:
-        around = media_around(scene, cache) if index.media else ()
+        around = media_around(scene, cache) if index.has_insides else ()
         warnings = warnings_of(around)
     if index.motions and index.has_media and scene.camera.medium is None:
         warnings += _passed_through(index, cache)

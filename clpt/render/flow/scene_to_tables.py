@@ -357,8 +357,10 @@ class _Tables:
             sides = bodies.rows(bounding, self.encoder, self.materials, media)
         else:
             sides = media.of_shapes(bounding)
-        if index.has_media and (index.balanced or index.light_paths or index.guided):
-            words = light_media_words(self.analysis.light_media, media, bodies)
+        absorbing = index.has_media or self.materials.absorption
+        if absorbing and (index.balanced or index.light_paths or index.guided):
+            lights = self.analysis.light_media
+            words = light_media_words(lights, media, bodies, len(self.lights.rows))
             self.store.append("media", words)
         self.store.append("media", sides)
         around = self.analysis.around

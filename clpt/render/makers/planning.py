@@ -199,7 +199,7 @@ def _patch(film: DeviceFilm, scene: Scene) -> Patch | None:
 def _enters_a_medium(film: DeviceFilm, scene: Scene) -> bool:
     """Return whether the camera or a light of a changed scene may be in other media."""
     lowered = film.wavefront.scene.lowered
-    if not lowered.features.media.present:
+    if not lowered.features.media.absorbing:
         return scene.camera.medium is not film.scene.camera.medium
     if lowered.features.light_media and _lights_moved(film.scene, scene):
         return True

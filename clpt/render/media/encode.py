@@ -89,7 +89,7 @@ class MediumWords:
 
     def word(self, filling: Filling | None) -> int:
         """Return the word of a medium or of the inside of a body that absorbs, 0 of None."""
-        if filling is None or not self._has_media:
+        if filling is None or not (self._has_media or isinstance(filling, Absorber)):
             return 0
         if filling not in self._words:
             if isinstance(filling, Absorber):

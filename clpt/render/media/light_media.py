@@ -73,9 +73,14 @@ def light_media(
 
 
 def light_media_words(
-    surrounding: LightMedia, media: MediumWords, bodies: BodyWords | None
+    surrounding: LightMedia, media: MediumWords, bodies: BodyWords | None, rows: int
 ) -> NDArray[np.uint32]:
-    """Return the words of `around` for each row of `lights`, (3 n,) uint32."""
+    """Return the words of `around_words` for each of the rows of `lights`, (3 rows,) uint32.
+
+    Zeros where the media are unknown.
+    """
+    if not surrounding.around:
+        return np.zeros(3 * rows, np.uint32)
     words: list[tuple[int, int, int]] = []
     for at_light, count in surrounding.around:
         words += [around_words(at_light, media, bodies)] * count

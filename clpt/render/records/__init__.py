@@ -261,10 +261,10 @@ class Features:
 
     @property
     def light_media(self) -> bool:
-        """Whether media are known around lights, as paths start there."""
+        """Whether media, or bodies that absorb, are known around lights, as paths start there."""
         transport = self.transport
         start = transport.light_paths or transport.weighed or transport.guided
-        return self.media.present and start and not transport.lit_ghosts
+        return self.media.absorbing and start and not transport.lit_ghosts
 
     @property
     def screen_motion(self) -> bool:

@@ -1,6 +1,7 @@
 """Integrators, samplers, filters and the film: how a scene becomes a picture."""
 
 from clpt.scene.integrators.film import (
+    MOST_BANDS,
     BlackmanHarris,
     Box,
     Film,
@@ -39,7 +40,7 @@ PIXELWISE = (Sobol, Independent)  # samplers whose pixels do not know of each ot
 FILTERS = (Box, Tent, Gaussian, Mitchell, Lanczos, BlackmanHarris)
 
 __all__ = [
-    "DEEPEST", "FILTERS", "HAVE_LAYERS", "KINDS", "MOST_GUIDE_PATHS",
+    "DEEPEST", "FILTERS", "HAVE_LAYERS", "KINDS", "MOST_BANDS", "MOST_GUIDE_PATHS",
     "NO_AOV", "PIXELWISE", "SAMPLERS", "Auto", "BlackmanHarris", "Box", "Direct", "Film",
     "Filter", "Gaussian", "Independent", "Integrator", "Lanczos", "Mitchell",
     "ParticleTracer", "Path", "Sampler", "Sobol", "Tent", "Vcm", "Whitted", "Zsobol",

@@ -106,8 +106,8 @@ def _lit_screen(way: integrators.Integrator, lamp: shapes.Shape | lights.Light) 
     return scene if is_shape else dataclasses.replace(scene, lights=[lamp])
 
 
-def _expected(irradiance: np.ndarray) -> np.ndarray:
-    """The mean radiance of the picture's pixels, whose rays through the fog differ in length."""
+def _expected(irradiance: np.ndarray, extinction: np.ndarray = FOG_A) -> np.ndarray:
+    """The mean radiance of the picture's pixels, whose rays to the screen differ in length."""
     at = np.tan(np.radians(25)) * (np.arange(64) + 0.5 - 32) / 32
     x, y = np.meshgrid(at, at)
     d = np.stack([x, y, np.ones_like(x)], axis=-1) / np.sqrt(x**2 + y**2 + 1)[..., None]
@@ -117,7 +117,7 @@ def _expected(irradiance: np.ndarray) -> np.ndarray:
     o = np.array([0, 0.8, 0.3])
     along = d @ o
     t = -along + np.sqrt(along**2 + SCREEN**2 - o @ o)
-    return REFLECTS / np.pi * irradiance * np.exp(-t[..., None] * FOG_A).mean(axis=(0, 1))
+    return REFLECTS / np.pi * irradiance * np.exp(-t[..., None] * extinction).mean(axis=(0, 1))
 
 
 def _compare(scene: Scene, expected: np.ndarray, spp: int) -> None:
@@ -182,3 +182,36 @@ def test_a_clear_body_is_the_fog() -> None:
     clear = m.Dielectric(int_ior=1.0, ext_ior=1.0, absorption=(0.0, 0.0, 0.0))
     seen = _mean(_scene(_camera(0.2), [_wall(), _body(clear)], WAYS["path"]))
     np.testing.assert_allclose(seen, LIGHT * np.exp(-FOG_A * (0.2 + WALL)), rtol=2e-4)
+
+
+# without a medium around
+
+
+def _in_glass(parts: list[Any], camera: cameras.Camera, way: integrators.Integrator) -> Scene:
+    """A scene whose parts, with the camera, are all in a large ball that absorbs."""
+    glass = shapes.Sphere(radius=4.0, material=GLASS["dielectric"])
+    film = Film(width=8, height=8, mode="rgb")
+    return Scene(camera=camera, shapes=[*parts, glass], film=film, integrator=way)
+
+
+@pytest.mark.parametrize("way", [way for way in WAYS if way != "particle_tracer"])
+def test_a_camera_and_a_wall_in_the_same_body(way: str) -> None:
+    seen = _mean(_in_glass([_wall()], _camera(0.2), WAYS[way]))
+    np.testing.assert_allclose(seen, LIGHT * np.exp(-A * (0.2 + WALL)), rtol=2e-4)
+
+
+@pytest.mark.parametrize("way", [way for way in WAYS if way != "whitted"])
+def test_a_lamp_and_a_screen_in_the_same_body(way: str) -> None:
+    theta = (np.arange(2000) + 0.5) / 2000 * np.arcsin(LAMP / SCREEN)
+    length = SCREEN * np.cos(theta) - np.sqrt(LAMP**2 - (SCREEN * np.sin(theta)) ** 2)
+    step = np.arcsin(LAMP / SCREEN) / 2000
+    weights = (2 * np.pi * step * np.cos(theta) * np.sin(theta))[:, None]
+    irradiance = LIGHT * (weights * np.exp(-length[:, None] * A)).sum(0)
+    lamp = shapes.Sphere(
+        radius=LAMP, material=m.Diffuse(reflectance=0.0), emission=lights.Area(radiance=LIGHT)
+    )
+    screen = shapes.Sphere(
+        radius=SCREEN, flip_normals=True, material=m.Diffuse(reflectance=REFLECTS)
+    )
+    scene = _in_glass([lamp, screen], EYE, WAYS[way])
+    _compare(scene, _expected(irradiance, A), 128)
