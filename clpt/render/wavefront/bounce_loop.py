@@ -16,7 +16,7 @@ import numpy as np
 
 from clpt import device
 from clpt.device.stream import Timings
-from clpt.render.flow import bounce, programs, signatures
+from clpt.render.flow import bounce, flags, programs
 from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.records import Features
 from clpt.render.wavefront import launches, strategy
@@ -324,7 +324,7 @@ class BounceLoop:
     def _link(self, lowered: Lowered, chosen: Strategy) -> device.Program:
         features, layout = lowered.features, chosen.layout
         texts = programs.loop_sources(features, layout, self.lanes, chosen.interleaved)
-        known = {"loop": signatures.loop_arguments(features, layout)}
+        known = {"loop": flags.loop_arguments(features, layout)}
         return device.link(self.device, texts, "loop", known)
 
     def _adjust(self, took: float, was_cut: bool) -> None:
