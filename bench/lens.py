@@ -21,7 +21,7 @@ from clpt import device
 from clpt.records import SETTINGS, TABLES
 from clpt.render.camera import encode_camera
 from clpt.render.flow import stages
-from clpt.render.flow.signatures import scene_text
+from clpt.render.flow.flags import scene_text
 from clpt.render.records import CameraFeatures
 from clpt.scene.cameras import Lens
 

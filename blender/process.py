@@ -60,8 +60,8 @@ class Process:
         except OSError:
             raise ProcessError("clpt has ended") from None
 
-    def receive(self, wait: float) -> tuple[dict[str, Any], bytes] | None:
-        """Return a message and the pixels after it, None if none comes within `wait` [s].
+    def receive(self, wait: float) -> tuple[dict[str, Any], list[bytes]] | None:
+        """Return a message and the pictures after it, None if none comes within `wait` [s].
 
         Raises ProcessError if the process has ended, or tells an error.
         """
@@ -69,12 +69,12 @@ class Process:
             if not self.connection.poll(wait):
                 return None
             message = json.loads(self.connection.recv_bytes())
-            pixels = self.connection.recv_bytes() if message.get("pixels") else b""
+            pictures = [self.connection.recv_bytes() for _ in range(message.get("pictures", 0))]
         except (EOFError, OSError):
             raise ProcessError("clpt has ended; its message is in the terminal") from None
         if "error" in message:
             raise ProcessError(message["error"])
-        return message, pixels
+        return message, pictures
 
     def stop(self) -> None:
         """End the process, if it has not ended."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +22,24 @@ TO_CLPT = Matrix.Diagonal((-1.0, 1.0, -1.0, 1.0))  # cameras and lamps look alon
 DOME = [[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 SILENT = {"CAMERA", "EMPTY", "ARMATURE", "LATTICE", "LIGHT_PROBE", "SPEAKER"}
 
-Rows = list[list[float]]  # of a matrix
+CAMERA = ("", "", ())  # the key of the camera
+
+Key = tuple[str, str, tuple[int, ...]]  # of an instance, at all times
+Pose = tuple[float, dict[Key, Matrix]]
 
 
 class Writer:
     """Writes a scene once. told: what is left out or approximated, for people."""
 
-    def __init__(self, depsgraph: bpy.types.Depsgraph, folder: Path, width: int, height: int):
-        self.depsgraph, self.folder = depsgraph, folder
+    def __init__(
+        self,
+        depsgraph: bpy.types.Depsgraph,
+        folder: Path,
+        width: int,
+        height: int,
+        set_frame: Callable[..., None],
+    ):
+        self.depsgraph, self.folder, self.set_frame = depsgraph, folder, set_frame
         self.width, self.height = width, height
         self.told: dict[str, None] = {}
         self.tree = Tree(self.image, self.tell)
@@ -45,7 +56,7 @@ class Writer:
         shapes: list[Json] = []
         lights: list[Json] = []
         parts: dict[int, list[Json]] = {}
-        places: dict[int, list[Rows]] = {}
+        places: dict[int, list[tuple[Key, Matrix]]] = {}
         for instance in self.depsgraph.object_instances:
             if not instance.show_self:
                 continue
@@ -54,18 +65,27 @@ class Writer:
                 key = source.data.as_pointer()
                 if key not in parts:
                     parts[key] = self._parts(len(parts), source)
-                places.setdefault(key, []).append([list(row) for row in instance.matrix_world])
+                placed = _key(instance), instance.matrix_world.copy()
+                places.setdefault(key, []).append(placed)
             elif source.type == "LIGHT":
                 self._lamp(source, instance.matrix_world.copy(), lights, shapes)
             elif source.type not in SILENT:
                 self.tell(f"objects of the type {source.type.title()} are left out")
-        for key, matrices in places.items():
-            shapes += self._placed(parts[key], matrices)
         lights += self._world()
+        camera = self._camera()
+        poses = self._poses()
+        for key, placed in places.items():
+            shapes += self._placed(parts[key], [_moved(row, poses) for row in placed])
+        if poses and self.depsgraph.scene.camera is not None:
+            camera |= {"shutter": {"open": 0.0, "close": poses[-1][0]}, **self._moved_camera(poses)}
         content = {
             "version": 2,
-            "camera": self._camera(),
-            "film": {"width": self.width, "height": self.height},
+            "camera": camera,
+            "film": {
+                "width": self.width,
+                "height": self.height,
+                "alpha": self.depsgraph.scene.render.film_transparent,
+            },
             "materials": self.named,
             "groups": self.groups,
             "shapes": shapes,
@@ -75,15 +95,43 @@ class Writer:
         file.write_text(json.dumps(content), "utf-8")
         return file
 
-    def _placed(self, parts: list[Json], matrices: list[Rows]) -> list[Json]:
+    def _poses(self) -> list[Pose]:
+        """Return when the shutter is open [s], and where all is then; nothing without motion blur.
+
+        The frame of the scene is set to these times, and back.
+        """
+        scene, frames = self.depsgraph.scene, self.depsgraph.scene.render
+        length = frames.motion_blur_shutter
+        if not frames.use_motion_blur or not length > 0.0:
+            return []
+        start = {"START": 0.0, "CENTER": -0.5, "END": -1.0}[frames.motion_blur_position] * length
+        rate = frames.fps / frames.fps_base
+        present, poses = scene.frame_current_final, []
+        for share in (0.0, 0.5, 1.0):
+            frame = present + start + share * length
+            self.set_frame(math.floor(frame), subframe=frame - math.floor(frame))
+            places = {_key(i): i.matrix_world.copy() for i in self.depsgraph.object_instances}
+            camera = scene.camera
+            if camera is not None:
+                places[CAMERA] = camera.evaluated_get(self.depsgraph).matrix_world.copy()
+            poses.append((share * length / rate, places))
+        self.set_frame(math.floor(present), subframe=present - math.floor(present))
+        return poses
+
+    def _moved_camera(self, poses: list[Pose]) -> Json:
+        matrix = self.depsgraph.scene.camera.evaluated_get(self.depsgraph).matrix_world.copy()
+        moved = _moved((CAMERA, matrix), poses)
+        return {"motion": moved["motion"]} if "motion" in moved else {}
+
+    def _placed(self, parts: list[Json], places: list[Json]) -> list[Json]:
         """Return the shapes of a mesh at all its places: instances of a group where it has many."""
-        if len(matrices) == 1:
-            return [{**part, "to_world": matrices[0]} for part in parts]
+        if len(places) == 1:
+            return [{**part, **places[0]} for part in parts]
         if not parts:
             return []
         name = f"group{len(self.groups)}"
         self.groups[name] = parts
-        return [{"type": "instance", "group": name, "to_world": matrix} for matrix in matrices]
+        return [{"type": "instance", "group": name, **place} for place in places]
 
     def _parts(self, number: int, source: Any) -> list[Json]:
         """Return the shapes of an object in its own space, one for each material."""
@@ -296,6 +344,26 @@ class Writer:
                     "focus_distance": focus,
                 }
         return {**described, "to_world": [list(row) for row in place]}
+
+
+def _key(instance: bpy.types.DepsgraphObjectInstance) -> Key:
+    parent = instance.parent
+    numbers = tuple(instance.persistent_id) if instance.is_instance else ()
+    return instance.object.name_full, "" if parent is None else parent.name_full, numbers
+
+
+def _moved(placed: tuple[Key, Matrix], poses: list[Pose]) -> Json:
+    """Return where something is, and how it moves while the shutter is open."""
+    key, matrix = placed
+    place: Json = {"to_world": [list(row) for row in matrix]}
+    keys = [(time, there[key]) for time, there in poses if key in there]
+    if len(keys) < 2 or all(there == matrix for _, there in keys):
+        return place
+    back = matrix.inverted_safe()
+    motion = [
+        {"time": time, "transform": [list(row) for row in there @ back]} for time, there in keys
+    ]
+    return {**place, "motion": motion}
 
 
 def _linear(encoded: np.ndarray) -> np.ndarray:

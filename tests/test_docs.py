@@ -384,7 +384,7 @@ def test_the_code_of_limits(run: Run):
 LIMITS = (  # on the page, and where the code has them
     ("65 536 pixels", "clpt.cli.options.values", "LARGEST", 65536),
     ("67 108 864 pixels", "clpt.render.film.check", "LARGEST", 67108864),
-    ("| 1024 |", "clpt.scene.integrators", "MOST_BANDS", 1024),
+    ("| 1024 |", "clpt.scene.integrators.film", "MOST_BANDS", 1024),
     ("| 4000 |", "clpt.scene.integrators", "DEEPEST", 4000),
     ("715 827 882", "clpt.bvh.build", "MOST", 715827882),
     ("| 255 |", "clpt.render.records.materials", "MOST", 255),

@@ -12,7 +12,7 @@ from clpt import device
 from clpt.device import kernels_folder
 from clpt.layout import SLAB_BLOCK, TYPES, Constants, Record, bits
 from clpt.records import CONSTANTS, LIGHT, PATH, SETTINGS, SHAPE, SLABS
-from clpt.render.flow.signatures import scene_text
+from clpt.render.flow.flags import scene_text
 from clpt.render.records import camera as camera_records
 
 UNIFORM = [SETTINGS, *camera_records.RECORDS.values()]

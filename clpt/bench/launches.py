@@ -31,7 +31,7 @@ from clpt.records import HIT, PATH, PATH_BITS, SHADOW, SLABS
 from clpt.render.flow import programs
 from clpt.render.flow.scene_to_tables import lower
 from clpt.render.wavefront.bounce_loop import Step, beginning
-from clpt.render.wavefront.path_buffers import default_slots
+from clpt.render.wavefront.path_buffers import APPENDING, default_slots
 from clpt.render.wavefront.wavefront import Wavefront
 from clpt.scene import Scene
 
@@ -262,7 +262,7 @@ def launches(flight: Flight) -> Iterator[Launch]:
         interleaved=chosen.interleaved,
     )  # fmt: skip
     for step in wave.stages:
-        yield _launch(flight, step, texts.get(step.name) or texts["append"])
+        yield _launch(flight, step, texts[APPENDING.get(step.name, step.name)])
 
 
 def _launch(flight: Flight, step: Step, text: device.Source) -> Launch:

@@ -22,7 +22,7 @@ from clpt.records import SLABS
 from clpt.render.film.state import FILM_WORDS
 from clpt.render.flow import blocks, programs
 from clpt.render.records import Features
-from clpt.render.wavefront.path_buffers import QUEUEING, queue_sizes, queue_steps
+from clpt.render.wavefront.path_buffers import APPENDING, queue_sizes, queue_steps
 from clpt.scene import Scene
 
 _WORD = 4  # bytes
@@ -34,7 +34,6 @@ _QUEUED = {
     "generate": (1, 0),
     "shadow": (1, 0),
 }  # words read and written of a queue
-APPENDING = {"append_begin", *QUEUEING.values()}
 WARM = 4  # bounces before the measurement, so that paths of all depths are in flight
 BOUNCES = 4  # of a round: in a single bounce few paths may begin
 

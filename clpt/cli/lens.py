@@ -46,7 +46,7 @@ def lens(
 
     prescription = lenses.read(lens) if Path(lens).suffix else lenses.library(lens)
     if f_number is not None:
-        prescription = prescription.with_stop(lenses.paraxial.stop_radius(prescription, f_number))
+        prescription = prescription.with_stop(lenses.tracing.stop_radius(prescription, f_number))
     waves = _numbers(wavelengths, "--wavelengths", 200.0, 2000.0)
     angles = _numbers(fields, "--fields", -89.0, 89.0)
     console = output_console()

@@ -3,10 +3,10 @@
 Lengths are in millimetres here, wavelengths in nm.
 """
 
-from clpt.lenses import paraxial
+from clpt.lenses import tracing
 from clpt.lenses.files import READERS, library, names, read
-from clpt.lenses.paraxial import Cardinal, cardinal
 from clpt.lenses.prescription import COATINGS, Coat, Prescription, Surface
+from clpt.lenses.tracing import Cardinal, cardinal
 
 __all__ = [
     "COATINGS",
@@ -18,6 +18,6 @@ __all__ = [
     "cardinal",
     "library",
     "names",
-    "paraxial",
     "read",
+    "tracing",
 ]

@@ -3,8 +3,7 @@
 `droplets` returns a medium from indices and sizes; the other functions are its steps.
 """
 
-from .droplets import DENSE, Sizes, angles, droplets, sizes, water_index
-from .sphere import Spheres, spheres
+from .droplets import DENSE, Sizes, Spheres, angles, droplets, sizes, spheres, water_index
 
 __all__ = [
     "DENSE", "Sizes", "Spheres", "angles", "droplets", "sizes", "spheres", "water_index",

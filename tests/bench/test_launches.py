@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import shutil
 import subprocess
 import sys
@@ -220,3 +221,12 @@ def test_where_it_cannot_be_written(
         launches.write_program(
             tmp_path / "file", noted[STAGE], "cornell", on.info, "another", "right"
         )
+
+
+def test_queues_of_a_gpu_are_launches(on: device.Device, scene: Scene) -> None:
+    """The kernel of each launch is in its text: queues of one program serve several stages."""
+    info = dataclasses.replace(on.info, kind="gpu", compute_units=1)
+    queued = Flight(device.Device(on.context, on.queue, info), scene, COUNT)
+    every = [*launches.launches(queued)]
+    assert all(each.kernel in each.text.text for each in every)
+    assert {"append_ended", "append", "append_shadows"} <= {each.stage for each in every}

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from clpt import images
+from clpt.images import exr_files
 
 bpy: Any = pytest.importorskip("bpy")
 blender: Any = pytest.importorskip("blender")
@@ -207,3 +208,72 @@ def test_hair_lies_where_cycles_has_it(tmp_path: Path) -> None:
     ours, cycles = (picture(engine, tmp_path, 64) for engine in ("CLPT", "CYCLES"))
     dark = [(shown.mean(axis=2) < 0.5 * shown.max()).mean() for shown in (ours, cycles)]
     assert 0.03 < dark[1] < 0.7 and dark[0] == pytest.approx(dark[1], rel=0.05)
+
+
+def test_passes_are_those_of_cycles(tmp_path: Path) -> None:
+    """Depth, normals, positions of a cube: medians of the differences are rounding."""
+    bpy.ops.wm.read_factory_settings()
+    layer = bpy.context.scene.view_layers[0]
+    for option in ("use_pass_z", "use_pass_normal", "use_pass_position"):
+        setattr(layer, option, True)
+    bpy.context.scene.render.image_settings.media_type = "MULTI_LAYER_IMAGE"
+    shown = {}
+    for engine in ("CLPT", "CYCLES"):
+        scene = bpy.context.scene
+        scene.render.engine = engine
+        scene.cycles.samples = scene.clpt.samples = 16
+        scene.render.resolution_x, scene.render.resolution_y = SIZE
+        scene.render.resolution_percentage = 100
+        scene.render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
+        scene.render.image_settings.color_depth = "32"
+        scene.render.filepath = str(tmp_path / f"{engine}.exr")
+        bpy.ops.render.render(write_still=True)
+        file = Path(scene.render.filepath)
+        parts = range(len(images.part_names(file)))
+        shown[engine] = {
+            name: values
+            for part in parts
+            for name, values in exr_files.read_channels(file, part=part).items()
+        }
+    names = [f"{name}.{axis}" for name in ("Normal", "Position") for axis in "XYZ"]
+    for name in ("Depth.Z", *names):
+        ours, cycles = (shown[engine][f"ViewLayer.{name}"] for engine in ("CLPT", "CYCLES"))
+        assert np.median(np.abs(ours - cycles)) < 1e-3, name
+        assert np.mean(np.abs(ours - cycles) < 0.02) > 0.8, name
+
+
+def test_what_moves_is_blurred_as_in_cycles(tmp_path: Path) -> None:
+    """A glowing square that crosses the picture while the shutter is open: its row of pixels."""
+    floor_and_camera()
+    bpy.data.objects["Plane"].location = (0.0, 0.0, -200.0)
+    bpy.ops.mesh.primitive_plane_add(size=1.0)
+    square = bpy.context.object
+    glow = bpy.data.materials.new("glow")
+    glow.use_nodes = True
+    surface = glow.node_tree.nodes["Principled BSDF"]
+    surface.inputs["Emission Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    surface.inputs["Emission Strength"].default_value = 2.0
+    square.data.materials.append(glow)
+    for frame, x in ((0, -2.0), (2, 2.0)):
+        square.location = (x, 0.0, 0.0)
+        square.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(1)
+    bpy.context.scene.render.use_motion_blur = True
+    bpy.context.scene.render.motion_blur_shutter = 1.0
+    ours, cycles = (picture(engine, tmp_path, 256) for engine in ("CLPT", "CYCLES"))
+    rows = [shown[..., 0].sum(axis=0) for shown in (ours, cycles)]
+    assert rows[0].sum() == pytest.approx(rows[1].sum(), rel=0.02)
+    assert np.abs(rows[0] - rows[1]).max() < 0.1 * rows[1].max()
+
+
+def test_a_transparent_film_has_alpha(tmp_path: Path) -> None:
+    bpy.ops.wm.read_factory_settings()
+    scene = bpy.context.scene
+    scene.render.film_transparent = True
+    scene.render.image_settings.color_mode = "RGBA"
+    alphas = []
+    for engine in ("CLPT", "CYCLES"):
+        picture(engine, tmp_path, 32)
+        channels = images.read_channels(scene.render.filepath)
+        alphas.append(next(v for name, v in channels.items() if name.endswith("A")).mean())
+    assert 0.05 < alphas[1] < 0.5 and alphas[0] == pytest.approx(alphas[1], abs=0.005)

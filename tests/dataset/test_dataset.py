@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import json
 import os
 import subprocess
@@ -19,6 +20,7 @@ from clpt import dataset
 from clpt import transforms as tf
 from clpt.dataset import truth as truths
 from clpt.errors import SceneError, UnknownKindError
+from clpt.files import output_files
 from clpt.scene import Film, Scene, cameras, lights, materials, shapes
 from clpt.scene.integrators import Path
 
@@ -231,6 +233,24 @@ def test_a_killed_run_goes_on(tmp_path):
     assert subprocess.run([sys.executable, "-c", code], cwd=os.getcwd()).returncode == 9
     report = run(tmp_path / "a")
     assert (report.written, report.present) == (2, 2)
+
+
+def test_a_full_disk_ends_the_run_and_loses_nothing(tmp_path, monkeypatch):
+    write, calls = output_files.write, []
+
+    def fills(path, content):
+        calls.append(path)
+        if len(calls) > 7:  # within picture 1
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        write(path, content)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(output_files, "write", fills)
+        with pytest.raises(OSError, match="No space left"):
+            run(tmp_path, count=3)
+    assert [path.stem for path in (tmp_path / "records").glob("*.json")] == ["000000"]
+    report = run(tmp_path, count=3)
+    assert (report.written, report.present, report.failures) == (2, 1, {})
 
 
 def test_coco(tmp_path):

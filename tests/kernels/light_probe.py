@@ -12,7 +12,7 @@ import pyopencl as cl
 from clpt import device
 from clpt.geometry import analytic, shapes, triangles
 from clpt.records import SETTINGS, SHAPE
-from clpt.render.flow.signatures import scene_text
+from clpt.render.flow.flags import scene_text
 from clpt.render.geometry import cases as shape_text
 from clpt.render.lights import cases as light_dispatch
 from clpt.render.lights import encode as lights

@@ -10,7 +10,7 @@ import pyopencl as cl
 from clpt import device
 from clpt.records import SETTINGS, TABLES
 from clpt.render.flow import choices
-from clpt.render.flow.signatures import scene_text
+from clpt.render.flow.flags import scene_text
 from clpt.render.records import Features
 from tests.kernels.harness import opened
 

@@ -79,7 +79,7 @@ def test_rays_lead_back_to_the_film(lens):
     o, d, alive = out[:3].T * 1e3, out[3:6].T, out[6] > 0.0
     assert 0.5 < alive.mean() < 0.99
     # Camera space looks along +z from the film, which stands behind the last surface.
-    back = lenses.paraxial.film_distance(made, 1300.0) + 0.2
+    back = lenses.tracing.film_distance(made, 1300.0) + 0.2
     o = np.stack([o[:, 0], o[:, 1], made.length + back - o[:, 2]], axis=1)
     d = np.stack([-d[:, 0], -d[:, 1], d[:, 2]], axis=1)
     for wavelength in np.unique(waves):
@@ -98,9 +98,9 @@ def test_irradiance_beside_float64():
     5 standard errors of 32,768 samples (two-sided significance 6e-7).
     """
     camera = Lens(exposure="irradiance", f_number=2.8)
-    made = camera.prescription.with_stop(lenses.paraxial.stop_radius(camera.prescription, 2.8))
+    made = camera.prescription.with_stop(lenses.tracing.stop_radius(camera.prescription, 2.8))
     trace_ = probe(camera)
-    back = lenses.paraxial.film_distance(made, 1e7)
+    back = lenses.tracing.film_distance(made, 1e7)
     size, cells = made.surfaces[-1].semi_diameter, 200
     x, y = (each.ravel() for each in np.meshgrid(*[(np.arange(cells) + 0.5) / cells * 2 - 1] * 2))
     for place in (0.0, 10.0, 17.5):

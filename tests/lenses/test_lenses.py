@@ -10,7 +10,6 @@ import pytest
 from clpt import lenses, spectra
 from clpt.errors import SceneError
 from clpt.lenses import Prescription, Surface, tracing
-from clpt.lenses.paraxial import film_distance, stop_radius
 from clpt.lenses.prescription import (
     AIR,
     COATINGS,
@@ -22,7 +21,15 @@ from clpt.lenses.prescription import (
     quarter_wave,
     reflectance,
 )
-from clpt.lenses.tracing import ZONES, Rays, axis_solid_angle, trace, zones
+from clpt.lenses.tracing import (
+    ZONES,
+    Rays,
+    axis_solid_angle,
+    film_distance,
+    stop_radius,
+    trace,
+    zones,
+)
 from clpt.spectra import Constant
 
 CROWN = Constant(1.5)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from clpt.render.flow import flags, signatures, vertices
+from clpt.render.flow import flags, vertices
 from clpt.render.records import Features
 from clpt.render.records.dispatch import function
 from clpt.scene.scatterer import Scatterer
@@ -178,14 +178,14 @@ def _call(features: Features, paths: Features, layout: str, stage: Stage) -> _Ca
     """The call of a stage for a kind of paths."""
     begin, join = begin_and_join(paths)
     groups = {
-        begin: signatures.begin_args(paths),
-        "intersect": signatures.trace_args(paths, layout),
-        "flight": signatures.flight_args(paths),
-        "gather_along": signatures.gather_args(paths),
-        "deposit": signatures.deposit_args(paths),
-        "train": signatures.deposit_args(paths),
-        join: signatures.join_args(paths, layout),
-        "shade": signatures.shade_args(features),
+        begin: flags.begin_args(paths),
+        "intersect": flags.trace_args(paths, layout),
+        "flight": flags.flight_args(paths),
+        "gather_along": flags.gather_args(paths),
+        "deposit": flags.deposit_args(paths),
+        "train": flags.deposit_args(paths),
+        join: flags.join_args(paths, layout),
+        "shade": flags.shade_args(features),
     }
     args = [(type_, name) for name, type_ in groups.get(stage.kernel, {}).items()]
     if stage.kernel == "shade":

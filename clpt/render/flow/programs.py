@@ -15,7 +15,7 @@ import re
 from clpt import bvh, device
 from clpt.errors import SceneError, UnknownKindError
 from clpt.layout import SLAB_BLOCK
-from clpt.render.flow import blocks, bounce, choices, flags, signatures, stages, vertices
+from clpt.render.flow import blocks, bounce, choices, flags, stages, vertices
 from clpt.render.flow.stages import functions_text
 from clpt.render.geometry import cases as shapes
 from clpt.render.lights import cases as lights
@@ -232,7 +232,7 @@ def loop_sources(
     used |= dict.fromkeys(shared)
     files = {
         **_shared(features, layout),
-        **signatures.loop_files(features, layout),
+        **flags.loop_files(features, layout),
         "generated/block.cl": blocks.blocks_text(features.passes),
         "generated/bounce_stages.cl": bounce.stages_text(features, layout, lanes, interleaved),
     }
@@ -323,7 +323,7 @@ def _generated(features: Features, layout: str) -> Files:
         **shapes.virtual_files(features),
         **rough_coat_table.virtual_files(),
         **lights.virtual_files(),
-        **signatures.virtual_files(features, layout),
+        **flags.virtual_files(features, layout),
         **parameters.virtual_files(features),
         **choices.virtual_files(features, layout),
         "generated/common.cl": vertices.calls_text(),

@@ -16,12 +16,12 @@ import numpy as np
 
 from clpt import device
 from clpt.device.stream import Timings
-from clpt.render.flow import bounce, programs, signatures
+from clpt.render.flow import bounce, flags, programs
 from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.records import Features
 from clpt.render.wavefront import launches, strategy
 from clpt.render.wavefront.device_scene import DeviceScene
-from clpt.render.wavefront.path_buffers import GROUP, QUEUEING, PathBuffers, queue_steps
+from clpt.render.wavefront.path_buffers import APPENDING, GROUP, QUEUEING, PathBuffers, queue_steps
 from clpt.render.wavefront.strategy import Strategy
 
 BATCH = 8  # bounces that are enqueued between two reads of the counters
@@ -307,11 +307,10 @@ class BounceLoop:
 
     def _bind_queues(self, kernel: str, kinds: int) -> list[Step]:
         """The kernels that queue slots for a stage: by material for shading, else in a queue."""
-        shades, steps = kernel == "shade", []
-        queues = queue_steps(self.paths.slots, kinds if shades else 1, QUEUEING[kernel])
-        for name, size, group in queues:
-            program = "append" if shades or name == "append_begin" else "append_some"
-            bound = self.kernels.bind(self._label + program, name)
+        steps = []
+        wanted = kinds if kernel == "shade" else 1
+        for name, size, group in queue_steps(self.paths.slots, wanted, QUEUEING[kernel]):
+            bound = self.kernels.bind(self._label + APPENDING[name], name)
             steps.append(Step(name, bound, (size,), (group,) if group else None))
         return steps
 
@@ -325,7 +324,7 @@ class BounceLoop:
     def _link(self, lowered: Lowered, chosen: Strategy) -> device.Program:
         features, layout = lowered.features, chosen.layout
         texts = programs.loop_sources(features, layout, self.lanes, chosen.interleaved)
-        known = {"loop": signatures.loop_arguments(features, layout)}
+        known = {"loop": flags.loop_arguments(features, layout)}
         return device.link(self.device, texts, "loop", known)
 
     def _adjust(self, took: float, was_cut: bool) -> None:

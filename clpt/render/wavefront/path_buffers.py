@@ -101,6 +101,9 @@ PADDING = 80  # words between runs of all slots: powers of two collide in a cach
 GROUP = 64  # slots are a multiple of it; the local size of kernels with a single lane
 # The kernel that fills the queue of a stage, by the stage's kernel.
 QUEUEING = {"shade": "append", "generate": "append_ended", "shadow": "append_shadows"}
+# Kernels that fill queues, and their programs.
+APPENDING = {"append_begin": "append", "append": "append"}
+APPENDING |= {"append_ended": "append_some", "append_shadows": "append_some"}
 QUEUE_GROUP = 256  # work-items that append to queues together
 FRESH = PATH_BITS["fresh"]
 CPU_SLOTS = 1 << 14

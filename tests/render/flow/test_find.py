@@ -79,5 +79,5 @@ def test_media_are_found_around_lights_and_the_camera() -> None:
     given.lights = given.lights[1:]
     found = analyse(given, LoweringCache())
     assert found.around == (fog,)
-    assert [around for around, _ in found.light_media.around] == [(fog,), (fog,)]
+    assert [around for around, _ in found.light_media.around] == [(fog, None), (fog, None)]
     np.testing.assert_allclose(found.light_media.extinction, 0.1, rtol=1e-6)

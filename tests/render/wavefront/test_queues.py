@@ -17,8 +17,8 @@ from clpt.layout import SLAB_BLOCK, Record
 from clpt.records import HIT, PATH, SHADOW, SLABS
 from clpt.render.flow import programs
 from clpt.render.flow.blocks import blocks_text, members, unused
+from clpt.render.flow.flags import scene_text
 from clpt.render.flow.scene_to_tables import lower
-from clpt.render.flow.signatures import scene_text
 from clpt.render.wavefront.path_buffers import queue_sizes, queue_steps
 from clpt.scene import Scene, integrators
 from clpt.scene.cameras import Perspective
