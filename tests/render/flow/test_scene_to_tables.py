@@ -166,7 +166,7 @@ def test_shapes_cost_the_same_however_many() -> None:
 
     calls(1)  # what is kept for all
     few, many = calls(100), calls(300)
-    assert (many - few) / 200 < 1.1 * few / 100 < 265
+    assert (many - few) / 200 < 1.1 * few / 100 < 320  # 33 of them look at the time of the load
 
 
 def test_more_triangles_than_kernels_count(monkeypatch: pytest.MonkeyPatch) -> None:
