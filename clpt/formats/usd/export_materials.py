@@ -113,7 +113,7 @@ class MaterialWriter:
             or base.thin_walled
             or base.transmission_weight == 0
         ):
-            self.warn(f"the inside of shapes, {interior.kind}, below what OpenPBR lets through")
+            self.warn(f"the medium {interior.kind} inside of shapes")
             return
         absorbed, scattered = (
             rgb(value, "unbounded") for value in interior.coefficients(spectral=False)
