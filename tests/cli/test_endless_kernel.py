@@ -15,11 +15,11 @@ SPINS = """
 import signal, sys
 import numpy as np, pyopencl as cl
 from clpt import device
-from clpt.cli.process import stopping
-for number in (signal.SIGINT, *stopping.ENDING):
+from clpt.cli.process import ending
+for number in (signal.SIGINT, *ending.ENDING):
     signal.signal(number, signal.SIG_DFL)  # a shell ignores Ctrl-C in the background
-stopping.raise_at_signals()
-stopping.end_at_second()
+ending.raise_at_signals()
+ending.end_at_second()
 on = device.choose()
 text = "kernel void spin(global volatile int *x) { while (x[0] == 0) x[1]++; }"
 program = cl.Program(on.queue.context, text).build()
@@ -28,7 +28,7 @@ cl.enqueue_fill_buffer(on.queue, buffer, np.int32(0), 0, 64)
 on.queue.finish()
 kernel = cl.Kernel(program, "spin")
 kernel.set_arg(0, buffer)
-with stopping.stops():
+with ending.stops():
     cl.enqueue_nd_range_kernel(on.queue, kernel, (1,), None)
     on.queue.flush()
     print("begun", flush=True)

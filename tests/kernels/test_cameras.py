@@ -300,9 +300,7 @@ def varied(cls):
 BASES = {scene.Lens: {"blades": 6, "f_number": 4.0}}  # where each number matters
 
 
-@pytest.mark.parametrize(
-    "cls, name", [(cls, name) for cls in scene.KINDS for name in numbers(cls)]
-)
+@pytest.mark.parametrize("cls, name", [(cls, name) for cls in scene.KINDS for name in numbers(cls)])
 def test_every_number_changes_rays(cls, name):
     """Of a traced lens it changes the record: rays that are reflected have its numbers too."""
     one = cls(**BASES[cls]) if cls in BASES else varied(cls)
@@ -370,9 +368,10 @@ def test_points_are_seen_where_their_rays_begin(cls, step):
     assert seen.all()
     np.testing.assert_allclose(np.stack([x, y], axis=1), film, atol=2e-5)
     if cls.connects:
-        assert pytest.approx(
-            np.column_stack([film, np.ones(len(film))]), abs=2e-5
-        ) == projected(camera, step, directions, away=True)[:3].T
+        assert (
+            pytest.approx(np.column_stack([film, np.ones(len(film))]), abs=2e-5)
+            == projected(camera, step, directions, away=True)[:3].T
+        )
     if step == "connect":  # over the solid angle of the film, at 1 m
         d = [directions, *(rays(camera, 40, 30, film + e)[1] for e in 1e-3 * np.eye(2))]
         solid = np.linalg.norm(np.cross(d[1] - d[0], d[2] - d[0]), axis=1) * 1e6

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import tempfile
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,6 +14,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdRender, UsdShade, UsdUtils, Vt
 from clpt import images, transforms
 from clpt.arrays import Floats, Floats32, on_host
 from clpt.errors import SceneError
+from clpt.files import output_files
 from clpt.formats.as_openpbr import rgb
 from clpt.formats.gltf.cameras_lights import FROM_GLTF
 from clpt.formats.usd.export_materials import MaterialWriter, unused
@@ -46,22 +46,21 @@ def save(scene: Scene, path: Path) -> list[str]:
     """
     try:
         if path.suffix.lower() != ".usdz":
-            return _written(scene, path)
-        with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+            with output_files.replacing(path) as partial:
+                return _written(scene, partial)
+        with output_files.replacing(path) as partial, tempfile.TemporaryDirectory() as folder:
             layer = Path(folder) / "scene.usdc"
             lost = _written(scene, layer)
-            package = Path(folder) / "scene.usdz"
-            if not UsdUtils.CreateNewUsdzPackage(str(layer), str(package)):
+            partial.unlink(missing_ok=True)
+            if not UsdUtils.CreateNewUsdzPackage(str(layer), str(partial)):
                 raise SceneError("cannot be written: OpenUSD refuses to pack it", file=path)
-            os.replace(package, path)
-        return lost
+            return lost
     except OSError as error:
         raise SceneError(f"cannot be written: {error.strerror}", file=path) from None
 
 
 def _written(scene: Scene, path: Path) -> list[str]:
     path.unlink(missing_ok=True)
-    path.touch()  # OpenUSD would make folders that are not there
     stage = Usd.Stage.CreateNew(str(path))
     writer = _Writer(stage, path.parent)
     writer.scene(lamps.plainly_lit(scene))

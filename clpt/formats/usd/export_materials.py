@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from pxr import Gf, Sdf, Usd, UsdShade
 
 from clpt import images
 from clpt.arrays import Floats32
+from clpt.files import output_files
 from clpt.formats import as_openpbr
 from clpt.formats.as_openpbr import Surface, dispersion, rgb
 from clpt.scene import materials
@@ -179,7 +179,7 @@ class MaterialWriter:
             if (name := f"{stem}{i or ''}{suffix if copied else '.exr'}") not in taken
         )
         if copied:
-            shutil.copyfile(str(file), folder / name)
+            output_files.write(folder / name, Path(str(file)).read_bytes())
         else:
             if bitmap.spectral(REFLECTANCE) is not None:
                 self.warn("the spectra of images; their colors are written")

@@ -39,8 +39,8 @@ def divided(on: device.Device, side: int, slots: int | None = None, looped: bool
 
 def test_queues_are_for_those_who_shade_one_path(on: device.Device, cornell: Lowered) -> None:
     gpu = device.Device(on.context, on.queue, dataclasses.replace(on.info, kind="gpu"))
-    found = [choose(gpu, cornell, Tuning(queued=q)).queued for q in (None, True)]
-    assert found == [False, True]  # of one kind
+    queued = [choose(gpu, cornell, Tuning(queued=q)).queued for q in (None, True, False)]
+    assert queued == [True, True, False]  # of one kind too: shadow rays and new paths are in queues
     assert choose(on, cornell, Tuning(queued=True)).queued == (on.lanes == 1)
 
 
