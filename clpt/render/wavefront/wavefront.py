@@ -114,9 +114,8 @@ class Wavefront:
     ) -> Wavefront:
         """Return a wavefront of a lowered scene, which others may render too.
 
-        slots: paths in flight; looped: whether a kernel on the device runs all bounces. Each is
-        chosen to suit the device where it is None. trees: see `DeviceScene`; halves:
-        whether even and odd samples are kept apart.
+        slots: paths in flight; None suits the device. trees: see `DeviceScene`. halves: whether
+        even and odd samples are kept apart.
 
         Raises as `Wavefront` does, SceneError for a layout that cannot hold the scene.
         """
