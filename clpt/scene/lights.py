@@ -120,7 +120,7 @@ def _to_the_eye(doc: str, unit: str) -> Any:
 class Lamp(Light):
     """Base of the lights with a single spectrum as their emission.
 
-    A strength of STRENGTHS beside it makes the emission a colour alone.
+    If a strength of STRENGTHS is set too, the emission is only the colour.
     """
 
     temperature: float | None = host(
@@ -186,7 +186,7 @@ _L = TypeVar("_L", bound=Light)
 
 
 def with_emission(light: _L, area: float = 0.0) -> _L:
-    """Return a light whose emission says all that its temperature and its strength say.
+    """Return a light whose temperature and strength are part of its emission.
 
     area: of the shape that it is on [m^2]. Raises SceneError for a light that is dark.
     """

@@ -19,8 +19,9 @@ low by chance. So guides decide: light paths that stay out of the picture, a gui
 paths. The change of their mean while their number doubles gives the noise.
 
 Let v be the relative variance of a sample of the camera in a cell, w that of a sample's light
-paths. n and m of them leave v / n + w / m, and n + m is least for a limit e of that where
-m = (w + sqrt(v w)) / e. The cell that wants most decides m; any cell's n is what that leaves it.
+paths. With n samples and m light paths the variance is v / n + w / m. For a limit e of the
+variance, n + m is least at m = (w + sqrt(v w)) / e. The cell with the largest m decides m for all;
+then the n of each cell follows from e.
 
 A cell's n must not depend on its own samples. So the two colours of the chessboard decide m
 separately, each by guides and by the samples of its own pixels: from that the cells of the other

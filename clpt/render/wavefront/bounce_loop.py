@@ -207,9 +207,9 @@ class BounceLoop:
     def run(self, first: int, end: int, on_batch: OnBatch) -> bool:
         """Trace the paths of samples first to end - 1 of every pixel, and wait.
 
-        on_batch is called every few iterations with the counters; if it returns False, every path
-        is brought to its end, and no other begins. What it raises is raised when the device has
-        done what it was given; paths are left in flight then, and the film is not whole. Returns
+        on_batch is called every few iterations with the counters. If it returns False, the paths in
+        flight end, and no other path begins. If it raises an error, the device finishes its work
+        first, then the error is raised; paths stay in flight, and the film is incomplete. Returns
         whether all paths were traced.
         """
         numbers = self.numbers(first, end)
@@ -217,7 +217,7 @@ class BounceLoop:
         self.paths.restart()
         if first < end:
             return self._go_on(numbers, self._ending.leave or self._ending.pause, on_batch)
-        size = self._size  # launches with nothing to do are no measure of others
+        size = self._size  # short launches say nothing about long launches
         self._size, self._begin = launches.Size(self._share, 1), 0
         finished = self._go_on(numbers, self._ending.pause, on_batch)
         self._size, self._begin = size, 0

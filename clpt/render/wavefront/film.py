@@ -108,7 +108,7 @@ class Film:
             self.stream.copy(into, self.sums["film"], **offsets)
 
     def set_group(self, first: int, words: cl.Buffer | None) -> None:
-        """Enqueue that a group is what `copy_group` took, or without that 0."""
+        """Enqueue that a group has the words that `copy_group` copied, or 0 without a copy."""
         size = self.group_bytes // self._parts
         for part in range(self._parts):
             at = self._word_at(part, first)

@@ -109,8 +109,8 @@ FRESH = PATH_BITS["fresh"]
 CPU_SLOTS = 1 << 14
 UNIT_SLOTS = 1 << 14  # of a GPU's compute unit, which runs about an eighth of them at once
 MOST_SLOTS = 1 << 22  # beyond, more slots bring no speed
-# A core keeps its paths in its second cache, and waits the less for the longest of them the more
-# samples each slot has to take: few slots, measured on CPUs.
+# Few slots, measured on CPUs: a core keeps its paths in its second cache. If each slot has to take
+# many samples, the core waits less for its longest path.
 LOOP_SLOTS = 1 << 10  # of a core
 WORDS = sum(record.step for record in SLABS) + 2  # of a slot, with the words of queues
 LARGEST = max(record.step for record in SLABS)

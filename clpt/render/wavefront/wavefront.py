@@ -67,8 +67,8 @@ class Wavefront:
     tuning: for the strategies of other lowerings.
 
     counts: of rays and samples; begun: whether paths may have begun since someone set it to False;
-    leave: raised, it lets `render_samples` and the like leave paths in
-    flight as soon as the device can; their on_batch must raise then, and the film is not whole.
+    leave: a flag. When it is raised, `render_samples` and the like return as soon as the device
+    can, with paths in flight: their on_batch must raise an error then, and the film is incomplete.
 
     Raises MemoryBudgetError, KernelBuildError, DeviceError.
     """
@@ -228,7 +228,7 @@ class Wavefront:
     def clear(self, *, learned: bool = False) -> None:
         """Enqueue that the film is empty; the next sample is number 0.
 
-        learned: what a guide has learned stays, which is of the seed that there was then.
+        learned: the guide keeps what it has learned, with the seed of that time.
         """
         self._light_paths = 0  # that are in the film
         self._in_flight = None  # the next paths take the places of these
@@ -364,7 +364,7 @@ class Wavefront:
         guide = self.guide
         if guide is None or guide.trained:
             return
-        assert self._trainer is not None, "who has a guide has what it learns from"
+        assert self._trainer is not None, "a guide has a trainer"
         guide.clear()
         if looped:
             self._trainer.enqueue(0, guide.samples)
