@@ -134,7 +134,7 @@ def seconds_to_error(act: Callable[[], object]) -> float:
     return took
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("parts", PARTS, ids=lambda parts: parts.__name__)
 def test_a_preparation_ends_soon(
     parts: Callable[[Generator, Path], Parts], seed: int, tmp_path: Path

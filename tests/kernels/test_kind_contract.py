@@ -24,7 +24,7 @@ from clpt.scene.roles import REAL, Role
 from clpt.scene.values import Attributes, Operation, Texture, Use, brightness_at
 from clpt.spectra import Constant
 from clpt.view import probe
-from tests.kernels import kind_contract, strangers
+from tests.kernels import strangers
 from tests.kernels.kind_contract import LAMPS, check_bounds, check_number, check_power
 from tests.kernels.test_textures import look_up
 
@@ -42,7 +42,7 @@ def test_the_power_is_that_of_the_extent(cls: type[lights.Light]) -> None:
     check_power(cls)
 
 
-@pytest.mark.parametrize("number", kind_contract.NUMBERS[1:])
+@pytest.mark.parametrize("number", [40, pytest.param(10_000, marks=pytest.mark.slow)])
 @each
 def test_many_light_as_one_does(cls: type[lights.Light], number: int) -> None:
     check_number(cls, number)

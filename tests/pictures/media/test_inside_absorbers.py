@@ -37,6 +37,16 @@ WAYS: dict[str, integrators.Integrator] = {
     "guiding": integrators.Path(guiding=True, guide_paths=4096, light_paths=0, max_depth=8),
     "whitted": integrators.Whitted(max_depth=8),
 }
+QUICK = ("path", "light paths", "particle_tracer")  # others are as good in slow tests
+
+
+def _ways(without: str = "") -> list[Any]:
+    """Return the names of integrators as parameters."""
+    return [
+        pytest.param(way, marks=() if way in QUICK else pytest.mark.slow)
+        for way in WAYS
+        if way != without
+    ]
 
 
 def _body(material: m.Material, **sides: Any) -> shapes.Shape:
@@ -80,7 +90,7 @@ def test_a_camera_within(kind: str, name: bool) -> None:
     np.testing.assert_allclose(seen, expected, rtol=4e-3 if kind == "gltf_surface" else 2e-4)
 
 
-@pytest.mark.parametrize("way", [way for way in WAYS if way != "particle_tracer"])
+@pytest.mark.parametrize("way", _ways("particle_tracer"))
 def test_a_camera_within_by_every_integrator(way: str) -> None:
     """No light path goes through a smooth boundary to a camera that is a point."""
     expected = LIGHT * np.exp(-A * (0.2 + RADIUS) - FOG_A * (WALL - RADIUS))
@@ -128,7 +138,7 @@ def _compare(scene: Scene, expected: np.ndarray, spp: int) -> None:
     assert (np.abs(mean - expected) < 5.0 * error + 0.005 * expected).all(), mean / expected
 
 
-@pytest.mark.parametrize("way", [way for way in WAYS if way != "whitted"])
+@pytest.mark.parametrize("way", _ways("whitted"))
 def test_a_lamp_within(way: str) -> None:
     """A ball that shines: the irradiance is an integral over its disk as the screen sees it."""
     theta = (np.arange(2000) + 0.5) / 2000 * np.arcsin(LAMP / SCREEN)
@@ -144,7 +154,9 @@ def test_a_lamp_within(way: str) -> None:
     _compare(_lit_screen(WAYS[way], lamp), _expected(LIGHT * (weights * through).sum(0)), 128)
 
 
-@pytest.mark.parametrize("way", ["light paths", "vcm", "particle_tracer"])
+@pytest.mark.parametrize(
+    "way", ["light paths", pytest.param("vcm", marks=pytest.mark.slow), "particle_tracer"]
+)
 def test_a_point_lamp_within(way: str) -> None:
     """Light paths begin in the body and come into the fog."""
     through = np.exp(-A * RADIUS - FOG_A * (SCREEN - RADIUS))
@@ -194,13 +206,13 @@ def _in_glass(parts: list[Any], camera: cameras.Camera, way: integrators.Integra
     return Scene(camera=camera, shapes=[*parts, glass], film=film, integrator=way)
 
 
-@pytest.mark.parametrize("way", [way for way in WAYS if way != "particle_tracer"])
+@pytest.mark.parametrize("way", _ways("particle_tracer"))
 def test_a_camera_and_a_wall_in_the_same_body(way: str) -> None:
     seen = _mean(_in_glass([_wall()], _camera(0.2), WAYS[way]))
     np.testing.assert_allclose(seen, LIGHT * np.exp(-A * (0.2 + WALL)), rtol=2e-4)
 
 
-@pytest.mark.parametrize("way", [way for way in WAYS if way != "whitted"])
+@pytest.mark.parametrize("way", _ways("whitted"))
 def test_a_lamp_and_a_screen_in_the_same_body(way: str) -> None:
     theta = (np.arange(2000) + 0.5) / 2000 * np.arcsin(LAMP / SCREEN)
     length = SCREEN * np.cos(theta) - np.sqrt(LAMP**2 - (SCREEN * np.sin(theta)) ** 2)
