@@ -195,8 +195,9 @@ def test_random_failures_change_nothing(scene, whole, faults):
     assert min(left) == 1
 
 
-@pytest.mark.parametrize("kind", [pytest.param("path", marks=pytest.mark.slow), "light_paths"])
-@pytest.mark.parametrize("which", [0, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["path", "light_paths"])
+@pytest.mark.parametrize("which", [0, 1])
 def test_failures_with_noise(scenes, faults, kind, which):
     """The first device decides; another one only takes samples."""
     scene = small(scenes, kind)
