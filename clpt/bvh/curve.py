@@ -49,7 +49,7 @@ def runs(
 
 
 def whole(building: Building, count: int, parts: cl.Buffer) -> cl.Buffer:
-    """Return the extent of items, from those of parts."""
+    """Return the extent of all items. parts: the extents of groups of items."""
     extent, unused = building.allocate(64), building.allocate(16)
     root = {"parts": parts, "n_parts": parts.size // 64, "ranges": unused, "extents": extent}
     building.run(_BUILD, "build_root", 1, count=count, **root)

@@ -37,7 +37,7 @@ Bundle: TypeAlias = dict[str, str]  # digests of a scene's files by name, includ
 
 
 def to_json(bundle: Bundle) -> dict[str, Any]:
-    """Return what `from_json` reads."""
+    """Return a bundle as JSON; `from_json` is the inverse."""
     return {"format": "clpt bundle", "version": VERSION, "files": bundle}
 
 

@@ -70,7 +70,7 @@ class Truth:
 
     @property
     def boxes(self) -> Integers:
-        """Boxes (n, 4) of what is visible: x, y, width, height [pixels]; zeros where nothing is."""
+        """Boxes (n, 4) of the visible pixels: x, y, width, height [pixels]; 0 if hidden."""
         return _boxes(np.arange(1, len(self.names) + 1)[:, None, None] == self.instances)
 
     @property

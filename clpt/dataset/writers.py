@@ -31,7 +31,7 @@ class Writer(ABC):
 
     @abstractmethod
     def write(self, picture: Picture) -> dict[str, Any]:
-        """Write a picture's files; return what its record and `finish` need."""
+        """Write a picture's files; return the arguments of its record and of `finish`."""
 
     def finish(self, records: Iterable[dict[str, Any]]) -> None:  # noqa: B027
         """Write what sums up all pictures, from their records by number."""
@@ -64,7 +64,7 @@ def codes(picture: Picture) -> np.ndarray:
 
 
 def labels(truth: Truth) -> dict[str, Any]:
-    """Return what a record tells of the camera and the objects, as JSON has it."""
+    """Return the camera and the objects of a record, as JSON."""
     visibility, amodal = truth.visibility, truth.amodal_boxes
     objects = []
     for i, name in enumerate(truth.names):

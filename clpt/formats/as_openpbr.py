@@ -17,6 +17,7 @@ import numpy as np
 
 from clpt import spectra
 from clpt.arrays import Floats
+from clpt.scene import insides
 from clpt.scene import materials as m
 from clpt.scene.params import fields_of, params
 from clpt.scene.roles import REAL
@@ -27,8 +28,7 @@ from clpt.spectra.spectrum import Role
 
 Warn = Callable[[str], None]
 GREY = 0.5
-LINES = (587.56, 486.13, 656.28)  # d, F, C [nm]
-COSINE_82 = 1.0 / 7.0  # of the angle at which the tint of a metal counts
+COSINE_82 = 1.0 / 7.0  # OpenPBR's specular_color of a metal is for this angle
 GLASS = 1.5  # index of coats that have none
 
 
@@ -135,7 +135,8 @@ def _curve(index: IndexLike) -> Floats:
 
 def dispersion(index: IndexLike) -> tuple[float, float]:
     """Return an index of refraction at the d line, and its Abbe number; 0 without dispersion."""
-    d, f, c = np.interp(LINES, cie.GRID, _curve(index)).tolist()
+    lines = 1e3 * np.array(insides.LINES)  # [nm]
+    f, d, c = np.interp(lines, cie.GRID, _curve(index)).tolist()
     return d, (d - 1.0) / (f - c) if f - c > 1e-6 and d > 1.0 else 0.0
 
 

@@ -17,7 +17,7 @@ from clpt.errors import SceneError
 from clpt.files import output_files
 from clpt.formats.as_openpbr import rgb
 from clpt.formats.gltf.cameras_lights import FROM_GLTF
-from clpt.formats.usd.export_materials import MaterialWriter, unused
+from clpt.formats.usd.export_materials import MaterialWriter, split, unused
 from clpt.formats.usd.lights import TURNED
 from clpt.geometry import analytic, lamps, triangles
 from clpt.scene import Scene, lights
@@ -353,20 +353,15 @@ def _rows(rows: ArrayLike, kind: type[_Array]) -> _Array:
 
 def _shine(prim: UsdLux.BoundableLightBase | UsdLux.NonboundableLightBase, color: Floats) -> None:
     """Set the intensity of a light, and its color with a greatest part of 1."""
-    strength = float(np.max(color))
+    strength, share = split(color)
     prim.CreateIntensityAttr(strength)
-    prim.CreateColorAttr(Gf.Vec3f(*(color / strength if strength > 0.0 else color).tolist()))
+    prim.CreateColorAttr(Gf.Vec3f(*share.tolist()))
 
 
-def _facing(direction: NDArray[Any]) -> NDArray[Any]:
+def _facing(direction: Floats) -> NDArray[Any]:
     """Return a rotation (4, 4) that takes -z to a direction."""
-    forward = direction / np.linalg.norm(direction)
-    up = np.eye(3)[int(np.argmin(np.abs(forward)))]
-    right = np.cross(forward, up)
-    right /= np.linalg.norm(right)
-    turn = np.eye(4)
-    turn[:3, :3] = np.stack([right, np.cross(right, forward), -forward], axis=1)
-    return turn
+    up = np.eye(3)[int(np.argmin(np.abs(direction)))]
+    return transforms.look_at(np.zeros(3), direction, up) @ TURNED
 
 
 def _disk() -> tuple[Floats32, NDArray[np.uint32], Floats32 | None, Floats32 | None]:

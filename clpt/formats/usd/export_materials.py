@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pxr import Gf, Sdf, Usd, UsdShade
+from pxr import Gf, Sdf, Tf, Usd, UsdShade
 
 from clpt import images
-from clpt.arrays import Floats32
+from clpt.arrays import Floats, Floats32
 from clpt.files import output_files
 from clpt.formats import as_openpbr
 from clpt.formats.as_openpbr import Surface, dispersion, rgb
@@ -121,10 +121,8 @@ class MaterialWriter:
         total = absorbed + scattered + rgb(base.absorption, "unbounded")
         if not total.max() > 0.0:
             return
-        depth = 1.0 / float(total.max())
-        _color(shader, "transmission_color", np.exp(-total * depth))
+        depth = _color_at_depth(shader, total)
         _color(shader, "transmission_scatter", scattered * depth)
-        shader.CreateInput("transmission_depth", TYPES.Float).Set(depth)
         if isinstance(interior.phase, HenyeyGreenstein):
             g = float(np.mean(rgb(interior.phase.g, "unbounded")))
             shader.CreateInput("transmission_scatter_anisotropy", TYPES.Float).Set(g)
@@ -303,8 +301,6 @@ class Network:
 
 def unused(stage: Usd.Stage, parent: str, name: str) -> str:
     """Return a path below a parent that no prim has, by a name that USD allows."""
-    from pxr import Tf
-
     valid = Tf.MakeValidIdentifier(name or "prim")
     path, count = f"{parent}/{valid}", 1
     while stage.GetPrimAtPath(path):
@@ -342,6 +338,12 @@ def _two_by_two(texture: Checkerboard) -> Bitmap:
     )
 
 
+def split(color: Floats) -> tuple[float, Floats]:
+    """Return the greatest part of a color (3,), and the color over it; black stays black."""
+    strength = float(color.max())
+    return strength, color / strength if strength > 0.0 else color
+
+
 def _emit(network: Network, shader: UsdShade.Shader, emission: Area) -> None:
     """Write what a surface emits: color times luminance, as `load` reads it."""
     radiance = emission.radiance
@@ -349,9 +351,8 @@ def _emit(network: Network, shader: UsdShade.Shader, emission: Area) -> None:
         _connect(shader, "emission_color", TYPES.Color3f, network.texture(radiance, wide=True))
         shader.CreateInput("emission_luminance", TYPES.Float).Set(1.0)
         return
-    color = rgb(radiance, "emission")
-    strength = float(color.max())
-    _color(shader, "emission_color", color / strength if strength > 0.0 else color)
+    strength, color = split(rgb(radiance, "emission"))
+    _color(shader, "emission_color", color)
     shader.CreateInput("emission_luminance", TYPES.Float).Set(strength)
 
 
@@ -368,9 +369,15 @@ def _absorb(
         return
     if isinstance(tint, Texture) or not np.allclose(rgb(tint, "reflectance"), 1.0):
         writer.warn("the tint of what absorbs inside as well")
-    depth = 1.0 / float(absorption.max())
-    _color(shader, "transmission_color", np.exp(-absorption * depth))
+    _color_at_depth(shader, absorption)
+
+
+def _color_at_depth(shader: UsdShade.Shader, extinction: Floats) -> float:
+    """Write the color of what is left at a depth [m]; return the depth. extinction: (3,) [1/m]."""
+    depth = 1.0 / float(extinction.max())
+    _color(shader, "transmission_color", np.exp(-extinction * depth))
     shader.CreateInput("transmission_depth", TYPES.Float).Set(depth)
+    return depth
 
 
 def _bend(network: Network, shader: UsdShade.Shader, surface: Surface) -> None:
