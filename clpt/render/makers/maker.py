@@ -109,8 +109,9 @@ class Maker(ABC):
         return self.home.wavefront.stream.last
 
     def prepare(self) -> None:
-        """Run all kernels once, so that the first samples come at once."""
+        """Run all kernels once and wait, so that the first samples come at once."""
         self.home.wavefront.render_samples(0, 0)
+        self.home.wavefront.stream.wait()  # for the picture of the film, whose kernel ran last
 
     @abstractmethod
     def begin(self, call: Call, now: Contents, more: Contents) -> Settle:
