@@ -1,5 +1,5 @@
-/* Where fog, thin glass or masks decide by chance the first surface of a path, a path goes ahead of each of a pixel's
- * first samples, to the first surface, for layers alone. */
+/* Scouts. Fog, thin glass or masks may choose the first surface of a path at random. In such scenes a scout, a path for
+ * layers alone, runs to the first surface before each of a pixel's first samples. */
 
 /* Step. */
 #define LAYERS_SCOUT 1
@@ -12,12 +12,12 @@ inline mask path_scouts(integer state) { return (state & PATH_SCOUTS) != 0; }
 
 inline mask path_scouts(integer state) { return mask_of(0); }
 
-/* Step begin: the paths that ended and only scouted: their samples begin anew. */
+/* Step begin: scouts that have ended; their samples begin after them. */
 #include "generated/scouts.cl"
 
 inline mask scouts_ended(PathEnd end) { return end.ended & end.begun & path_scouts(end.state); }
 
-/* The bits of Path.state at the beginning of paths that go ahead of their samples. */
+/* The bits of Path.state of a scout, if the next path is a scout. */
 inline integer scouts_begin(mask ended, integer sample)
 {
     return sel_i(!ended & (sample < LAYER_SAMPLES), (integer)(PATH_SCOUTS), (integer)(0));
@@ -31,8 +31,8 @@ inline mask scouts_ended(PathEnd end) { return mask_of(0); }
 inline integer scouts_begin(mask ended, integer sample) { return (integer)(0); }
 inline mask layers_end(PathEnd end, mask scouted) { return end.ended & end.begun; }
 
-/* Step choice: paths that scout choose among the parts of a mixture by the numbers of their samples, turned so that the
- * first sample has 1/2. So an id is that of the part whose share is the half of the whole or more, and no chance. */
+/* Step choice: a scout chooses a part of a mixture by a random number that is shifted, modulo 1, so that the first
+ * sample's number is 1/2. So the first sample's id is never random: it is the id of the part that covers 1/2. */
 #include "transport/path_state.cl"
 #include "generated/scouts.cl"
 
@@ -46,11 +46,10 @@ inline real scout_choice(Scene scene, natural key, integer state, natural dimens
 /* Twin, where no path scouts. */
 inline real scout_choice(Scene scene, natural key, integer state, natural dimension, real u) { return u; }
 
-/* Step vertex: a path that scouts goes through fog, holes and hidden lights to the first surface, which layers have,
- * and ends. */
+/* Step vertex: a scout passes fog, holes and hidden lights, adds the first surface to the layers, and ends. */
 #include "generated/scouts.cl"
 
-/* Takes the `active` paths that scout a surface further; returns the others. */
+/* Takes the scouts among the `active` paths a surface further; returns the other paths. */
 inline mask scout_vertex(Scene scene, Slab path, uint at, mask active, Vertex v LAYER_ARGS)
 {
     mask scouts = active & path_scouts(v.state);
@@ -71,5 +70,5 @@ inline mask scout_vertex(Scene scene, Slab path, uint at, mask active, Vertex v 
     return active & !scouts;
 }
 
-/* Twin, where no path scouts, or none meets the material. */
+/* Twin, where there are no scouts, or no scout meets the material. */
 inline mask scout_vertex(Scene scene, Slab path, uint at, mask active, Vertex v LAYER_ARGS) { return active; }

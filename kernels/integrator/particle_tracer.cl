@@ -1,12 +1,12 @@
-/* A vertex of a path that comes from a light: it is joined to the camera, and goes on. Steps that a scene or a
+/* A vertex of a path from a light: it is connected to the camera, and the path goes on. Steps that a scene or a
  * material does not have do nothing.
  *
- * f is asked for as radiance flows, from the light to the camera, and light that is carried takes it with the
- * geometric cosine of the side where it leaves (Veach 1997, 5.3.2). bsdf_sample's weight for the opposite flow lacks
- * eta^2 where light is refracted and, where normals are smoothed, the quotient
- * |wo . ns| |wi . n| / (|wo . n| |wi . ns|), with wo on the side of the light.
+ * The path carries importance-weighted power, so it needs the adjoint BSDF (Veach 1997, 5.3.2): f for radiance that
+ * flows from the light to the camera, times the geometric cosine of the ray that leaves. bsdf_sample has the weight for
+ * radiance that flows the other way. adjoint_weight multiplies this weight by eta^2 at a refraction and, at smoothed
+ * normals, by |wo . ns| |wi . n| / (|wo . n| |wi . ns|), with wo on the side of the light.
  *
- * As the light paths of `path` they are weighed against those from the camera (transport/mis_ratio.cl). */
+ * The integrator `path` weighs these paths against paths from the camera (transport/mis_ratio.cl). */
 #include "cameras/camera.cl"
 #include "generated/camera.cl"
 #include "film/connect.cl"
@@ -15,8 +15,8 @@
 #include "generated/mis_ratio.cl"
 #include "generated/light_path_steps.cl"
 
-/* The weight of a direction for light that is carried; leaves: the cosine of the ray that goes on over the cosine of
- * the ray that arrives. */
+/* The weight of a sampled direction for a path from a light; leaves: the cosine of the next ray over the cosine of the
+ * incident ray. */
 inline Spectrum adjoint_weight(Vertex v, Scattering scatter, BsdfSample bs, mask next, real leaves)
 {
     real over = max_r(fabs(bs.wi.z), (real)(1e-6f));
@@ -69,7 +69,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     vertex_end(path, at, active, next, null, v.state);
 }
 
-/* Step vertex: where a program shades light paths alone. */
+/* Step vertex: a program shades light paths alone. */
 inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active)
 {
     Vertex v = vertex_load(scene, path, hit, at, active);

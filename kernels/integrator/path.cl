@@ -14,7 +14,7 @@
 inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v SHADE_ARGS)
 {
     Spectrum beta = v.beta, ratio = load_path_ratio(path, at);
-    mask met = active & !met_emission(scene, path, at, active, v SHADE_PASSED);
+    mask hidden = add_emission(scene, path, at, active, v SHADE_PASSED), met = active & !hidden;
     mask next = BSDF_IS_PANE ? met : met & vertex_continues(scene, v, vertex_is_null((integer)(0)));
 
     Sampler sampler = pixel_sampler(scene.settings, load_path_pixel_key(path, at), load_path_sample(path, at));
@@ -31,7 +31,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     NextEvent event = next_event_seek(scene, next, v, scatter);
     bsdf_ask(scene, scatter, event.wi, 0);
     event = next_event_weigh(scene, event, v, scatter, mis_ratio, guided, ratio SHADE_PASSED);
-    if (LANES == 1) { /* a GPU has too few registers to keep the event meanwhile */
+    if (LANES == 1) { /* a GPU has too few registers to hold the event and wo longer: wo is computed anew */
         v.state += next_event_keep(scene, path, shadow, at, active, v, event);
         scatter.wo = to_frame(scatter.shading.frame, neg3(load_path_d(path, at)));
     }
@@ -57,15 +57,15 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     store_path_ratio(path, at, on, ratio);
 }
 
-/* Step vertex: where a program shades paths from the camera alone. */
+/* Step vertex: a program shades paths from the camera alone. The host includes this step or the next. */
 inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active SHADE_ARGS)
 {
     Vertex v = vertex_load(scene, path, hit, at, active);
     path_vertex(scene, path, shadow, at, scout_vertex(scene, path, at, active, v LAYER_PASSED), v SHADE_PASSED);
 }
 
-/* Step both: paths from a light (which: 0) and from the camera (1), in a single program: the surface that either meets
- * is loaded by the same instructions, as to compile them takes long. */
+/* Step both: a program shades paths from lights (which: 0) and from the camera (which: 1). They share vertex_load,
+ * which takes long to compile. */
 inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uint at, mask active SHADE_ARGS,
                               uint which)
 {

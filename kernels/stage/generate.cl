@@ -96,7 +96,7 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_lambdas(path, at, go, b.lambdas);
     store_path_beta(path, at, go, b.beta);
     store_path_radiance(path, at, go, spectrum_of((real)(0.0f)));
-    store_path_pdf(path, at, go, -b.ray.far);
+    store_path_pdf(path, at, go, -b.ray.far); /* a camera ray has no pdf; stage/intersect.cl reads its range */
     store_path_eta(path, at, go, (real)(1.0f));
     store_path_mis_ratio(path, at, go, (real)(settings->light_paths));
     store_path_expected(path, at, go, (real)(0.0f));

@@ -14,6 +14,7 @@ STAGE(intersect)(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS STAGE_AT_ARG)
     if (any(active)) {
         scene.time = load_path_time(path, at);
         vec3 o = load_path_o(path, at), d = load_path_d(path, at);
+        /* at depth 0 Path.pdf is minus the range of the camera ray */
         real far = sel((state & PATH_DEPTH) == 0, -load_path_pdf(path, at), (real)(FAR));
         TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, far, active);
         integer shape = sel_i(h.prim >= 0, h.shape, (integer)(0)), row = shape * SHAPE_ROW_WORDS;

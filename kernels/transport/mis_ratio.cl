@@ -11,7 +11,8 @@
  * The mis_ratio of a camera's path begins with the number l of light paths a sample. c is the cosine of the incident
  * ray, c' of the next ray, and p_back the density of the incident direction for a light path that comes back:
  *
- *     mis_ratio' = mis_ratio / (importance c) c' / p at x_1,    mis_ratio / c p_back c' / p at later vertices;
+ *     mis_ratio' = mis_ratio * c' / (importance * c * p) at x_1,
+ *     mis_ratio' = mis_ratio * p_back * c' / (c * p)     at later vertices;
  *
  * importance: film/connect.cl. At x_1 a delta lobe leaves 0, as no light path can be connected there; at later vertices
  * p_back / p counts as 1. Times the density of emission (light_path_pdf) this is the third density over the first.
@@ -19,23 +20,24 @@
  * The mis_ratio of a light path begins with 1 / l, over the gain of aiming (lights/aiming.cl). At its first vertex, q
  * is the density of next-event estimation, and
  *
- *     mis_ratio' = mis_ratio / (emission c) sqrt(q^2 + p_back^2) c' / p,    then mis_ratio / c p_back c' / p;
+ *     mis_ratio' = mis_ratio * sqrt(q^2 + p_back^2) * c' / (emission * c * p),
+ *     mis_ratio' = mis_ratio * p_back * c' / (c * p)     at later vertices;
  *
  * p_back is 0 there if no ray can meet the light, q is 0 behind a delta lobe. At the connection to the camera c' / p
  * becomes importance c', with the cosine c' to the camera.
  *
  * Direct light at x_1 is left to next-event estimation of the camera's path: a light path is connected from its second
- * vertex on, and for k = 2 the third density is 0. (Splats of light that next-event estimation finds without noise
- * would add noise only, see bench/notes/light_paths.md.) If x_1 is a collision, which the camera's path reaches by
- * chance, and no ray can meet the light, a light path is connected there too. Null surfaces change nothing. If a
+ * vertex on, and for k = 2 the third density is 0. (Next-event estimation has little noise there; splats would only add
+ * noise, see bench/notes/light_paths.md.) The exception is a collision x_1 whose light no ray can meet: the camera's
+ * path reaches a collision at random, so a light path is connected there too. Null surfaces change nothing. If a
  * material ends light paths (`ends_light_paths`), the camera's mis_ratio is 0.
  *
  * A vertex may be a collision in a medium. Both sides sample a collision with density transmittance times extinction,
  * and a surface with density transmittance. The transmittance between two vertices is equal both ways, and at a
  * collision the extinction takes the place of c and c'; both cancel, so that c and c' are 1 (VERTEX_COSINE). If a side
  * is connected and the other side has sampled a distance, weights leave the transmittance out, as weights of next-event
- * estimation do. They leave out the change by equiangular sampling too: any weights that sum to 1 are valid, and both
- * sides know these.
+ * estimation do. Equiangular sampling changes the density of a collision; weights leave this change out too. The result
+ * is unbiased: weights need only sum to 1, and both sides compute the same weights.
  *
  * If some light paths aim at specular shapes, Russian roulette ends most others at a diffuse x_{k-1}: the third density
  * is lower there (transport/roulette.cl).
@@ -46,10 +48,11 @@
  * is not x_1 then. With e = `merging_area`, the density of merging over the product of both paths' densities is e. So a
  * camera's path carries from x_i on (dVM of Georgiev 2012)
  *
- *     merge_ratio' = e c' / p,    then merge_ratio / c p_back c' / p,
+ *     merge_ratio' = e * c' / p                              at x_i,
+ *     merge_ratio' = merge_ratio * p_back * c' / (c * p)     at later vertices,
  *
  * and at a specular vertex the square of merge_ratio is added to the square of mis_ratio. A light path that has met a
- * specular vertex begins, at each vertex that is not specular, with merge_ratio' = e / l c' / p, and goes on as above
+ * specular vertex begins, at each vertex that is not specular, with merge_ratio' = e * c' / (l * p), and goes on as above
  * while all later vertices are specular; it counts at a connection to a specular x_1.
  *
  * In a medium x_i is a collision, and photons are merged along the ray to it (transport/photons/along.cl): e is the
@@ -68,7 +71,7 @@ typedef struct {
     real arrives;     /* mis_ratio / c, with importance and emission */
     real nee_pdf;     /* q at the first vertex of a light path */
     mask first;       /* the first vertex of the path */
-    mask met;         /* a ray from the vertex may meet the light */
+    mask can_be_met;  /* a ray from the vertex can meet the light */
     real merge_ratio; /* added to `arrives` at a specular vertex; of a light path, at the connection alone */
     real merges;      /* density of merging at the vertex over the path's density, 0 without merging */
 } MisRatio;
@@ -93,7 +96,7 @@ inline MisRatio mis_ratio_of_camera_path(Scene scene, Slab path, uint at, Vertex
     MisRatio r;
     real mis_ratio = load_path_mis_ratio(path, at);
     r.first = v.depth == 0;
-    r.met = mask_of(1);
+    r.can_be_met = mask_of(1);
     r.nee_pdf = 0.0f;
     if (any(r.first)) mis_ratio = sel(r.first, mis_ratio_seen(scene, v, sampler, mis_ratio), mis_ratio);
     real goes_on = 1.0f / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f));
@@ -145,7 +148,7 @@ inline MisRatio mis_ratio_of_light_path(Scene scene, Slab path, uint at, Vertex 
     MisRatio r;
     r.arrives = load_path_mis_ratio(path, at) / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f));
     r.first = v.depth == 1;
-    r.met = mask_of(1);
+    r.can_be_met = mask_of(1);
     r.nee_pdf = 0.0f;
     if (any(r.first)) {
         integer row = sel_i(r.first, load_path_light(path, at), (integer)(0));
@@ -153,7 +156,7 @@ inline MisRatio mis_ratio_of_light_path(Scene scene, Slab path, uint at, Vertex 
         real t = v.t + load_path_null_distance(path, at);
         real emission = common_light_begins_pdf(scene, row, v.s.p, receiver, wi, t, n, &r.nee_pdf);
         r.arrives = r.arrives / sel(r.first, max_r(emission, (real)(1e-30f)), (real)(1.0f));
-        r.met = !r.first | light_can_be_met(scene, row);
+        r.can_be_met = !r.first | light_can_be_met(scene, row);
     }
     r.merge_ratio = load_path_merge_ratio(path, at) / max_r(VERTEX_COSINE(v.s.n, v.d), (real)(1e-7f));
     r.merges = merge_ratio_of_photon(scene, path, at, v);
@@ -163,9 +166,9 @@ inline MisRatio mis_ratio_of_light_path(Scene scene, Slab path, uint at, Vertex 
 /* The mis_ratio of a light path that continues along d, with density p. */
 inline real mis_ratio_to_camera(MisRatio r, Surface s, vec3 d, mask delta, real p, real p_back)
 {
-    real back = sel(r.met, p_back, (real)(0.0f));
+    real back = sel(r.can_be_met, p_back, (real)(0.0f));
     real either = sel(r.first, sqrt(sqr(back) + sqr(r.nee_pdf)), back) / max_r(p, (real)(1e-30f));
-    real change = sel(delta, sel(r.met, (real)(1.0f), (real)(0.0f)), either);
+    real change = sel(delta, sel(r.can_be_met, (real)(1.0f), (real)(0.0f)), either);
     return mis_ratio_limited(r.arrives * change * VERTEX_COSINE(s.n, d));
 }
 
@@ -209,7 +212,7 @@ inline mask keep_mis_ratio_to_camera(Scene scene, Slab path, uint at, mask next,
 inline real mis_weight_of_connection(Scene scene, MisRatio r, Vertex v, BsdfPair pair, CameraPoint c, mask *shine)
 {
     mask hidden = mask_of(scene.settings->hide_lights != 0) & (v.s.light >= 0);
-    mask joined = BSDF_IS_PHASE ? !r.first | !r.met : !r.first;
+    mask joined = BSDF_IS_PHASE ? !r.first | !r.can_be_met : !r.first;
     *shine = *shine & joined & !hidden & !ends_light_paths(scene, v);
     return 1.0f / (1.0f + mis_square_of_connection(scene, r, v.s, c, pair.p, pair.p_back));
 }

@@ -9,7 +9,8 @@
 #define MOST_NULL_SURFACES 1024
 
 /* Dimensions of a sample, in pairs: an even dimension and the next are well spread together. Film and first light
- * point, then DIMENSIONS_A_VERTEX per surface, null surfaces too; beyond these a pair a surface for _TEXEL to _AIM. */
+ * point, then DIMENSIONS_A_VERTEX a surface, null surfaces too. From _TEXEL, _FLIGHT and _AIM on, each surface has one
+ * more pair. */
 #define DIMENSION_FILM 0
 #define DIMENSION_VERTEX 1
 #define DIMENSIONS_A_VERTEX 4

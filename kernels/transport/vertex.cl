@@ -8,7 +8,7 @@ typedef struct {
     Wavelengths lambdas;
     Spectrum beta;        /* throughput, here */
     integer state, depth; /* see transport/path_state.cl */
-    integer met;          /* number of surfaces, including null surfaces, which add no depth */
+    integer surfaces;     /* number of surfaces so far; null surfaces count here, and not in depth */
     Surface s;
     mask front;           /* the front was hit */
     integer row;          /* of the material */
@@ -49,7 +49,7 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active
     v.beta = load_path_beta(path, at);
     v.state = load_path_state(path, at);
     v.depth = v.state & PATH_DEPTH;
-    v.met = v.depth + load_path_nulls(path, at);
+    v.surfaces = v.depth + load_path_nulls(path, at);
 #if BSDF_IS_PHASE
     v.s = surface_of_point(madd3(v.d, v.t, v.o));
     v.front = mask_of(1);
@@ -70,13 +70,13 @@ inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active
 {
     Scattering scatter;
     scatter.sampler = sampler;
-    scatter.dimension = as_natural(DIMENSION_VERTEX + v.met * DIMENSIONS_A_VERTEX);
+    scatter.dimension = as_natural(DIMENSION_VERTEX + v.surfaces * DIMENSIONS_A_VERTEX);
     vec2 none = {0.0f, 0.0f};
     scatter.choice = USES_CHOICE ? sampler_pair(sampler, scatter.dimension + DIMENSION_CHOICE) : none;
     scatter.lambdas = v.lambdas;
     TexturePoint point = surface_texture_point(v.s);
 #if STOCHASTIC_FILTERING
-    point.u = sampler_pair(sampler, as_natural(DIMENSION_TEXEL + v.met));
+    point.u = sampler_pair(sampler, as_natural(DIMENSION_TEXEL + v.surfaces));
 #endif
     scatter.bsdf = bsdf_load(scene, v.row, point, v.lambdas);
     bsdf_between_bodies(scene, active, v, &scatter.bsdf);
@@ -106,22 +106,25 @@ inline Receiver vertex_receiver(Scene scene, Vertex v, Scattering scatter, vec3 
     return receiver_at(scene, v.row, scale3(scatter.shading.frame.n, sign), away);
 }
 
+/* Whether a path crosses a null surface here: a hole, a null boundary, or a pane by its lobe. */
 inline mask vertex_is_null(integer lobe)
 {
     return BSDF_IS_NULL ? mask_of(1) : BSDF_IS_PANE ? (lobe & LOBE_NULL) != 0 : mask_of(0);
 }
 
-/* Whether paths may continue beyond the vertex; null: paths that cross a null surface. */
+/* Whether max_depth, or the most null surfaces, lets paths go on; null: paths that cross a null surface. */
 inline mask vertex_continues(Scene scene, Vertex v, mask null)
 {
-    mask more = v.depth + 1 < scene.settings->max_depth, beyond = v.met - v.depth < MOST_NULL_SURFACES;
+    mask more = v.depth + 1 < scene.settings->max_depth, beyond = v.surfaces - v.depth < MOST_NULL_SURFACES;
     return BSDF_IS_NULL ? beyond : BSDF_IS_PANE ? sel_i(null, beyond, more) : more;
 }
 
 /* Continues the `next` paths along d; null: paths that cross a null surface. */
 inline void vertex_leave(Slab path, uint at, mask next, mask null, Vertex v, vec3 d, Spectrum beta)
 {
-    if (BSDF_IS_NULL || BSDF_IS_PANE) { /* MIS weights use the origin before it */
+    if (BSDF_IS_NULL || BSDF_IS_PANE) {
+        /* A null surface splits a ray in two. MIS weights need the whole ray: null_distance is the length before the
+         * present origin, and for a camera ray Path.pdf is the length to the end of its range (stage/intersect.cl). */
         real pdf = load_path_pdf(path, at), onward = v.t + surface_ray_offset(v.s, d);
         store_path_pdf(path, at, next & null & (v.depth == 0), pdf + onward);
         store_path_null_distance(path, at, next & null, load_path_null_distance(path, at) + onward);

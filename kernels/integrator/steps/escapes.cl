@@ -1,5 +1,6 @@
-/* Rays that leave a sealed medium toward a lamp, see media/escape.cl. `path_escapes` returns the gain of Path.state.
- * next: the paths that go on along `onward`, before roulette; the path has the ratio from before the vertex. */
+/* Rays that leave a sealed medium toward a lamp, see media/escape.cl. `path_escapes` returns the bits to add to
+ * Path.state. next: the paths that go on along `onward`, before roulette; Path.ratio is still the ratio before the
+ * vertex. */
 
 /* Step. */
 /* At a collision in a sealed medium: a ray that may leave it. */
@@ -40,7 +41,7 @@ inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask n
 inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask next, Vertex v, Scattering scatter,
                             BsdfSample bs, vec3 onward) { return (integer)(0); }
 
-/* Step end: at other surfaces: no path leaves a sealed medium from there. */
+/* Step end: at other surfaces, where no path leaves a sealed medium. */
 inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask next, Vertex v, Scattering scatter,
                             BsdfSample bs, vec3 onward)
 {
@@ -49,8 +50,8 @@ inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask n
     return 0;
 }
 
-/* Step out: at a smooth boundary: a path that comes out may have been sent, and a path that goes in keeps the place of
- * the boundary, and a lamp. */
+/* Step out: at a smooth boundary. A path that leaves the medium gets the MIS ratio of escape rays from its last
+ * collision; a path that enters stores the plane of the boundary and the cone around a lamp. */
 #include "media/escape.cl"
 
 inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask next, Vertex v, Scattering scatter,
@@ -58,7 +59,7 @@ inline integer path_escapes(Scene scene, Slab path, Slab shadow, uint at, mask n
 {
     mask outward = dot3(v.s.n, onward) > 0.0f, bent = (bs.lobe & LOBE_TRANSMIT) != 0;
     mask out = !v.front & bent & outward & (v.depth > 0);
-    real sent = load_path_escape(path, at); /* below 0 behind the boundary, so that a path passes a single boundary */
+    real sent = load_path_escape(path, at); /* stored as -sent behind this boundary: a second boundary makes it 0 */
     store_path_escape(path, at, next, sel(out, -max_r(sent, (real)(0.0f)), (real)(0.0f)));
     integer name = sel_i(next & !outward, v.media.inside, (integer)(0));
     mask sealed = (name & MEDIUM_SEALED) != 0;

@@ -1,12 +1,12 @@
-/* Joins a vertex of a light path to the camera: a ray to it waits in the shadow slab. */
+/* Connects a vertex of a light path to the camera; the ray to the camera waits in the shadow slab. */
 typedef struct {
     CameraPoint c;
-    vec3 to; /* toward it, in shading.frame */
+    vec3 to; /* toward the point of the lens, in shading.frame */
 } CameraJoint;
 
 /* Step. */
 
-/* Chooses a point of the lens. */
+/* Samples a point of the lens. */
 inline CameraJoint join_camera_seek(Scene scene, Vertex v, Scattering scatter)
 {
     CameraJoint joint;
@@ -16,7 +16,7 @@ inline CameraJoint join_camera_seek(Scene scene, Vertex v, Scattering scatter)
     return joint;
 }
 
-/* Returns what Path.state gains. arrives: 1 over the cosine of the ray that arrives. */
+/* Returns the bits to add to Path.state. arrives: 1 over the cosine of the incident ray. */
 inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Vertex v, Scattering scatter,
                            MisRatio mis_ratio, CameraJoint joint, real arrives)
 {

@@ -6,7 +6,7 @@ inline void merge_at_vertex(Scene scene, Slab path, uint at, mask met, Vertex v,
     if (any(merges)) {
         integer sample = load_path_sample(path, at);
         Spectrum merged = merge_photons(scene, merges, v, scatter, mis_ratio, ratio, sample MERGE_PASSED);
-        /* By something sharp, so it has met two surfaces; of no group of lights. */
+        /* This light has been at a specular vertex and at this vertex, so its depth is 2. Its group is unknown. */
         light_layers_add(scene, path, at, merges, (integer)(2), (integer)(0), spectrum_mul(v.beta, merged)
                          LIGHT_LAYER_PASSED);
         merged = spectrum_add(load_path_radiance(path, at), spectrum_mul(v.beta, merged));

@@ -2,8 +2,9 @@
 /* Light that a path from the camera meets, on surfaces that shine. */
 #include "generated/met_weight.cl"
 
-/* Adds the light that the `active` paths have met. Returns the paths that the light is hidden from. */
-inline mask met_emission(Scene scene, Slab path, uint at, mask active, Vertex v SHADE_ARGS)
+/* Adds the emission of the surface to the `active` paths. Returns the paths that do not see this light: camera rays, if
+ * `hide_lights` is set. They continue behind the light. */
+inline mask add_emission(Scene scene, Slab path, uint at, mask active, Vertex v SHADE_ARGS)
 {
     mask hidden = active & (v.s.light >= 0) & (v.depth == 0) & mask_of(scene.settings->hide_lights != 0);
     if (any(hidden)) hide_light(path, at, hidden, v);
@@ -24,7 +25,7 @@ inline mask met_emission(Scene scene, Slab path, uint at, mask active, Vertex v 
 }
 
 /* Twin, on surfaces that do not shine. */
-inline mask met_emission(Scene scene, Slab path, uint at, mask active, Vertex v SHADE_ARGS) { return mask_of(0); }
+inline mask add_emission(Scene scene, Slab path, uint at, mask active, Vertex v SHADE_ARGS) { return mask_of(0); }
 
 /* Step weight: the weight of light that a path meets, against next-event estimation and against light paths. */
 #include "generated/diffuse_roulette.cl"

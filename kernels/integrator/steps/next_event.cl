@@ -1,14 +1,14 @@
 /* Next-event estimation: a point of a light is chosen, and a ray toward it waits in the shadow slab. */
 typedef struct {
-    mask shine; /* the material sends light from there on; before it is asked, what may */
+    mask shine; /* light of the point reaches the next vertex; before the BSDF is evaluated, it may */
     LightSample ls;
-    real begins; /* density of a light path from there, where paths are weighed against those */
-    vec3 wi;     /* toward it, in shading.frame */
+    real begins; /* density of a light path from the point, if light paths have MIS weights */
+    vec3 wi;     /* toward the point, in shading.frame */
     Spectrum value;
 } NextEvent;
 
 /* Step. */
-/* Chooses the point. */
+/* Samples the point on a light. */
 inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering scatter)
 {
     NextEvent e;
@@ -23,7 +23,7 @@ inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering sc
     return e;
 }
 
-/* Weighs its light. */
+/* Evaluates the BSDF and the MIS weight of the point's light. */
 inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering scatter, MisRatio mis_ratio,
                                   Guided guided, Spectrum ratio SHADE_ARGS)
 {
@@ -38,8 +38,8 @@ inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering
     return e;
 }
 
-/* Keeps it. On a CPU that is after the next direction is sampled: between them compilers would read tables of materials
- * again. Returns what Path.state gains. */
+/* Stores the shadow ray. On a CPU path_vertex calls it after it has sampled the next direction: if the store stood
+ * before the sampling, compilers would read tables of materials twice. Returns the bits to add to Path.state. */
 inline integer next_event_keep(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v, NextEvent e)
 {
     shadow_toward(shadow, at, active, e.shine, v.s, e.ls, e.value);

@@ -42,7 +42,7 @@ inline mask light_path_roulette(Scene scene, Slab path, uint at, mask next, mask
 inline mask dull_goes_on(mask next, mask null, Scattering scatter, BsdfSample bs, MisRatio *r, Spectrum *beta)
 {
     mask plays = next & r->first & !null & ((bs.lobe & LOBE_DELTA) == 0) & is_diffuse_pdf(bs.p_back);
-    if (any(plays)) { /* no light is chosen here, so that its random number is free */
+    if (any(plays)) { /* no light is chosen here: DIMENSION_CHOICE is unused */
         vec2 u = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_CHOICE);
         real gain = sel(plays, (real)(1.0f / DIFFUSE_SHARE), (real)(1.0f));
         r->arrives *= gain;

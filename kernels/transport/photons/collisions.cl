@@ -1,12 +1,10 @@
 /* Photons of light paths that collide in media. */
 typedef struct {
-    mask met;
+    mask collides;  /* the light path has collided in a medium */
     integer medium;
 } Collision;
 
 /* Step. */
-#include "transport/photons/media.cl"
-
 #include "transport/photons/media.cl"
 
 /* The collisions of light paths; clears `active` in media without photons. */
@@ -14,9 +12,9 @@ inline Collision collision_met(Scene scene, Slab path, Slab hit, uint at, mask *
 {
     integer part = merging_part(scene, *active, load_hit_material(hit, at));
     Collision c;
-    c.met = photon_collides(MATERIAL_KIND(part));
+    c.collides = photon_collides(MATERIAL_KIND(part));
     c.medium = sel_i(*active, load_path_medium(path, at), (integer)(0));
-    *active = *active & (!c.met | photon_along(MATERIAL_KIND(merging_phase(scene, c.medium))));
+    *active = *active & (!c.collides | photon_along(MATERIAL_KIND(merging_phase(scene, c.medium))));
     return c;
 }
 
@@ -24,10 +22,10 @@ inline Collision collision_met(Scene scene, Slab path, Slab hit, uint at, mask *
 inline void collision_photon(Slab path, Slab hit, uint at, Collision c, Photon *photon, integer *group)
 {
     vec3 p = madd3(load_path_d(path, at), load_hit_t(hit, at), load_path_o(path, at));
-    photon->p = sel3(c.met, p, photon->p);
-    photon->normal = sel_n(c.met, as_natural(c.medium), photon->normal);
-    photon->mis_ratio = sel(c.met, load_path_mis_ratio(path, at), photon->mis_ratio);
-    *group = *group | sel_i(c.met, (integer)(MERGING_IN_MEDIUM), (integer)(0));
+    photon->p = sel3(c.collides, p, photon->p);
+    photon->normal = sel_n(c.collides, as_natural(c.medium), photon->normal);
+    photon->mis_ratio = sel(c.collides, load_path_mis_ratio(path, at), photon->mis_ratio);
+    *group = *group | sel_i(c.collides, (integer)(MERGING_IN_MEDIUM), (integer)(0));
 }
 
 /* Twin, where there are no media. */
