@@ -27,6 +27,8 @@ from clpt.scene.params import (
 )
 from clpt.scene.pixels import averaged, channel, check_image, image_file, thinned
 from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role
+from clpt.scene.textures.graph import SECOND_UV as SECOND_UV
+from clpt.scene.textures.graph import Graph as Graph
 from clpt.scene.values import (
     Attributes,
     ImageLike,
@@ -52,7 +54,6 @@ ATTRIBUTES = ("vertex_", "face_")  # prefixes of the names of attributes
 PATTERNS = ("fbm", "wrinkled", "windy")
 MOST_OCTAVES = 32
 MAPPINGS = ("uv", "planar", "spherical", "cylindrical", "uv1")
-SECOND_UV = ("vertex_u1", "vertex_v1")  # the attributes of a mesh that the mapping uv1 takes
 WRAPS = ("repeat", "clamp", "mirror", "zero")
 
 
@@ -118,6 +119,8 @@ class Bitmap(Placed):
     no copies.
     """
 
+    alpha = True
+
     image: ImageLike | None = host(
         None,
         "path of an image, or an array (h, w) or (h, w, 1|3|4), float32, or uint8 as 8-bit files "
@@ -176,8 +179,8 @@ class Bitmap(Placed):
         plain = stored.decoded(not self.raw)
         return np.nan_to_num(channel(plain, self.channel) if role is REAL else plain[..., :3])
 
-    def channel_factors(self, channel: int) -> list[Any]:
-        return [dataclasses.replace(self, channel="rgb"[channel])]
+    def with_channel(self, channel: str) -> Texture:
+        return dataclasses.replace(self, channel=channel)
 
     def mean(self, look: Look) -> float:
         return float(look.levels(self).mean())
@@ -186,6 +189,11 @@ class Bitmap(Placed):
         linear, offset = self.affine[:2, :2], self.affine[:2, 2]
         area = area * abs(np.linalg.det(linear))
         return averaged(look.levels(self), uv @ linear.T + offset, area, self.wraps)
+
+    def number_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
+        linear, offset = self.affine[:2, :2], self.affine[:2, 2]
+        area, values = area * abs(np.linalg.det(linear)), self.pixels(REAL)[..., 0]
+        return averaged(values.astype(np.float64), uv @ linear.T + offset, area, self.wraps)
 
     def clamped_at_poles(self) -> Texture:
         """Return it with `wrap_v` "clamp", unless it has a `wrap_v` or `to_uv` moves it along v."""
@@ -223,6 +231,13 @@ class Checkerboard(Placed):
             return self
         pattern = Checkerboard(color0=0.0, color1=1.0, to_uv=self.to_uv)
         return Mix(first=self.color0, second=self.color1, amount=pattern).folded(role)
+
+    def with_channel(self, channel: str) -> Texture:
+        ends = (
+            channel_factors(value, "rgb".index(channel)) for value in (self.color0, self.color1)
+        )
+        (first,), (second,) = ends  # colors: with textures it is a mixture, see `folded`
+        return dataclasses.replace(self, color0=first, color1=second)
 
     def mean(self, look: Look) -> float:
         return 0.5 * (mean(self.color0, look) + mean(self.color1, look))
@@ -376,14 +391,20 @@ class MeshAttribute(Texture):
     def attributes(self) -> tuple[str, ...]:  # type: ignore[override]
         return (self.name,)
 
-    def channel_factors(self, channel: int) -> list[Any]:
-        return [dataclasses.replace(self, channel="rgb"[channel])]
+    def with_channel(self, channel: str) -> Texture:
+        return dataclasses.replace(self, channel=channel)
 
     def brightness_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
         if self.name not in attributes:
             return super().brightness_at(look, uv, area, attributes)
         means = attributes[self.name].mean(axis=1, dtype=np.float64)
         return np.broadcast_to(np.maximum(means, 0.0)[:, None], uv.shape[:2])
+
+    def number_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
+        if self.name not in attributes:
+            return super().brightness_at(look, uv, area, attributes)
+        values = np.asarray(attributes[self.name], np.float64)[:, None]
+        return np.broadcast_to(channel(values, self.channel)[:, :, 0], uv.shape[:2])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -433,7 +454,7 @@ class Marble(Solid):
         return {**octaves, "scale": self.scale, "variation": self.variation}
 
 
-KINDS = (Bitmap, Checkerboard, Product, Mix, MeshAttribute, Dots, Checkers, Noise, Marble)
+KINDS = (Bitmap, Checkerboard, Product, Mix, MeshAttribute, Dots, Checkers, Noise, Marble, Graph)
 
 
 def _matrix(texture: Texture, name: str, size: int) -> None:
