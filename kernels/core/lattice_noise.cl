@@ -1,6 +1,7 @@
 /* Noises of Open Shading Language, which MaterialX has: Perlin's (Improving Noise, 2002) on a lattice without a period,
- * whose gradients Bob Jenkins' hash lookup3 chooses (public domain), cells, and Worley's (1996). clpt/scene/textures/noise.py
- * has the same in float64. A place in the plane has z = 0 and `planar`, a constant of the caller. */
+ * whose gradients Bob Jenkins' hash lookup3 chooses (public domain), cells, and Worley's (1996).
+ * clpt/scene/textures/noise.py has the same in float64. A place in the plane has z = 0 and `planar`, a constant of the
+ * caller. */
 #define LATTICE_SEED 0xdeadbeefu
 
 inline natural lattice_turned(natural x, int bits) { return (x << bits) | (x >> (32 - bits)); }

@@ -1,5 +1,5 @@
-/* The nodes of graphs, by the names of MaterialX's standard library. clpt/scene/textures/nodes.py has their inputs and the
- * same in float64; clpt/render/textures/graphs.py writes a function `graph_<number>` for each structure of a graph,
+/* The nodes of graphs, by the names of MaterialX's standard library. clpt/scene/textures/nodes.py has their inputs and
+ * the same in float64; clpt/render/textures/graphs.py writes a function `graph_<number>` for each structure of a graph,
  * which calls these. A node of numbers is called for each channel. The others take and return vectors: a number stands
  * in all channels, and what a value does not have is 0. */
 #include "core/lattice_noise.cl"

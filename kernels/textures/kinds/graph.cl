@@ -1,5 +1,5 @@
-/* A value that nodes compute, see textures/graph.cl: linear Rec. 709, which becomes a spectrum as the texels of an image
- * do. `graph_value` calls the function of the graph's structure. */
+/* A value that nodes compute, see textures/graph.cl: linear Rec. 709, which becomes a spectrum as the texels of an
+ * image do. `graph_value` calls the function of the graph's structure. */
 inline vec4 graph_colour(Graph t, Scene scene, TexturePoint point)
 {
     return graph_value(t, scene, t.kind == TEXTURE_GRAPH, point);
