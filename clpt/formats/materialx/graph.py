@@ -316,7 +316,7 @@ TYPES = {
     "float": 1, "integer": 1, "boolean": 1, "vector2": 2, "vector3": 3, "vector4": 4, "color3": 3,
     "color4": 4, "matrix33": 9, "matrix44": 16,
 }  # fmt: skip
-_TYPE = re.compile(rf"({'|'.join(TYPES)}|surfaceshader|string|filename)(FA|[IBVM]|\d)*")
+_TYPE = re.compile(rf"({'|'.join(TYPES)}|surfaceshader|string|filename)(FA|CF|VF|[IBVM]|\d)*")
 
 
 def category(kind: str) -> str:

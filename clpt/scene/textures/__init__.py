@@ -9,6 +9,7 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clpt import images
 from clpt.arrays import Floats, Floats32, on_host
@@ -243,13 +244,20 @@ class Checkerboard(Placed):
         return 0.5 * (mean(self.color0, look) + mean(self.color1, look))
 
     def brightness_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
-        cells = uv @ self.affine[:2, :2].T + self.affine[:2, 2]
-        same = np.equal(*np.moveaxis(cells % 1.0 < 0.5, -1, 0))
         first, second = (
             brightness_at(colour, look, uv, area, attributes)
             for colour in (self.color0, self.color1)
         )
-        return np.where(same, first, second)
+        return np.where(self._first(uv), first, second)
+
+    def number_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
+        first, second = (constant_number(colour, REAL) for colour in (self.color0, self.color1))
+        return np.where(self._first(uv), first, second)  # type: ignore[call-overload]
+
+    def _first(self, uv: Floats) -> NDArray[np.bool_]:
+        """Return where the first colour is, at uv (..., 2)."""
+        cells = uv @ self.affine[:2, :2].T + self.affine[:2, 2]
+        return np.equal(*np.moveaxis(cells % 1.0 < 0.5, -1, 0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

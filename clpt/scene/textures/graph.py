@@ -20,7 +20,8 @@ TEXTURE = "texture"  # the kind of a node that looks up a texture of the graph
 MOST_NODES = 400
 MOST_STOPS = 256
 SECOND_UV = ("vertex_u1", "vertex_v1")  # the attributes of a mesh that `texcoord1` is
-PLACES = np.random.default_rng(8).uniform(-2.0, 2.0, (512, 3))  # in space, for a mean
+SIDE = 64  # places along u and v, for a mean
+PLACES = np.random.default_rng(8).uniform(-2.0, 2.0, (SIDE**2, 3))  # in space, likewise
 
 Operand: TypeAlias = Floats | int | str  # a constant (n,), the number of a step, or a source
 
@@ -144,8 +145,9 @@ class Graph(Texture):
         return value(self.result)
 
     def mean(self, look: Look) -> float:
-        uv = np.random.default_rng(9).uniform(0.0, 1.0, (1, len(PLACES), 2))
-        return float(self._brightness(look, uv, np.zeros(1), {}).mean())
+        axis = (np.arange(SIDE) + 0.5) / SIDE
+        uv = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(1, -1, 2)
+        return float(self._brightness(look, uv, np.full(1, 1.0 / SIDE**2), {}).mean())
 
     def brightness_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
         if "position" in self.sources:  # which uv does not tell

@@ -438,6 +438,7 @@ def test_nodes(kind: str, values: dict[str, Any], expected: Any) -> None:
 def test_definitions_are_named() -> None:
     assert category("ND_ifgreater_vector2I") == "ifgreater" and width("ND_ifgreater_vector2I") == 2
     assert category("ND_open_pbr_surface_surfaceshader") == "open_pbr_surface"
+    assert category("ND_combine2_color4CF") == category("ND_combine2_vector4VV") == "combine2"
     assert category("ND_multiply_color3FA") == "multiply" and width("ND_image_color4") == 4
 
 
