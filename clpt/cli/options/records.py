@@ -100,7 +100,7 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "Camera and picture": ("camera", "size", "crop", "env", "env_rotation"),
     "Light transport": (
         "mode", "integrator", "max_depth", "light_paths", "guiding", "radius", "lambda_min",
-        "lambda_max", "bands",
+        "lambda_max", "bands", "time_bins", "time_min", "time_max",
     ),
     "Colour": (
         "exposure", "tone", "view", "display", "look", "ocio", "sensor", "white_balance",
