@@ -226,7 +226,7 @@ def index_around(scene: Scene, cached: LoweringCache | None = None) -> float:
 def _bends(shape: Shape) -> float:
     """Return the index behind the boundary of a shape, over that before it; 1 of a sheet."""
     for part in mt.parts(shape.material):
-        inside = float(index(part.inside_index).sample(SODIUM))
+        inside = float(index(cast("Spectrum | str", part.inside_index)).sample(SODIUM))
         if part.transmits and not part.is_sheet and inside > 0.0:
             outside = index(fields_of(part).get("ext_ior", Constant(1.0)))
             return inside / float(outside.sample(SODIUM))
