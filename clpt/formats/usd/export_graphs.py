@@ -114,7 +114,7 @@ class GraphWriter:
         }
         settings = {k: v for k, v in step.settings.items() if k != "channels"}
         suffix = widest if "W" in letters else types[-1]
-        return self._node(kind, suffix, types[-1], settings, **given)
+        return self._node(kind, suffix, types[-1], **settings, **given)
 
     def _texture(self, step: Step, inputs: dict[str, Value]) -> Value:
         uv = inputs.get("texcoord")
@@ -137,19 +137,14 @@ class GraphWriter:
         mapping = "uv1" if operand == "texcoord1" else "uv"
         return Value("vector2", self.network.coordinates(mapping))
 
-    def _node(
-        self,
-        kind: str,
-        suffix: str,
-        form: str,
-        settings: dict[str, int] | None = None,
-        **inputs: Value,
-    ) -> Value:
+    def _node(self, kind: str, suffix: str, form: str, **inputs: Value | int) -> Value:
+        """Add a node. suffix: of its definition; form: the type of the result."""
         node = self.network.shader(kind, f"{kind}_{suffix}", form)
         for name, value in inputs.items():
-            _set(node, name.rstrip("_"), value)
-        for name, number in (settings or {}).items():
-            node.CreateInput(name, TYPES.Int).Set(number)
+            if isinstance(value, int):
+                node.CreateInput(name, TYPES.Int).Set(value)
+            else:
+                _set(node, name.rstrip("_"), value)
         return Value(form, node)
 
     def _as(self, value: Value, form: str) -> Value:
@@ -172,7 +167,7 @@ class GraphWriter:
             return _numbers(value.numbers[index : index + 1])
         if value.form == "float":
             return value
-        return self._node("extract", value.form, "float", {"index": index}, in_=value)
+        return self._node("extract", value.form, "float", index=index, in_=value)
 
 
 def _combined(writer: GraphWriter, step: Step, inputs: dict[str, Value]) -> Value:
@@ -249,7 +244,7 @@ def _set(node: UsdShade.Shader, name: str, value: Value) -> None:
     if value.form == "integer":
         made.Set(int(np.ceil(numbers[0])))
     else:
-        made.Set(numbers[0] if len(numbers) == 1 else VECS[len(numbers)](*numbers))
+        made.Set(numbers[0] if len(numbers) == 1 else VECTORS_OF_USD[len(numbers)](*numbers))
 
 
-VECS = (None, None, Gf.Vec2f, Gf.Vec3f, Gf.Vec4f)
+VECTORS_OF_USD = {2: Gf.Vec2f, 3: Gf.Vec3f, 4: Gf.Vec4f}

@@ -251,8 +251,9 @@ class Checkerboard(Placed):
         return np.where(self._first(uv), first, second)
 
     def number_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
-        first, second = (constant_number(colour, REAL) for colour in (self.color0, self.color1))
-        return np.where(self._first(uv), first, second)  # type: ignore[call-overload]
+        colours = self.color0, self.color1
+        first, second = (constant_number(colour, REAL) or 0.0 for colour in colours)
+        return np.where(self._first(uv), first, second)
 
     def _first(self, uv: Floats) -> NDArray[np.bool_]:
         """Return where the first colour is, at uv (..., 2)."""
