@@ -211,6 +211,7 @@ class Writer:
                     "type": "directional",
                     "direction": direction,
                     "irradiance": self._emitted(lamp, color, 1.0),
+                    "angle": math.degrees(lamp.angle),
                 }
             )
         elif lamp.type == "POINT" and lamp.shadow_soft_size > 0.0:

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 import click
 
-from ..choices import Missing
 from ..errors import SceneError
 from ..formats import FORMATS, locate, save
 from .info import read_scene
 from .options.grading import GradingOptions, grading_options
 from .options.records import with_records
-from .options.scene_options import Loading, loading_options
-from .options.values import Choice
+from .options.scene_options import Loading, reading_options
 from .process import terminal
 
 if TYPE_CHECKING:
@@ -30,11 +28,7 @@ MAP_ROWS, MAP_SAMPLES = 512, 64  # of a map of the surroundings
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="The same as TARGET.")
 @click.option("--layer", metavar="NAME", help="Take this layer of an .exr in place of the picture.")
 @grading_options
-@loading_options
-@click.option(
-    "--missing-textures", type=Choice(get_args(Missing)), default="error",
-    help="Of scenes: grey stands for an image that is not there, or an unknown material.",
-)  # fmt: skip
+@reading_options
 @with_records(graded=GradingOptions, loading=Loading)
 def convert(
     source: Path, target: Path | None, output: Path | None, layer: str | None,

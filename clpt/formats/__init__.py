@@ -49,7 +49,13 @@ IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
 SCENES = tuple(suffix for suffix, kind in FORMATS.items() if kind in (*WITH_VARIABLES, "pbrt"))
 MOST_COMPARED, CLOSE = 4096, 0.7  # names of a folder; least similarity of a suggested name
 MOST_NAMED = 8  # scenes of a folder that a message names
-ARGUMENTS = ("kinds", "progress", "missing_textures", "budget")  # of `load`, beside variables
+ARGUMENTS = (
+    "kinds",
+    "progress",
+    "missing_textures",
+    "strict",
+    "budget",
+)  # of `load`, beside variables
 
 __all__ = ["FORMATS", "load", "load_dict", "locate", "save"]
 
@@ -61,6 +67,7 @@ def load(
     kinds: Iterable[type[Material]] = (),
     progress: Progress | None = None,
     missing_textures: Missing = "error",
+    strict: bool = False,
     budget: Budget | None = None,
     **variables: Any,
 ) -> Scene:
@@ -71,8 +78,9 @@ def load(
     three `camera` is a camera's number or name. `progress` is called with the share that is read,
     from 0 to 1, and a text, for files of many shapes. `missing_textures`: "grey" replaces missing
     images, and unknown materials of Mitsuba and PBRT, by grey; it leaves out unknown shapes and
-    lights. Each has a warning. `budget`: memory and time that the load may take; a file that asks
-    for more is refused. Raises SceneError with the file and, where it is known, the line.
+    lights. Each has a warning. `strict`: the first warning is an error. `budget`: memory and time
+    that the load may take; a file that asks for more is refused. Raises SceneError with the file
+    and, where it is known, the line.
     """
     path = locate(path)
     try:
@@ -80,6 +88,10 @@ def load(
             scene = _load(path, kinds, progress, missing_textures, variables)
         scene.account = account
         scene.warnings[:] = [one_line(text, LONGEST_WARNING) for text in scene.warnings]
+        if strict and scene.warnings:
+            others = len(scene.warnings) - 1
+            more = f"; warnings after it: {others}" if others else ""
+            raise SceneError(f"strict: {scene.warnings[0]}{more}", file=path)
         return scene
     except RecursionError:
         raise SceneError("what it holds is nested too deeply", file=path) from None

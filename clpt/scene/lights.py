@@ -427,13 +427,17 @@ class Goniometric(PoweredLamp):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Directional(Lamp):
-    """Parallel light from infinitely far away."""
+    """Light from infinitely far away: parallel, or of a disk, which gives shadows soft edges.
+
+    No ray meets the disk, so mirrors do not show it.
+    """
 
     reach = "distant"
 
     direction: Vector3 = host((0.0, 0.0, -1.0), "the light travels along it", form="direction")
     irradiance: SpectrumLike = emission(1.0, "on a surface that faces it", "W m^-2 nm^-1")
     lux: float | None = _to_the_eye("illuminance of a surface that faces it", "lx")
+    angle: float = real(0.0, "diameter of its disk, the sun's is 0.53", "degrees", 0.0, 180.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

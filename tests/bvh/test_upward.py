@@ -32,10 +32,13 @@ def some_rays(triangles, n=2000):
     return np.concatenate([o, ends[0], d, ends[1]], 1).astype(np.float32)
 
 
-def same_hits(first, second, share=1.0):
-    """Distances are equal to a bit, for the order of tests decides between equally near triangles;
-    share: of the rays that hit the same triangle, at least."""
-    np.testing.assert_allclose(first["t"], second["t"], rtol=1.2e-7)
+def same_hits(first, second, share=1.0, bits=1):
+    """Distances are equal to some units of the last place.
+
+    Among equally near triangles the order of tests decides. share: of the rays that hit the same
+    triangle, at least.
+    """
+    np.testing.assert_allclose(first["t"], second["t"], rtol=1.2e-7 * bits)
     np.testing.assert_array_equal(first["prim"] == MISS, second["prim"] == MISS)
     assert (first["prim"] == second["prim"]).mean() >= share
 
@@ -53,10 +56,10 @@ def test_hits_are_those_of_planes(device, gpu, trace, shape, layout, lanes):
     trees = [bvh.build(on, *mesh(triangles), layout=layout) for on in (device, gpu)]
     (planes, blocked), (upward, occluded) = (trace(tree, rays, lanes) for tree in trees)
     if shape in ("one line", "far away"):  # triangles of no or hardly any area, hit by luck
-        assert (planes["t"] == upward["t"]).mean() > 0.95
+        assert (planes["t"] == upward["t"]).mean() > 0.9
         return
     close = shape in ("identical", "same centroid", "geometric", "deep")
-    same_hits(planes, upward, share=0.0 if close else 1.0)
+    same_hits(planes, upward, *((0.0, 4) if close else ()))
     np.testing.assert_array_equal(blocked, occluded)
     assert shape == "points" or (planes["prim"] != MISS).mean() > 0.1
 

@@ -91,6 +91,18 @@ def test_images_that_are_not_there(tmp_path, name):
         np.testing.assert_allclose(np.unique(made.lights[0].image), 0.5)
 
 
+def test_strict_stops_at_a_warning(tmp_path):
+    path = tmp_path / "a.xml"
+    path.write_text(MITSUBA, "utf-8")
+    warnings = load(path, missing_textures="grey").warnings
+    with pytest.raises(SceneError, match="strict: ") as stopped:
+        load(path, missing_textures="grey", strict=True)
+    assert warnings[0] in str(stopped.value) and str(len(warnings) - 1) in str(stopped.value)
+    whole = tmp_path / "whole.json"
+    whole.write_text('{"camera": {"type": "perspective"}, "shapes": [{"type": "sphere"}]}', "utf-8")
+    assert load(whole, strict=True).shapes
+
+
 def test_there_is_no_third_way(tmp_path):
     path = tmp_path / "a.xml"
     path.write_text(MITSUBA, "utf-8")

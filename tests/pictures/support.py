@@ -33,6 +33,11 @@ def with_path(scene: Scene, **changes: Any) -> Scene:
     return dataclasses.replace(scene, integrator=dataclasses.replace(own, **changes))
 
 
+def quick(names: Any, *chosen: str) -> list[Any]:
+    """Return all names as parameters of a test; those that are not `chosen` are slow."""
+    return [pytest.param(n, marks=() if n in chosen else pytest.mark.slow) for n in names]
+
+
 def exposures(scene: Scene, count: int, spp: int, first_seed: int = 1, **wavefront: Any) -> Values:
     """Render `count` times with different seeds: (count, h, w, 3) float64."""
     renderer = clpt.Renderer(scene, **wavefront)

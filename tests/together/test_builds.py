@@ -34,7 +34,7 @@ from tests.front_end import CLANG, errors
 from tests.together.builds import Way, texts
 from tests.together.strategies import scenes, shown, ways
 
-SCENES = 30
+SCENES = 20
 
 pytestmark = pytest.mark.skipif(CLANG is None, reason="clang is not installed")
 

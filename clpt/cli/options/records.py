@@ -110,7 +110,8 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "Device": ("device", "threads", "layout", "tree_quality", "texture_budget"),
     "Cluster": ("cluster", "keys"),
     "Scene file": (
-        "variables", "variant", "missing_textures", "load_memory", "load_seconds", "load_parts",
+        "variables", "variant", "missing_textures", "strict", "load_memory", "load_seconds",
+        "load_parts",
     ),
 }  # fmt: skip
 

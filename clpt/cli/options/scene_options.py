@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from ...scene import Scene
 
 
-RESERVED = ("kinds", "progress", "missing_textures", "budget")  # parameters of clpt.load
+RESERVED = ("kinds", "progress", "missing_textures", "strict", "budget")  # parameters of clpt.load
 
 
 class Bytes(click.ParamType):
@@ -106,10 +106,25 @@ _LOADING = (
     ),
 )  # fmt: skip
 
+_MISSING = (
+    click.option(
+        "--missing-textures", type=Choice(get_args(Missing)), default="error",
+        help="grey: go on with grey where an image is not there, or a material is unknown.",
+    ),
+    click.option(
+        "--strict", is_flag=True, help="Stop where the scene's file says what is left out."
+    ),
+)  # fmt: skip
+
 
 def loading_options(command: Command) -> Command:
     """Give a command the parameter `variables`, and options that limit loads."""
     return with_options(command, _LOADING)
+
+
+def reading_options(command: Command) -> Command:
+    """Give a command the options of the record `Loading`."""
+    return with_options(loading_options(command), _MISSING)
 
 
 LOCAL = "local:"
@@ -165,11 +180,16 @@ class Loading:
 
     variables: dict[str, Any]
     missing_textures: Missing = "error"
+    strict: bool = False
 
     def read(self, file: Path, progress: Progress | None = None) -> Scene:
         """Return the scene of a file. Raises SceneError."""
         return load(
-            file, progress=progress, missing_textures=self.missing_textures, **self.variables
+            file,
+            progress=progress,
+            missing_textures=self.missing_textures,
+            strict=self.strict,
+            **self.variables,
         )
 
 
@@ -286,14 +306,10 @@ _OPTIONS = (
     click.option(
         "--alpha", is_flag=True, default=None, help="Transparent background (alpha channel)."
     ),
-    loading_options,
+    reading_options,
     click.option(
         "--texture-budget", type=Bytes(), metavar="SIZE",
         help="Memory for images, such as 500M; larger ones are halved.  [default: half the free]",
-    ),
-    click.option(
-        "--missing-textures", type=Choice(get_args(Missing)), default="error",
-        help="grey: go on with grey where an image is not there, or a material is unknown.",
     ),
 )  # fmt: skip
 

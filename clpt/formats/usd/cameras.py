@@ -18,6 +18,24 @@ POLICIES = (
     "adjustPixelAspectRatio",
 )  # fmt: skip
 
+# What renderers call their variables (RenderVar), in small letters, and the layer of the same
+# content; None: the picture itself.
+VARIABLES: dict[str, str | None] = {
+    "ci": None, "color": None, "c.*": None, "beauty": None, "combined": None, "a": None,
+    "alpha": None,
+    "albedo": "albedo", "diffuse_albedo": "albedo", "diffusealbedo": "albedo",
+    "n": "shading_normal", "nn": "shading_normal", "normal": "shading_normal",
+    "ng": "geometric_normal", "ngn": "geometric_normal",
+    "depth": "z", "z": "z", "cameradepth": "z", "lineardepth": "z", "distance": "depth",
+    "p": "position", "pworld": "position", "position": "position", "worldposition": "position",
+    "st": "uv", "uv": "uv", "motion": "motion", "motionvector": "motion",
+    "id": "shape_id", "primid": "shape_id", "materialid": "material_id",
+    "elementid": "primitive_id", "variance": "variance", "samplecount": "samples",
+    "cryptoobject": "crypto_object", "crypto_object": "crypto_object",
+    "cryptomaterial": "crypto_material", "crypto_material": "crypto_material",
+    "direct": "direct", "indirect": "indirect",
+}  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -25,7 +43,7 @@ class Settings:
 
     camera: a prim path, or None. size: of the picture [pixels], or None. policy: of POLICIES, how
     the camera's aperture gets the picture's form. still: without motion blur. sharp: without depth
-    of field.
+    of field. layers: that its variables are.
     """
 
     camera: str | None = None
@@ -33,6 +51,7 @@ class Settings:
     policy: str = POLICIES[0]
     still: bool = False
     sharp: bool = False
+    layers: tuple[str, ...] = ()
 
     def aperture(self, width: float, height: float) -> tuple[float, float]:
         """Return a camera's aperture in the form of the picture."""
@@ -78,7 +97,24 @@ def settings(document: Document, shown: list[Usd.Prim]) -> Settings:
     )
     sharp = prim.GetAttribute("disableDepthOfField").Get()
     pixels = None if size is None else (max(int(size[0]), 1), max(int(size[1]), 1))
-    return Settings(camera, pixels, policy, bool(still), bool(sharp))
+    return Settings(
+        camera, pixels, policy, bool(still), bool(sharp), _layers(document, sources[1:])
+    )
+
+
+def _layers(document: Document, products: list[Usd.Prim]) -> tuple[str, ...]:
+    """Return the layers that the variables of products name, each once."""
+    names: list[str] = []
+    for product in products:
+        for path in product.GetRelationship("orderedVars").GetTargets():
+            variable = document.stage.GetPrimAtPath(path)
+            source = str(_authored(variable, "sourceName", path.name)) if variable else path.name
+            known = source.rpartition(":")[2].lower()  # without a renderer's name before it
+            if known not in VARIABLES:
+                document.warn(f"the variable {source!r} is left out", path)
+            elif (layer := VARIABLES[known]) is not None:
+                names.append(layer)
+    return tuple(dict.fromkeys(names))
 
 
 def _authored(prim: Usd.Prim, name: str, default: object) -> Any:

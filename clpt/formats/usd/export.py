@@ -273,7 +273,8 @@ class _Writer:
                 self.warn("that a spot's edge is linear; it is smooth")
         elif isinstance(light, lights.Directional):
             prim = UsdLux.DistantLight.Define(self.stage, path)
-            prim.CreateAngleAttr(0.0)
+            prim.CreateAngleAttr(float(light.angle))
+            prim.CreateNormalizeAttr(True)
             _shine(prim, rgb(light.irradiance, "emission"))
             self.place(prim, _facing(np.asarray(light.direction, float)), light.motion)
         elif isinstance(light, lights.Constant):

@@ -32,7 +32,7 @@ Z_POLE = transforms.rotate([1.0, 0.0, 0.0], 90.0)  # from a pole +y to a pole +z
 # From the space of a goniometric light, whose -y is the lamp's nadir, to that of a light of USD.
 FROM_NADIR = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 SUN_ANGLE, SUN_INTENSITY = 0.53, 50000.0
-WIDE = 2.0  # [degrees] of a distant light from which on a sharp shadow is told
+WIDEST = 180.0  # [degrees] disk of a distant light
 SHAPED = "inputs:shaping:"
 BALLS: dict[str, Callable[[Floats], Floats]] = {
     "mirroredBall": lambda angle: np.sin(0.5 * angle),
@@ -98,11 +98,15 @@ def _distant(document: Document, prim: Usd.Prim, placement: Matrix) -> Light:
     factor = math.pi * (math.sin(half) ** 2 if half <= 0.5 * math.pi else 2.0 - math.sin(half) ** 2)
     if document.value(prim, "inputs:normalize", False) or half == 0.0:
         factor = 1.0
-    if angle > WIDE:
-        document.warn("its angle only scales its light: shadows are sharp", prim.GetPath())
+    if angle > WIDEST:
+        document.warn(f"its angle is {WIDEST:g} degrees in shadows", prim.GetPath())
     rgb = emitted(document, prim, SUN_INTENSITY) * factor
     direction = transforms.rigid(placement)[:3, :3] @ [0.0, 0.0, -1.0]
-    return Directional(direction=tuple(direction), irradiance=RGBIlluminant(*rgb))
+    return Directional(
+        direction=tuple(direction),
+        irradiance=RGBIlluminant(*rgb),
+        angle=min(max(angle, 0.0), WIDEST),
+    )
 
 
 def _dome(document: Document, prim: Usd.Prim, placement: Matrix) -> Light:

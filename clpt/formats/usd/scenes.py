@@ -207,6 +207,8 @@ def _scene(document: Document, variables: dict[str, Any]) -> Scene:
             scene.extra["shutter"] = (opening, closing - opening)
     if size is not None:
         scene.film = dataclasses.replace(scene.film, width=size[0], height=size[1])
+    if settings.layers:
+        scene.film = dataclasses.replace(scene.film, layers=settings.layers)
     return scene
 
 

@@ -1,10 +1,14 @@
-/* Parallel light; `direction` is the unit vector along its rays. */
+/* Light from a disk at infinity that no ray meets; `direction` is the unit vector along the ray from its middle, and
+ * `angle` its diameter [rad]. */
 LightSample directional_sample(Directional l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
 {
+    real a = sqr(0.5f * l.angle); /* the square of its half angle, at most pi / 2 */
+    real one_minus_cos = a * (0.5f - a * (0.0416666667f - a * (0.00138888889f - a * (2.48015873e-5f - a * 2.7557e-7f))));
+    Spectrum irradiance = emission_load(scene, l.irradiance, texture_point_nowhere(), lambdas);
     LightSample s;
-    s.wi = neg3(l.direction);
+    s.wi = to_world(frame_of(neg3(l.direction)), uniform_cone(u, one_minus_cos));
     s.t = FAR;
-    s.radiance = emission_load(scene, l.irradiance, texture_point_nowhere(), lambdas);
+    s.radiance = spectrum_scale(irradiance, 1.0f / (1.0f - 0.5f * one_minus_cos)); /* over the mean cosine */
     s.pdf = -1.0f;
     return s;
 }

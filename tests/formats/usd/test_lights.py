@@ -64,6 +64,7 @@ def test_distant_lights_by_their_angle(stage: Loader) -> None:
     assert np.allclose(scene.lights[0].direction, [0, 0, -1])
     expected = 100.0 * math.pi * math.sin(math.radians(0.5)) ** 2
     assert rgb(scene.lights[0].irradiance) == pytest.approx((expected,) * 3)
+    assert scene.lights[0].angle == 1.0
     scene = stage(MESH + light % "bool inputs:normalize = 1")
     assert rgb(scene.lights[0].irradiance) == pytest.approx((100.0,) * 3)
     usual = stage(MESH + 'def DistantLight "L" {}').lights[0]

@@ -105,6 +105,23 @@ def test_render_settings(stage: Loader) -> None:
     assert stage(mesh + text % "", camera="A").camera.fov < 40.0
 
 
+def test_variables_become_layers(stage: Loader) -> None:
+    def variable(prim: str, source: str) -> str:
+        return f'def RenderVar "{prim}" {{ uniform string sourceName = "{source}" }}\n'
+
+    text = f"""
+    def Mesh "M" {{ {SQUARE} }}
+    {SUN}
+    {variable("C", "Ci")} {variable("N", "ri:Nn")} {variable("D", "cameraDepth")}
+    {variable("D2", "depth")} {variable("X", "wetness")}
+    def RenderProduct "P" {{ rel orderedVars = [</C>, </N>, </D>, </D2>, </X>] }}
+    def RenderSettings "S" {{ rel products = </P> }}
+    """
+    scene = stage(text)
+    assert scene.film.layers == ("shading_normal", "z")
+    assert scene.warnings == ["/X: the variable 'wetness' is left out"]
+
+
 def test_what_is_missing_is_told_by_prim(stage: Loader) -> None:
     text = f"""
     def Mesh "M" {{ {SQUARE} }}

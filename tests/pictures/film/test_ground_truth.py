@@ -30,6 +30,7 @@ from clpt.scene.materials import (
 )
 from clpt.scene.motion import Keys, Shutter
 from clpt.scene.shapes import Cube, Curves, Disk, Group, Instance, Mesh, Rectangle, Shape, Sphere
+from tests.pictures.support import quick
 
 SIZE, EYE, NEAR = 24, 4.0, 1e-2
 LAYERS = ("albedo", "shading_normal", "geometric_normal", "depth", "z", "position", "uv",
@@ -179,12 +180,6 @@ THROUGH: dict[str, dict[str, Any]] = {
 """What layers look through: what lies behind is seen as if that were not there."""
 
 
-def quick(names: Any, *chosen: str) -> list[Any]:
-    """All of a table, of which some run in the quick suite."""
-    slow = pytest.mark.slow
-    return [pytest.param(n, marks=() if n in chosen else slow) for n in names]
-
-
 @pytest.mark.parametrize("what", quick(THROUGH, "two hidden lamps in fog", "a mask that is open"))
 def test_what_is_looked_through(what: str) -> None:
     given = dict(THROUGH[what])
@@ -227,7 +222,7 @@ HOW: dict[str, tuple[Integrator, dict[str, Any]]] = {
 }
 
 
-@pytest.mark.parametrize("how", quick(HOW, "light paths"))
+@pytest.mark.parametrize("how", quick(HOW, "spectral"))
 def test_whatever_makes_the_picture(how: str) -> None:
     integrator, options = HOW[how]
     made = layers_of(scene([fog(scatters=0.5), hole(0.0)], integrator, **options))

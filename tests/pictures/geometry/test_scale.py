@@ -257,7 +257,7 @@ def lit_hall(
 @pytest.mark.parametrize(
     "changes",
     [
-        {},
+        pytest.param({}, marks=pytest.mark.slow),
         pytest.param({"integrator": Path(max_depth=4, light_paths=1)}, marks=pytest.mark.slow),
         pytest.param({"integrator": Vcm(max_depth=4)}, marks=pytest.mark.slow),
         pytest.param({"film": Film(width=16, height=16)}, marks=pytest.mark.slow),

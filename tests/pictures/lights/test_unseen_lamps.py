@@ -16,7 +16,7 @@ from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
 from clpt.scene.lights import Area
 from clpt.scene.shapes import Cube, Cylinder, Disk, Mesh, Rectangle, Shape, Sphere
-from tests.pictures.support import assert_agree, blocks, exposures
+from tests.pictures.support import assert_agree, blocks, exposures, quick
 from tests.pictures.transport.test_hybrid import narrow
 
 GONE = m.Mask(material=m.Diffuse(reflectance=0.0), opacity=0.0)
@@ -58,12 +58,7 @@ def taken(scene: Scene, spp: int = 64, first_seed: int = 1) -> Any:
     return blocks(exposures(scene, 8, spp, first_seed, device=narrow()))
 
 
-def some(names: Any, *quick: str) -> list[Any]:
-    """All names; those but for `quick` are slow."""
-    return [pytest.param(n, marks=() if n in quick else pytest.mark.slow) for n in names]
-
-
-@pytest.mark.parametrize("kind", some(LAMPS, "mesh"))
+@pytest.mark.parametrize("kind", quick(LAMPS, "mesh"))
 def test_they_shine_as_a_lamp_out_of_sight_does(kind: str) -> None:
     """The floor's light is that from a lamp that only the camera does not see."""
     seen = room(LAMPS[kind], methods.Path(max_depth=4, hide_lights=True), visible=True)
@@ -71,7 +66,7 @@ def test_they_shine_as_a_lamp_out_of_sight_does(kind: str) -> None:
     assert_agree(taken(room(LAMPS[kind], methods.Path(max_depth=4))), reference, kind)
 
 
-@pytest.mark.parametrize("name", some(INTEGRATORS, "light_paths", "vcm"))
+@pytest.mark.parametrize("name", quick(INTEGRATORS, "light_paths"))
 def test_every_integrator_finds_their_light(name: str) -> None:
     """Beside a rough metal, by which `path` finds what light paths find too."""
     place = tf.translate([-1.0, 0.8, 0.0]) @ tf.rotate([0, 1, 0], 90) @ tf.scale(0.8)
@@ -82,7 +77,7 @@ def test_every_integrator_finds_their_light(name: str) -> None:
     assert_agree(taken(ours, 128), taken(path, 128, 101), name)
 
 
-@pytest.mark.parametrize("name", some(INTEGRATORS, "path", "particle_tracer"))
+@pytest.mark.parametrize("name", quick(INTEGRATORS, "path", "particle_tracer"))
 def test_no_ray_sees_them(name: str) -> None:
     """Before the camera and in a mirror there is nothing; the same lamp is bright if it is seen."""
     place = tf.translate([-1.0, 0.8, 0.0]) @ tf.rotate([0, 1, 0], 90) @ tf.scale(0.8)

@@ -183,6 +183,7 @@ FREE = {
 }
 
 
+@pytest.mark.slow
 def test_panes_are_free_however_light_is_found() -> None:
     """A lamp over four panes over a floor: three steps are the panes' light by every way."""
     shapes = [

@@ -13,6 +13,7 @@ from clpt import transforms as tf
 from clpt.scene import Film, Scene, cameras, integrators, lights, media, shapes
 from clpt.scene import materials as m
 from clpt.scene.params import interior_params
+from tests.pictures.support import quick
 
 FOG = media.Homogeneous(sigma_a=0.5, sigma_s=0.4)
 GREY = m.Diffuse(reflectance=0.7)
@@ -82,7 +83,7 @@ def test_fog_within_is_seen() -> None:
     assert np.abs(without - _picture(_balls(GLASS["dielectric"], True), WAYS["path"])).max() > 0.01
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", quick(WAYS, "path", "light paths", "whitted"))
 def test_every_integrator(way: str) -> None:
     glass = GLASS["dielectric"]
     named, unnamed = (_picture(_balls(glass, own), WAYS[way]) for own in (True, False))

@@ -74,7 +74,8 @@ def sea_radiance(samples: int = 4, steps: int = 64) -> np.ndarray:
     return seen.reshape(8, samples, 8, samples).mean(axis=(1, 3))
 
 
-@pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
 def test_a_point_seen_in_water(mode: str) -> None:
     """Light scattered once in a sea, in by refraction and out by it: 1 %."""
     made = exposures(sea(mode, radius=0.1), 8, 64, device=narrow())

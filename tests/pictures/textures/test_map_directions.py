@@ -152,6 +152,7 @@ def test_a_mirror_shows_the_mirror_image(kind: str) -> None:
     np.testing.assert_allclose(row, row[0], rtol=4e-3)
 
 
+@pytest.mark.slow
 def test_told_tangents_hold_for_every_set() -> None:
     """Tangents of a mesh are its frame, on both sets, under transforms; a relief asks for none."""
     along = np.tile(np.float32([np.cos(0.6), np.sin(0.6), 0, -1]), (4, 1))

@@ -33,6 +33,7 @@ from tests.pictures.support import (
     Values,
     blocks,
     exposures,
+    quick,
     with_film,
 )
 from tests.pictures.transport.test_hybrid import narrow
@@ -299,7 +300,7 @@ def ball_focus(way: str, glass: Any, index: float, far: float, **film: Any) -> V
     return np.array([fitted(one) for one in found])
 
 
-@every_way
+@pytest.mark.parametrize("way", quick(WAYS, "path"))
 def test_a_ball_of_glass_has_its_focus_behind_it(way: str) -> None:
     """R (2 - n) / (2 (n - 1)) behind its back, within 1 % of R: of what a screen behind it sees."""
     assert_formula(ball_focus(way, 1.5, 1.5, focus(1.5) + BEHIND), focus(1.5), 0.01)

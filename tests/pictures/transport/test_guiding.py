@@ -81,10 +81,9 @@ def test_every_material(material: m.Material, mode: str) -> None:
     both(scene, 512, material.kind, max_depth=-1, rr_depth=2)
 
 
-@pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
-@pytest.mark.parametrize(
-    "fog", [pytest.param(fog, marks=() if fog == "chromatic" else pytest.mark.slow) for fog in FOGS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("fog", FOGS)
 def test_every_medium(fog: str, mode: str) -> None:
     """Directions at collisions are guided too, along with those of the floor."""
     both(room(FOGS[fog], SPOT, mode=mode), 64, fog, max_depth=6)
@@ -179,6 +178,7 @@ def picture(scene: Scene, *runs: int, **options: Any) -> np.ndarray:
     return renderer.image()
 
 
+@pytest.mark.slow
 def test_same_bits_however_samples_are_split() -> None:
     """Runs, slots, steps, stages that the host enqueues, films that are merged."""
     scene = guided(caustic(filter=Gaussian()))

@@ -16,6 +16,7 @@ from clpt.scene import materials as m
 from clpt.scene.integrators import Integrator, ParticleTracer, Path, Vcm
 from clpt.scene.motion import Keys, Shutter
 from clpt.scene.textures import Bitmap
+from tests.pictures.support import quick
 
 # the pixel of a slot and its sums, which outlive a path
 KEPT = {
@@ -86,7 +87,7 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", quick(SCENES, "milk", "path"))
 def test_no_path_follows_from_the_one_before(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Slots whose words hold other numbers give the same bits."""
     scene = SCENES[name]

@@ -82,7 +82,10 @@ def scene(medium: media.Grid, size: int, integrator: integrators.Integrator) -> 
 @pytest.mark.parametrize("share", [16, 64, 512])
 @pytest.mark.parametrize(
     "integrator",
-    [integrators.Path(max_depth=12), integrators.Vcm(max_depth=8)],
+    [
+        integrators.Path(max_depth=12),
+        pytest.param(integrators.Vcm(max_depth=8), marks=pytest.mark.slow),
+    ],
     ids=lambda integrator: integrator.kind,
 )
 def test_films_do_not_depend_on_launches(
