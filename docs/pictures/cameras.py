@@ -93,7 +93,8 @@ CAMERAS = {
     "calibrated": seen(
         "A fisheye by OpenCV's model, with calibrated distortion; what it does not see is black.",
         cameras.Calibrated(
-            model="kannala_brandt", intrinsics=(60.0, 60.0, 95.5, 71.5),
+            model="kannala_brandt",
+            intrinsics=(60.0, 60.0, 95.5, 71.5),
             distortion=(0.05, -0.1, 0.0, 0.0),
             to_world=look_at([0.5, 1.3, 2.2], [-0.1, 0.7, 0.0], UP),
         ),

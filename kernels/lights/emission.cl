@@ -1,5 +1,5 @@
-/* Emission of light paths, for integrators that trace paths from lights. The step `emission` of kernels/lights/kinds/<kind>.cl
- * has, for placed lights,
+/* Emission of light paths, for integrators that trace paths from lights. The step `emission` of
+ * kernels/lights/kinds/<kind>.cl has, for placed lights,
  *
  *   Spectrum <kind>_intensity(<Kind> l, Scene scene, vec3 d, Wavelengths lambdas);   all sent along d [W sr^-1 nm^-1]
  *   LightRay <kind>_emit(<Kind> l, Scene scene, vec2 u, vec2 v, Wavelengths lambdas);
@@ -133,8 +133,8 @@ inline LightRay area_ray_unseen(LightRay r, LightRow l) { return r; }
  * are the densities of a light's kind. */
 
 /* The density with which light_emit sends a ray along -wi through a surface that is perpendicular to wi at distance t.
- * For a light on a shape it is divided by the cosine at the light [1/(m^2 sr)]; for a light at a point it is the density
- * of the direction over t^2 [1/m^2]. Areas are in units of Settings.mis_area_unit. */
+ * For a light on a shape it is divided by the cosine at the light [1/(m^2 sr)]; for a light at a point it is the
+ * density of the direction over t^2 [1/m^2]. Areas are in units of Settings.mis_area_unit. */
 inline real light_emit_pdf(Scene scene, integer row, vec3 wi, real t)
 {
     LightRow l = light_at(scene, row);

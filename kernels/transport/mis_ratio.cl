@@ -52,8 +52,8 @@
  *     merge_ratio' = merge_ratio * p_back * c' / (c * p)     at later vertices,
  *
  * and at a specular vertex the square of merge_ratio is added to the square of mis_ratio. A light path that has met a
- * specular vertex begins, at each vertex that is not specular, with merge_ratio' = e * c' / (l * p), and goes on as above
- * while all later vertices are specular; it counts at a connection to a specular x_1.
+ * specular vertex begins, at each vertex that is not specular, with merge_ratio' = e * c' / (l * p), and goes on as
+ * above while all later vertices are specular; it counts at a connection to a specular x_1.
  *
  * In a medium x_i is a collision, and photons are merged along the ray to it (transport/photons/along.cl): e is the
  * section of the cylinder around the ray times the number of light paths. The transmittance up to x_i is left out, as

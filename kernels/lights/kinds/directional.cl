@@ -3,7 +3,8 @@
 LightSample directional_sample(Directional l, Scene scene, vec3 p, vec2 u, Wavelengths lambdas)
 {
     real a = sqr(0.5f * l.angle); /* the square of its half angle, at most pi / 2 */
-    real one_minus_cos = a * (0.5f - a * (0.0416666667f - a * (0.00138888889f - a * (2.48015873e-5f - a * 2.7557e-7f))));
+    real high = 0.00138888889f - a * (2.48015873e-5f - a * 2.7557e-7f);
+    real one_minus_cos = a * (0.5f - a * (0.0416666667f - a * high));
     Spectrum irradiance = emission_load(scene, l.irradiance, texture_point_nowhere(), lambdas);
     LightSample s;
     s.wi = to_world(frame_of(neg3(l.direction)), uniform_cone(u, one_minus_cos));

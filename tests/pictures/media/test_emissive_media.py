@@ -15,6 +15,7 @@ import clpt
 from clpt import spectra
 from clpt import transforms as tf
 from clpt.geometry.triangles import triangulate
+from clpt.render.lights import bodies as body_lights
 from clpt.render.lights.bodies import BrickLights
 from clpt.scene import Film, Scene, media
 from clpt.scene.cameras import Orthographic, Perspective
@@ -273,7 +274,7 @@ def test_bodies_as_lights(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene.integrator = PathIntegrator(max_depth=3, light_paths=0)
     scene.lights = []
     pictures = [exposures(scene, 12, 128).mean(axis=(1, 2), keepdims=True)]
-    monkeypatch.setattr(bodies, "_body", lambda *_: None)
+    monkeypatch.setattr(body_lights, "_body", lambda *_: None)
     pictures.append(exposures(scene, 12, 512).mean(axis=(1, 2), keepdims=True))
     assert_agree(*pictures, "bodies as lights and bodies that are met", 2e-4)
 
