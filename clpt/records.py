@@ -40,6 +40,7 @@ PATH = Record(
         "spectrum_of(1.0f)",
     ),
     eta=("real", "product of the relative indices so far, for Russian roulette"),
+    length=("real", "optical length from the camera to o, see kernels/transport [m]"),
     weight=("real", "sample's weight by the pixel filter; from a light, 1 over its first beta"),
     medium=("integer", "medium of the ray, see kernels/media/medium.cl; 0: none"),
     around=("integer", "medium from which the ray went into a body that absorbs; 0: none"),
@@ -103,6 +104,7 @@ SHADOW = Record(
         "medium at its beginning, where it may go through several; or bodies, where these overlap",
     ),
     into=("integer", "medium at its end, where a light is a part of that; 0: any"),
+    length=("real", "optical length from the camera to the light [m]"),
     film=(
         "vec2",
         "where the picture shows its beginning, from the corner [pixels]; of light paths",
@@ -208,10 +210,15 @@ SETTINGS = Record(
     layer_indirect=("integer", "1 more than where that of indirect light stands; 0: there is none"),
     layer_groups=("integer", "1 more than where those of groups of lights begin; 0: there is none"),
     light_groups=("integer", "where in `distributions` lights have the numbers of their groups"),
+    layer_times=("integer", "1 more than where those of light by time begin; 0: there is none"),
+    time_bins=("integer", "number of these, without the last, which has all other light"),
+    time_first=("real", "optical length where the first begins, over the camera's index [m]"),
+    time_rate=("real", "bins in a metre of such lengths [1/m]"),
+    near_share=("real", "distance to the camera's near plane over that from there to the far one"),
 )
 
 # the last of them, which only layers need
-LAYER_SETTINGS = tuple(m.name for m in SETTINGS.members)[-len(LAYER_PLACES) - 11 :]
+LAYER_SETTINGS = tuple(m.name for m in SETTINGS.members)[-len(LAYER_PLACES) - 16 :]
 
 SHAPE = Record(
     "ShapeRow",

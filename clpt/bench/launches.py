@@ -52,7 +52,9 @@ class Flight:
         width, height = scene.film.size
         side = math.sqrt(slots * width / height)
         width, height = (max(4, round(n / 4) * 4) for n in (side, slots / side))
-        film = dataclasses.replace(scene.film, width=width, height=height, crop=None, bands=0)
+        film = dataclasses.replace(
+            scene.film, width=width, height=height, crop=None, bands=0, time_bins=0
+        )
         self.scene = dataclasses.replace(scene, film=film)
         self.device = on
         self.wavefront = Wavefront.create(on, lower(self.scene), slots=slots, **wavefront)

@@ -1,6 +1,6 @@
 """Datasets: pictures of random scenes with ground truth, by the ten thousand."""
 
-from clpt.dataset.generating import Report, generate, pictures
+from clpt.dataset.generating import Report, generate, pictures, warm
 from clpt.dataset.picture import Picture
 from clpt.dataset.truth import Truth, ground_truth, optical_flow, scene_flow
 from clpt.dataset.writers import WRITERS, Writer
@@ -16,4 +16,5 @@ __all__ = [
     "optical_flow",
     "pictures",
     "scene_flow",
+    "warm",
 ]

@@ -84,10 +84,7 @@ def pictures(
         for index in indices:
             begin = time.perf_counter()
             try:
-                scene: object = make_scene(index, np.random.default_rng([seed, index]))
-                if not isinstance(scene, Scene):
-                    message = f"returned {type(scene).__name__} for picture {index}, not a Scene"
-                    raise SceneError(message, where="make_scene")
+                scene = _scene(make_scene, seed, index)
                 image, truth = renderers.render(scene)
             except Exception as error:
                 if on_failure is None:
@@ -95,6 +92,32 @@ def pictures(
                 on_failure(index, error)
                 continue
             yield Picture(index, image, scene, truth, time.perf_counter() - begin)
+
+
+def warm(make_scene: MakeScene, indices: Iterable[int], **options: Unpack[PictureOptions]) -> int:
+    """Compile what pictures need into the caches, and render nothing.
+
+    So no later picture waits for a compiler that needs what one of these needs. Pictures whose
+    function fails are passed over. Arguments: as of `pictures`. Returns the number of programs that
+    were compiled; the others were in the caches.
+    """
+    seed = options.pop("seed", 0)
+    with _Renderers(options) as renderers:
+        for index in indices:
+            try:
+                renderers.prepare(_scene(make_scene, seed, index))
+            except Exception as error:
+                log.warning("picture %d would fail: %s", index, error)
+        return renderers.compiled
+
+
+def _scene(make_scene: MakeScene, seed: int, index: int) -> Scene:
+    """Return the scene of a picture. Raises SceneError for anything else."""
+    scene: object = make_scene(index, np.random.default_rng([seed, index]))
+    if not isinstance(scene, Scene):
+        message = f"returned {type(scene).__name__} for picture {index}, not a Scene"
+        raise SceneError(message, where="make_scene")
+    return scene
 
 
 class _Renderers:
@@ -116,18 +139,39 @@ class _Renderers:
 
     def render(self, scene: Scene) -> tuple[Floats32, Truth | None]:
         """Return a scene's picture (h, w, 3), and its ground truth."""
-        if self.open:
-            self.open[0].update(scene=scene)
-        else:
-            self.open.append(Renderer(scene, self.device, **self.options))
+        self._bring(scene)
         self.open[0].run(self.spp)
         image = np.array(self.open[0].image()[..., :3])
         if self.truth == "none":
             return image, None
+        alone = self.truth == "silhouettes"
+        return image, ground_truth(scene, self._for_truth(scene), silhouettes=alone)
+
+    def prepare(self, scene: Scene) -> None:
+        """Compile what `render` needs."""
+        self._bring(scene)
+        self.open[0].prepare()
+        if self.truth != "none":
+            renderer = self._for_truth(scene)
+            renderer.update(scene=truth_scene(scene))
+            renderer.prepare()
+
+    @property
+    def compiled(self) -> int:
+        """The number of programs that were in no cache."""
+        devices = {id(on): on for renderer in self.open for on in renderer.devices}
+        return sum(on.builds.programs - on.builds.cached for on in devices.values())
+
+    def _bring(self, scene: Scene) -> None:
+        if self.open:
+            self.open[0].update(scene=scene)
+        else:
+            self.open.append(Renderer(scene, self.device, **self.options))
+
+    def _for_truth(self, scene: Scene) -> Renderer:
         if len(self.open) == 1:
             self.open.append(Renderer(truth_scene(scene), self.open[0].device))
-        alone = self.truth == "silhouettes"
-        return image, ground_truth(scene, self.open[1], silhouettes=alone)
+        return self.open[1]
 
 
 def generate(

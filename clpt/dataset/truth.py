@@ -148,7 +148,7 @@ def category(name: str) -> str:
 def truth_scene(scene: Scene, shapes: list[Shape] | None = None) -> Scene:
     """Return a scene for `ground_truth`: single rays, no lights. shapes: of these alone."""
     film = dataclasses.replace(
-        scene.film, mode="rgb", bands=0, layers=LAYERS, filter=Box(radius=0.01),
+        scene.film, mode="rgb", bands=0, time_bins=0, layers=LAYERS, filter=Box(radius=0.01),
         filtering="importance", alpha=False,
     )  # fmt: skip
     hide = scene.integrator.hide_lights

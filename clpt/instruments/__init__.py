@@ -6,6 +6,7 @@ from clpt.instruments.goniophotometry import Distribution, goniophotometer, writ
 from clpt.instruments.measuring import Measurement, measure, photometer
 from clpt.instruments.quantities import QUANTITIES
 from clpt.instruments.sensor import Sensor
+from clpt.instruments.time_of_flight import correlation, echoes, gate, phase_ranges
 
 __all__ = [
     "QUANTITIES",
@@ -13,9 +14,13 @@ __all__ = [
     "Glare",
     "Measurement",
     "Sensor",
+    "correlation",
+    "echoes",
+    "gate",
     "glare",
     "goniophotometer",
     "measure",
+    "phase_ranges",
     "photometer",
     "write_false_color",
     "write_photometry",

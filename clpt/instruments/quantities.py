@@ -44,7 +44,7 @@ class Quantity:
         """Return a film that measures it; bands: of a spectral quantity."""
         film = dataclasses.replace(
             film, mode="spectral", sensor="cie1931", white_balance="none", exposure=1.0,
-            alpha=False, layers=(),
+            alpha=False, layers=(), time_bins=0,
         )  # fmt: skip
         if self.weighs == "eye":
             return dataclasses.replace(film, bands=0, output_space="xyz")

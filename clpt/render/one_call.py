@@ -110,7 +110,14 @@ def small_picture(scene: Scene) -> bytes:
     shrunk = max(1.0, max(width, height) / SHOWN)
     size = max(round(width / shrunk), 1), max(round(height / shrunk), 1)
     film = dataclasses.replace(
-        scene.film, width=size[0], height=size[1], crop=None, bands=0, layers=(), alpha=False
+        scene.film,
+        width=size[0],
+        height=size[1],
+        crop=None,
+        bands=0,
+        time_bins=0,
+        layers=(),
+        alpha=False,
     )
     shown = dataclasses.replace(scene, film=film, noise=None)
     with Renderer(shown) as renderer:

@@ -222,8 +222,13 @@ class SceneIndex:
 
     @property
     def light_layers(self) -> bool:
-        """Whether the film has layers of light."""
-        return any(LAYERS[name].form == "light" for name in self.layers)
+        """Whether the film has layers of light, or sorts it by time."""
+        return self.timed or any(LAYERS[name].form == "light" for name in self.layers)
+
+    @property
+    def timed(self) -> bool:
+        """Whether the film sorts light by time."""
+        return self.film.time_bins > 0
 
     @property
     def splatting(self) -> bool:

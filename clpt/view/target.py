@@ -113,7 +113,9 @@ def smaller(divider: int) -> Variant:
             x, y = min(crop[0] // divider, width - 1), min(crop[1] // divider, height - 1)
             wide, high = (max(1, round(n / divider)) for n in crop[2:])
             crop = x, y, min(wide, width - x), min(high, height - y)
-        small = dataclasses.replace(film, width=width, height=height, crop=crop, bands=0)
+        small = dataclasses.replace(
+            film, width=width, height=height, crop=crop, bands=0, time_bins=0
+        )
         return dataclasses.replace(scene, film=small)
 
     return variant

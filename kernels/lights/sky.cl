@@ -70,7 +70,7 @@ inline void sky_layers(Scene scene, Slab path, uint at, PathEnd end, Wavelengths
         real w;
         Spectrum radiance = infinite_met(scene, row, v.from, v.receiver, v.d, v.pdf, v.mis_ratio, lambdas, &w);
         Spectrum light = spectrum_mul(beta, spectrum_scale(radiance, w));
-        light_layers_add(scene, path, at, v.seen, end.depth, (integer)(row), light LIGHT_LAYER_PASSED);
+        light_layers_add(scene, path, at, v.seen, end.depth, (integer)(row), (real)(FAR), light LIGHT_LAYER_PASSED);
     }
 }
 

@@ -116,7 +116,7 @@ inline Spectrum emission_mis_weighted(Scene scene, Slab path, uint at, mask flie
 inline void flight_light_layers(Scene scene, Slab path, uint at, mask flies, integer state, Spectrum light FLIGHT_ARGS)
 {
     integer row = scene.settings->light_count;
-    light_layers_add(scene, path, at, flies, state & PATH_DEPTH, row, light LIGHT_LAYER_PASSED);
+    light_layers_add(scene, path, at, flies, state & PATH_DEPTH, row, (real)(0.0f), light LIGHT_LAYER_PASSED);
 }
 
 /* Twin, where the film has no layers of lights. */

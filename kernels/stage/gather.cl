@@ -52,7 +52,7 @@ STAGE(gather_along)(SLAB_ARGS, SCENE_ARGS GATHER_ARGS STAGE_AT_ARG)
         real u = sampler_pair(sampler, DIMENSION_FLIGHT + vertex).x;
         Spectrum light = merge_along(scene, merges, ray, bsdf, sample, u MERGE_PASSED);
         light = spectrum_mul(load_path_beta(path, at), light);
-        light_layers_add(scene, path, at, merges, (integer)(2), (integer)(0), light LIGHT_LAYER_PASSED);
+        light_layers_add(scene, path, at, merges, (integer)(2), (integer)(0), (real)(0.0f), light LIGHT_LAYER_PASSED);
         store_path_radiance(path, at, merges, spectrum_add(load_path_radiance(path, at), light));
     }
 }

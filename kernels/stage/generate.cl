@@ -23,6 +23,7 @@
 #include "generated/first_cone.cl"
 #include "generated/layer_sums.cl"
 #include "generated/scouts_begin.cl"
+#include "generated/optical_length.cl"
 
 /* The beginning of a sample. */
 typedef struct {
@@ -109,6 +110,7 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_escape_width(path, at, go, (real)(0.0f));
     store_path_bodies(path, at, go, (integer)(settings->camera_bodies));
     store_path_ratio(path, at, go, camera_start());
+    length_begin(scene, path, at, go, b.ray.far);
 }
 
 STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)

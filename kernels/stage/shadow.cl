@@ -3,6 +3,7 @@
 #include "generated/join_args.cl"
 #include "generated/shadow_ray.cl"
 #include "generated/light_layers.cl"
+#include "generated/optical_length.cl"
 
 STAGE(shadow)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
 {
@@ -17,7 +18,7 @@ STAGE(shadow)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
         store_path_radiance(path, at, lit, shadow_adds(value, passes, load_path_radiance(path, at)));
 #if LIGHT_LAYERS
         integer surfaces = load_path_state(path, at) & PATH_DEPTH, row = load_path_light(path, at);
-        light_layers_add(scene, path, at, lit, surfaces, row, light LIGHT_LAYER_PASSED);
+        light_layers_add(scene, path, at, lit, surfaces, row, length_of_shadow(shadow, at), light LIGHT_LAYER_PASSED);
 #endif
     }
 }

@@ -1,6 +1,7 @@
 /* A vertex of a path: the incident ray (throughput includes absorption), the surface, scattering, continuation. */
 #include "generated/cone.cl"
 #include "generated/vertex_media.cl"
+#include "generated/optical_length.cl"
 
 typedef struct {
     vec3 o, d;            /* incident ray; d of unit length */
@@ -136,6 +137,7 @@ inline void vertex_leave(Slab path, uint at, mask next, mask null, Vertex v, vec
     store_path_around(path, at, next, vertex_around(v, d));
     store_path_ray_offset(path, at, next, surface_ray_offset(v.s, d));
     store_path_bodies(path, at, next, vertex_through(v, d));
+    length_add(path, at, next, v.t);
 }
 
 /* Adds the vertex to the depth, unless it is a null surface; ends the paths outside of `next`. */
@@ -152,6 +154,7 @@ inline void hide_light(Slab path, uint at, mask hidden, Vertex v) /* a camera ra
     store_path_pdf(path, at, hidden, load_path_pdf(path, at) + v.t);
     store_path_null_distance(path, at, hidden, load_path_null_distance(path, at) + v.t);
     store_path_cone(path, at, hidden, cone_word(v.cone));
+    length_add(path, at, hidden, v.t);
     store_path_mis_ratio(path, at, hidden, (real)(0.0f)); /* light paths cannot pass the light */
 }
 

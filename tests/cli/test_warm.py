@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -56,3 +57,23 @@ def test_it_tells_of_each_scene_and_writes_nothing(tmp_path, monkeypatch, capsys
 def test_a_scene_that_is_not_there(capsys):
     assert run(["warm", "no.json"]) == 2
     assert "no.json" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_every_set_of_kinds_is_compiled(tmp_path):
+    """Of three kinds there are seven sets; a scene of two of them then compiles nothing."""
+    told = clpt(tmp_path, "warm", CORNELL, *OPTIONS, "--kinds", "diffuse,plastic,conductor")
+    programs, found = map(int, re.findall(r"\d+", told.removeprefix(f"{CORNELL}: "))[:2])
+    assert programs >= 7 and found == 0
+    told = clpt(tmp_path, "warm", CORNELL, *OPTIONS, "--kinds", "conductor,diffuse")
+    programs, found = map(int, re.findall(r"\d+", told.removeprefix(f"{CORNELL}: "))[:2])
+    assert found == programs >= 3
+
+
+@pytest.mark.parametrize(
+    ("kinds", "message"),
+    [("glas", "glas"), (",".join(["diffuse"] * 99), "99 kinds need as many shapes")],
+)
+def test_kinds_that_cannot_be_compiled(kinds, message, capsys):
+    assert run(["warm", CORNELL, *OPTIONS, "--kinds", kinds]) == 2
+    assert message in capsys.readouterr().err

@@ -51,6 +51,9 @@ class FilmChanges:
     white_balance: str | float | tuple[float, float] | None = None
     output_space: str | None = None
     bands: int | None = None
+    time_bins: int | None = None
+    time_min: float | None = None
+    time_max: float | None = None
     lambda_min: float | None = None
     lambda_max: float | None = None
     layers: tuple[str, ...] | None = None

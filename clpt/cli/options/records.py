@@ -99,8 +99,8 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "Samples": ("spp", "noise", "limit", "numbers", "sampler", "seed", "period", "resume"),
     "Camera and picture": ("camera", "size", "crop", "env", "env_rotation"),
     "Light transport": (
-        "mode", "integrator", "max_depth", "light_paths", "guiding", "radius", "lambda_min",
-        "lambda_max", "bands",
+        "mode", "kinds", "integrator", "max_depth", "light_paths", "guiding", "radius",
+        "lambda_min", "lambda_max", "bands", "time_bins", "time_min", "time_max",
     ),
     "Colour": (
         "exposure", "tone", "view", "display", "look", "ocio", "sensor", "white_balance",

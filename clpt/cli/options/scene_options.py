@@ -295,6 +295,12 @@ _OPTIONS = (
     click.option(
         "--bands", type=click.IntRange(0), help="Bands of a spectral picture, for .npy and .exr."
     ),
+    click.option(
+        "--time-bins", type=click.IntRange(0),
+        help="Bins of light by its time from the lamp to the film, for .npy and .exr.",
+    ),
+    click.option("--time-min", type=float, help="Where the first bin begins [ns].  [default: 0]"),
+    click.option("--time-max", type=float, help="Where the last bin ends [ns].  [default: 100]"),
     click.option("--lambda-min", type=float, help="Shortest wavelength of the light [nm]."),
     click.option(
         "--lambda-max", type=float, help="Longest wavelength; fluorescence needs 300 to 830."

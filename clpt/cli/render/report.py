@@ -157,6 +157,8 @@ def remarks(
             yield f"{seen.white:.0%} of what is lit is white: {advice}"
         elif seen.black > NEARLY_BLACK and mended > exposure + DARK:
             yield f"{seen.black:.0%} of the picture is black: {advice}"
+    if scene.film.time_bins and (outside := renderer.form.outside(renderer.developed().times())):
+        yield outside
     yield from _outshone(scene)
 
 

@@ -60,6 +60,7 @@ MOST_WRITES = 64  # if more are needed, a single write covers the whole range
 OF_FILM = (
     "width", "height", "margin", "crop_x", "crop_y", "film_width", "film_height", "bands", "alpha",
 )  # fmt: skip
+OF_LAYERS = ("names", "light_groups", "time_bins")
 OF_PATHS = ("light_paths", "guide_paths", "photon_places", "photon_pixels")
 
 
@@ -131,7 +132,7 @@ def refusal(former: Lowered, new: Lowered) -> SceneError | None:
         message = "its size, bands, alpha and the reach of its filter stay; make a new Renderer"
         return SceneError(message, where="film")
     layers, others = former.features.film.layers, new.features.film.layers
-    if (layers.names, layers.light_groups) != (others.names, others.light_groups):
+    if any(vars(layers)[name] != vars(others)[name] for name in OF_LAYERS):
         return SceneError("other layers need a new Renderer", where="film.layers")
     return None
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from clpt.choices import AUTO
 from clpt.errors import SceneError
+from clpt.geometry.instancing import distinct
 from clpt.render.film import colour, filters
 from clpt.scene import Scene
-from clpt.scene.integrators import HAVE_LAYERS
+from clpt.scene.integrators import HAVE_LAYERS, TIMED
 from clpt.scene.layers import LAYERS
 
 LARGEST = 1 << 26  # pixels of a film; its tiles are divided in float32, see kernels/film/film.cl
@@ -25,6 +27,24 @@ def check_film(scene: Scene) -> None:
     if not film.filter.is_constant:
         filters.integrals(film.filter)
     _check_layers(scene)
+    if film.time_bins:
+        _check_times(scene)
+
+
+def _check_times(scene: Scene) -> None:
+    """Raise SceneError where the times of light would not be known."""
+    film, how = scene.film, scene.integrator
+    where = "film.time_bins"
+    if not isinstance(how, TIMED) or how.light_paths not in (0, AUTO):
+        names = ", ".join(cls.kind for cls in TIMED)
+        message = f"only paths from the camera have times: use {names}, without light_paths"
+        raise SceneError(message, where=where)
+    if film.filtering == "splatting":
+        message = 'time_bins need samples that serve one pixel: leave it out, or "importance"'
+        raise SceneError(message, where="film.filtering")
+    media = [m for shape in distinct(scene.shapes) for m in (shape.interior, shape.exterior)]
+    if any(m is not None and m.light is not None for m in (*media, scene.camera.medium)):
+        raise SceneError("light of media that glow has no single time", where=where)
 
 
 def _check_layers(scene: Scene) -> None:

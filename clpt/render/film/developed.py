@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.arrays import Image, Words
+from clpt.arrays import Floats32, Image, Words
 from clpt.errors import SceneError
-from clpt.render.film.layers import layers_of
+from clpt.render.film.layers import layers_of, times_of
 from clpt.render.film.pictures import PictureForm, Still
 from clpt.render.film.state import (
     FILM_WORDS,
@@ -54,6 +54,12 @@ class Developed(Still):
         """The layers by name, (h, w, 1 to 12) float32."""
         variance = self._variance() if "variance" in self.form.layers else None
         return layers_of(self._film.arrays, self, variance)
+
+    def times(self) -> Floats32:
+        """Light by its time, (h, w, time_bins + 1, 3) float32."""
+        if not self.form.time_bins:
+            raise SceneError("this picture has no times; set the film's", where="film.time_bins")
+        return times_of(self.form, self._film.light_layers, self)
 
     def halves(self) -> tuple[Image, Image]:
         """The pictures of even samples and of odd samples. Raises SceneError without them."""

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import images
-from clpt.arrays import Image, Words
+from clpt.arrays import Floats32, Image, Words
 from clpt.choices import Exposure
 from clpt.images import exr_files, spectral_exr
 from clpt.images.colour import View
@@ -170,13 +170,7 @@ def _light(form: PictureForm, words: Words, picture: Pictures) -> dict[str, dict
     names = [name for name in form.layers if LAYERS[name].form == "light"]
     if not names:
         return {}
-    sums = numbers(np.moveaxis(words, 1, 0)).reshape(-1, 3, *words.shape[2:])
-    samples = picture.samples_per_pixel()
-    means = sums[: len(sums) // (1 + form.weighed)] / np.maximum(samples, 1.0)
-    if form.weighed:
-        paths = max(picture.light_paths_per_pixel(), 1e-30)
-        means = means + sums[len(means) :] * ((samples > 0) / np.float32(paths))
-    colours = np.einsum("ij,njhw->nhwi", np.asarray(form.to_output), means).astype(np.float32)
+    colours = _light_colours(form, words[: len(words) - _time_sums(form)], picture)
     light: dict[str, dict[str, Image]] = {}
     for i, name in enumerate(names):  # light_groups comes last: it takes all remaining pictures
         if name == "light_groups":
@@ -185,6 +179,28 @@ def _light(form: PictureForm, words: Words, picture: Pictures) -> dict[str, dict
         else:
             light[name] = {name: colours[i]}
     return light
+
+
+def times_of(form: PictureForm, words: Words, picture: Pictures) -> Floats32:
+    """Return light by time, (h, w, time_bins + 1, 3) float32; arguments are those of `_light`."""
+    colours = _light_colours(form, words[len(words) - _time_sums(form) :], picture)
+    return np.ascontiguousarray(np.moveaxis(colours, 0, 2))
+
+
+def _time_sums(form: PictureForm) -> int:
+    """The sums of a pixel's light by time, which come last."""
+    return 3 * (form.time_bins + 1) if form.time_bins else 0
+
+
+def _light_colours(form: PictureForm, words: Words, picture: Pictures) -> Floats32:
+    """Return the pictures of sums of light (3 n, 3, h, w) in colours, (n, h, w, 3) float32."""
+    sums = numbers(np.moveaxis(words, 1, 0)).reshape(-1, 3, *words.shape[2:])
+    samples = picture.samples_per_pixel()
+    means = sums[: len(sums) // (1 + form.weighed)] / np.maximum(samples, 1.0)
+    if form.weighed:
+        paths = max(picture.light_paths_per_pixel(), 1e-30)
+        means = means + sums[len(means) :] * ((samples > 0) / np.float32(paths))
+    return np.einsum("ij,njhw->nhwi", np.asarray(form.to_output), means).astype(np.float32)
 
 
 def white_paper(film: Film, mode: str) -> NDArray[np.float64]:
@@ -251,8 +267,8 @@ def write_layers(
 
     path: of the file. source: the renderer or film. names: a name of SETS; "blender" gives names
     such as ViewLayer.Combined.R. metadata: further attributes of the file. The picture is stored in
-    half floats; bands and layers are stored in float32. The data window of a crop is its part of
-    the whole film. Raises SceneError.
+    half floats; bands, layers and light by time are stored in float32. The data window of a crop is
+    its part of the whole film. Raises SceneError.
     """
     source = source.developed()
     layers, form = source.layers(), source.form
@@ -260,6 +276,8 @@ def write_layers(
         layers.setdefault("samples", source.samples_per_pixel()[..., None])
     channels = channels_of(layers, names)
     channels |= _beside(source, names)
+    if form.time_bins:
+        channels |= time_channels(source.times())
     if form.bands and form.alpha:
         channels["A"] = source.picture()[..., 3]
     place = exr_files.windows(source.colours().shape, form.place)
@@ -288,11 +306,13 @@ def write_picture(
 ) -> None:
     """Write the picture of a renderer or film in the format of a path's suffix.
 
-    An .exr holds its layers and bands, an .npy its bands or else its colours. Other parameters are
-    as in `write_layers` and `clpt.write_image`. Raises SceneError.
+    An .exr holds its layers, bands and light by time; an .npy light by time, or else bands, or else
+    colours. Other parameters are as in `write_layers` and `clpt.write_image`. Raises SceneError.
     """
     suffix, form = path.suffix.lower(), source.form
-    if form.bands and suffix == ".npy":
+    if form.time_bins and suffix == ".npy":
+        images.write_npy(path, source.developed().times())
+    elif form.bands and suffix == ".npy":
         images.write_npy(path, source.image())
     elif suffix == ".exr":
         write_layers(path, source, names=names, metadata=metadata)
@@ -323,6 +343,16 @@ def channels_of(layers: Mapping[str, Image], names: str = "clpt") -> dict[str, I
             channel = exr_names[i] if exr_names else f"{prefix}.{letter}"
             channels[channel] = -image[..., i] if flipped else image[..., i]
     return channels
+
+
+def time_channels(times: Floats32) -> dict[str, Image]:
+    """Return the channels of light by time (h, w, bins + 1, 3) by names such as time_0000.R."""
+    names = [*(f"time_{i:04d}" for i in range(times.shape[2] - 1)), "time_outside"]
+    return {
+        f"{name}.{letter}": times[:, :, i, c]
+        for i, name in enumerate(names)
+        for c, letter in enumerate("RGB")
+    }
 
 
 def _beside(source: Pictures, names: str) -> dict[str, Image]:

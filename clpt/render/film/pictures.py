@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import device
-from clpt.arrays import Image
+from clpt.arrays import Floats32, Image
 from clpt.choices import DENOISERS
 from clpt.denoise import needs
 from clpt.denoise.oidn import Oidn
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 
+log = logging.getLogger(__name__)
+
+OUTSIDE = 1e-3  # share of light outside of the bins of time that is warned of
 LIGHT_LAYERS = ("layers", "light_layers", "mattes")  # words of layers, as `FilmState` has them
 
 
@@ -51,6 +55,9 @@ class PictureForm:
     bands: int = 0
     lambda_min: float = 360.0
     lambda_max: float = 830.0
+    time_bins: int = 0
+    time_min: float = 0.0
+    time_max: float = 100.0
     output_space: str = "rec709"
     exposure: float = 1.0
     display_exposure: float = 0.0
@@ -66,6 +73,17 @@ class PictureForm:
         """The wavelengths at the centres of the bands, (bands,) [nm]."""
         film = Film(bands=self.bands, lambda_min=self.lambda_min, lambda_max=self.lambda_max)
         return film.band_centres
+
+    def outside(self, times: Floats32) -> str:
+        """Return a sentence on light outside of the bins of `Pictures.times`, "" if it is little.
+
+        The share is of the absolute values of all channels.
+        """
+        light = np.abs(times).sum(axis=(0, 1, 3), dtype=np.float64)
+        share = light[-1] / max(light.sum(), 1e-300)
+        span = f"{self.time_min:g} to {self.time_max:g} ns"
+        reason = "it comes at other times, or from infinitely far"
+        return f"{share:.1%} of the light is not in {span}: {reason}" if share > OUTSIDE else ""
 
 
 class Pictures(ABC):
@@ -118,6 +136,19 @@ class Pictures(ABC):
         form = self.form
         stops = form.display_exposure
         return SpectralImage(self.image(), form.band_centres, emissive=True, exposure=stops)
+
+    def times(self) -> Floats32:
+        """Light by its time from the lamp to the film, (h, w, time_bins + 1, 3) float32.
+
+        In the film's output space, by the bins of `film.time_edges`. The last bin has the light of
+        all other times, and of lamps that are infinitely far away. The sum over all bins is the
+        picture. A warning tells how much light the last bin has. Raises SceneError for a film
+        without `time_bins`.
+        """
+        times = self.developed("words", "light_layers").times()
+        if warning := self.form.outside(times):
+            log.warning("%s", warning)
+        return times
 
     def samples_per_pixel(self) -> Image:
         """Return how many samples each pixel has, (h, w) float32."""
@@ -199,6 +230,10 @@ class DenoisedPicture(Still):
     def layers(self) -> dict[str, Image]:
         """The layers of the film by name, not denoised."""
         return self._layers
+
+    def times(self) -> Floats32:
+        """Light by time, not denoised."""
+        return self._source.times()
 
     def samples_per_pixel(self) -> Image:
         """Return how many samples each pixel has, (h, w) float32."""

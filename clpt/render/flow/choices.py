@@ -67,7 +67,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     ),
     "generated/sky.cl": lambda f, _: (
         *either(f.lights.infinite, "lights/sky.cl"),
-        *either(f.lights.infinite and bool(f.film.layers.lights), "lights/sky.cl#layers"),
+        *either(f.lights.infinite and f.film.layers.light_pictures, "lights/sky.cl#layers"),
     ),
     "generated/join_light.cl": lambda f, _: either(f.shows_lights, "lights/emission.cl#join"),
     "generated/layer_sums.cl": lambda f, _: (
@@ -94,8 +94,11 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/scout_choice.cl": lambda f, _: either(f.scouts, "film/scouts.cl#choice"),
     "generated/mattes.cl": lambda f, _: either(f.film.layers.mattes, "film/layers.cl#mattes"),
     "generated/light_layers.cl": lambda f, _: (
-        *when(f.film.layers.lights, "generated/sampler.cl"),
-        *either(f.film.layers.lights, "film/light_layers.cl"),
+        *when(f.film.layers.light_pictures, "generated/sampler.cl"),
+        *either(f.film.layers.light_pictures, "film/light_layers.cl"),
+    ),
+    "generated/optical_length.cl": lambda f, _: either(
+        f.film.layers.time_bins, "transport/optical_length.cl"
     ),
     "generated/met_weight.cl": lambda f, _: (
         when(f.media.escapes, "integrator/steps/met_emission.cl#weight_escapes")
@@ -180,7 +183,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *either(f.media.emissive, "media/flight.cl#emission"),
     ),
     "generated/light_of_flight.cl": lambda f, _: either(
-        bool(f.film.layers.lights) and not f.transport.light_paths, "media/flight.cl#light_layers"
+        f.film.layers.light_pictures and not f.transport.light_paths, "media/flight.cl#light_layers"
     ),
     "generated/way_steps.cl": lambda f, _: (
         *either(f.media.grids.present, "media/medium_grid.cl#shadow"),
@@ -325,6 +328,9 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         *either(not flags.is_null(f, cls), "integrator/steps/roulette.cl#path"),
         *either(not flags.is_null(f, cls), "integrator/steps/scatters.cl"),
         _escapes(f, cls),
+    ),
+    "generated/index_across.cl": lambda f, cls: either(
+        flags.refracts_widely(f, cls), "transport/optical_length.cl#crossing"
     ),
     "generated/light_path_steps.cl": lambda f, cls: (
         *either(f.transport.joined and not cls.delta, "integrator/steps/join_camera.cl"),

@@ -19,6 +19,7 @@ from clpt.render.geometry.surroundings import (
     boundaries,
     camera_origin,
     contested,
+    index_around,
     media_around,
     media_at,
     stands_still,
@@ -44,8 +45,8 @@ class Analysis:
     index: with the chosen integrator; reason: of the choice, "" without a choice; sphere: centre
     and radius of a sphere around the scene [m]; sources: emission of its lights; sealed: media that
     rays to lights cannot leave; light_media: media around lights; around: the media, or the matter
-    of bodies, at the camera; aims (k, 5): spheres that paths aim at, see `aims` and `escape_lamps`;
-    warnings: of media.
+    of bodies, at the camera; camera_index: of refraction there, 1 where light is not sorted by
+    time; aims (k, 5): spheres that paths aim at, see `aims` and `escape_lamps`; warnings: of media.
     """
 
     index: SceneIndex
@@ -56,6 +57,7 @@ class Analysis:
     sealed: frozenset[Medium]
     light_media: LightMedia
     around: tuple[Any, ...]
+    camera_index: float
     aims: NDArray[np.float32]
     warnings: tuple[str, ...]
 
@@ -83,8 +85,7 @@ def analyse(
     look = Look.of(scene.film, cache)
     sources = sources_of(index, geometry, sphere[1], look)
     index, lit = _media_at_lights(index, geometry, sources, sphere, cache)
-    lights = Lit(index, geometry, look, sources, sphere, lit.extinction)
-    index, reason = decided(lights, former)
+    index, reason = decided(Lit(index, geometry, look, sources, sphere, lit.extinction), former)
     around, warnings = _at_the_camera(scene, index, cache)
     sealed = sealed_media(index, cache) if index.media else frozenset()
     aimed = aims(index, geometry, sphere[1])
@@ -97,6 +98,7 @@ def analyse(
         sealed=sealed,
         light_media=lit,
         around=around,
+        camera_index=index_around(scene, cache) if index.timed else 1.0,
         aims=aimed if len(aimed) else escape_lamps(index, sealed, cache),
         warnings=(*warnings, *surroundings.warnings_of_holes(index, cache)),
     )

@@ -91,6 +91,12 @@ def is_guided(features: Features, cls: type[Scatterer]) -> bool:
     return features.transport.guided and not (unsuited or alone)
 
 
+def refracts_widely(features: Features, cls: type[Scatterer]) -> bool:
+    """Whether light by time asks for the index that lights have beyond a material."""
+    widely = cls.refracts and not cls.delta and cls.source is None
+    return widely and features.film.layers.time_bins > 0
+
+
 def asks_chance(features: Features, cls: type[Scatterer]) -> bool:
     """Whether light paths need the probability that a light tree chooses their light here."""
     glossy = features.transport.balanced and features.lights.gloss > 0
@@ -287,7 +293,7 @@ def layer_args(features: Features) -> dict[str, str]:
 
 def light_layer_args(features: Features) -> dict[str, str]:
     """Return arguments of stages that add to layers of light."""
-    return {"light_layers": "global uint *"} if features.film.layers.lights else {}
+    return {"light_layers": "global uint *"} if features.film.layers.light_pictures else {}
 
 
 def shade_args(features: Features) -> dict[str, str]:

@@ -43,7 +43,7 @@ def lower_names(
     """
     layers, listed = index.layers, index.listed
     names: dict[str, tuple[str, ...]] = {}
-    features = LayerFeatures(layers, present=bool(layers))
+    features = LayerFeatures(layers, bool(layers) or index.timed, time_bins=index.film.time_bins)
     if "crypto_object" in layers:
         if len(listed) > MOST_NAMED:
             message = f"mattes are for {MOST_NAMED:,} shapes, not {len(listed):,}"

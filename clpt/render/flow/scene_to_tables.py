@@ -23,7 +23,7 @@ from clpt.render.film.colour import sensor
 from clpt.render.flow.check import warnings_of
 from clpt.render.flow.find import Analysis, analyse
 from clpt.render.flow.layer_names import lower_names
-from clpt.render.flow.settings import settings_of
+from clpt.render.flow.settings import set_times, settings_of
 from clpt.render.geometry.encode import (
     encode_attributes,
     encode_geometry,
@@ -291,6 +291,8 @@ class _Tables:
             settings[f"camera_{name}"] = word
         settings["second_u"], settings["second_v"] = self.encoder.textures.second_uv
         settings["ambient"], settings["density"] = self.ambient, self.density
+        if self.index.timed:
+            set_times(settings, self.index, self.analysis.camera_index)
         return settings
 
     def append_motion(self) -> int:

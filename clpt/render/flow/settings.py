@@ -15,7 +15,8 @@ from clpt.render.records import LayerFeatures
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.find import Density
 from clpt.render.transport import light_caches
-from clpt.scene.integrators import DEEPEST, Vcm
+from clpt.scene.integrators import DEEPEST, LIGHT_SPEED, Vcm
+from clpt.scene.params import fields_of
 from clpt.spectra.cie import tanh_ends
 
 LARGEST = 62  # exponent of 4 of a unit of areas, which is float32
@@ -102,6 +103,18 @@ def _set_layers(settings: NDArray[np.void], layers: LayerFeatures) -> None:
     settings["matte_material"] = layers.matte_of_materials
     settings["layer_direct"], settings["layer_indirect"] = layers.direct, layers.indirect
     settings["layer_groups"], settings["light_groups"] = layers.groups, layers.light_group_row or 0
+    settings["layer_times"] = layers.times
+
+
+def set_times(settings: NDArray[np.void], index: SceneIndex, camera_index: float) -> None:
+    """Write which optical lengths the bins of a film are; camera_index: at the camera's place."""
+    film, planes = index.film, fields_of(index.camera)
+    settings["time_bins"] = film.time_bins
+    settings["time_first"] = film.time_min * LIGHT_SPEED / camera_index
+    length = (film.time_max - film.time_min) * LIGHT_SPEED / camera_index
+    settings["time_rate"] = film.time_bins / length
+    if "near" in planes:  # the lens is before the origins of the camera's rays
+        settings["near_share"] = planes["near"] / (planes["far"] - planes["near"])
 
 
 def mis_area_unit(scene_radius: float) -> float:

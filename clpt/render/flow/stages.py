@@ -256,7 +256,8 @@ def bsdf_text(features: Features, cls: type[Scatterer]) -> str:
     """Return a kind's struct, functions and loader, under the names that the integrators use."""
     kind = cls.kind
     reflectivity = "(m).reflectivity" if "reflectivity" in device_params(cls) else "(real)(0.0f)"
-    verbs = ("sample", "eval", "pdf", "albedo", "load", *(("pdfs",) if cls.chromatic else ()))
+    others = {"pdfs": cls.chromatic, "across": flags.refracts_widely(features, cls)}
+    verbs = ("sample", "eval", "pdf", "albedo", "load", *(verb for verb in others if others[verb]))
     return "\n".join(
         [
             functions_text(cls, features.spectra.mode, features),

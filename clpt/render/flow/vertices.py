@@ -139,7 +139,10 @@ def vertices(features: Features, lanes: int) -> list[Vertex]:
 
 def _may_share(features: Features, cls: type[Scatterer]) -> bool:
     """Whether a kind may share a vertex: not with photons, guides, escapes, hero wavelengths."""
-    special = (flags.is_chromatic, flags.fluoresces, flags.is_guided, flags.between_bodies)
+    special = (
+        flags.is_chromatic, flags.fluoresces, flags.is_guided, flags.between_bodies,
+        flags.refracts_widely,
+    )  # fmt: skip
     merged = features.transport.merged and flags.gathers_photons(features, cls)
     turning = ("clearcoat_apart", cls.turning_lobe)
     turned = any(flags.has_lobe(features, cls, lobe) for lobe in turning)

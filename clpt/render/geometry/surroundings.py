@@ -39,11 +39,13 @@ from clpt.scene import Film, Scene
 from clpt.scene import materials as mt
 from clpt.scene.cameras import Camera
 from clpt.scene.media import Medium
+from clpt.scene.params import fields_of
 from clpt.scene.shapes import Cylinder, Disk, Shape
-from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum
+from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum, index
 
 MOST_COMPARED = 500  # bodies whose boxes are compared
 NEAR = 1e-3  # least winding number of the boundaries around a point, of a filling of many bodies
+SODIUM = 589.3  # [nm] handbooks give indices for this wavelength
 OPEN = 1e-2  # largest sum of area vectors of a closed boundary, over its area
 
 # The matter of a shape's body, whose first entry is its priority; None for a shape without a body.
@@ -202,6 +204,33 @@ def bodies_at(
             number = _winding(shape, p, cached, time) if within else 0.0
             numbers[body] = numbers.get(body, 0.0) + number
     return tuple(body for body, number in numbers.items() if number > 0.5)
+
+
+def index_around(scene: Scene, cached: LoweringCache | None = None) -> float:
+    """Return the index of refraction at the camera's place, at the yellow line of sodium.
+
+    Outside of all bodies it is 1. Bodies lie one in another, or have a priority: then the highest
+    fills the place. Raises as `media_around` does.
+    """
+    time = moment(scene.camera)
+    p = camera_origin(scene.camera, scene.film, time)
+    factors: dict[int, float] = {}  # by priority
+    for shape in every(scene.shapes, lambda shape: _bends(shape) != 1.0):
+        low, high = _swept_box(shape, cached, time)
+        if _bends(shape) != 1.0 and ((p >= low) & (p <= high)).all():
+            turns = round(_winding(shape, p, cached, time))
+            factors[shape.priority] = factors.get(shape.priority, 1.0) * _bends(shape) ** turns
+    return factors[max(factors)] if factors else 1.0
+
+
+def _bends(shape: Shape) -> float:
+    """Return the index behind the boundary of a shape, over that before it; 1 of a sheet."""
+    for part in mt.parts(shape.material):
+        inside = float(index(cast("Spectrum | str", part.inside_index)).sample(SODIUM))
+        if part.transmits and not part.is_sheet and inside > 0.0:
+            outside = index(fields_of(part).get("ext_ior", Constant(1.0)))
+            return inside / float(outside.sample(SODIUM))
+    return 1.0
 
 
 def warnings_of(around: tuple[Filling, ...]) -> list[str]:

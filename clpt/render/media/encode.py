@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Words
 from clpt.records import MEDIUM_BITS
-from clpt.render.geometry.surroundings import Absorber, Filling
+from clpt.render.geometry.surroundings import SODIUM, Absorber, Filling
 from clpt.render.lights.bodies import BodyLight, BrickLights, black_bodies, brick_counts
 from clpt.render.lights.bounds import Bounds
 from clpt.render.lights.find import Sources
@@ -30,7 +30,6 @@ from clpt.scene.phases import Phase
 from clpt.scene.shapes import Shape
 from clpt.spectra import Constant, Spectrum, index
 
-SODIUM = 589.3  # [nm] handbooks give indices for this wavelength
 WIDEST_CONE = 1.4  # [rad] a lamp of a larger half angle counts as having no cone
 
 

@@ -48,6 +48,7 @@ class LayerFeatures:
     primitive_rows: int = 0  # where those stand of shapes whose primitives have other rows
     light_groups: int = 0  # of lights, where there is a layer for each
     light_group_row: int | None = None  # where in `distributions` they are
+    time_bins: int = 0  # of light by time
 
     @property
     def places(self) -> dict[str, int]:
@@ -108,8 +109,13 @@ class LayerFeatures:
     @macro("LIGHT_LAYERS")
     def light_pictures(self) -> int:
         """Number of pictures of light beside the picture, of each group of sums."""
-        groups = self.light_groups if "light_groups" in self.lights else 1
-        return len(self.lights) - 1 + groups if self.lights else 0
+        names = len(self.lights) + (self.light_groups - 1 if self.groups else 0)
+        return names + (self.time_bins + 1 if self.time_bins else 0)
+
+    @property
+    def times(self) -> int:
+        """1 more than where light by time begins, which comes last; 0 where there is none."""
+        return self.light_pictures - self.time_bins if self.time_bins else 0
 
     @property
     def direct(self) -> int:

@@ -149,7 +149,7 @@ class MaterialFeatures:
 
 MOST = 255  # kinds in a scene: what the upper bits of a material word count, but for mixtures
 CONTRACT = ("sample", "eval", "pdf", "albedo")  # what each has, see kernels/materials/bsdf.cl
-VERBS = (*CONTRACT, "pdfs", "load", "colour")
+VERBS = (*CONTRACT, "pdfs", "across", "load", "colour")
 # what else tables keep sources under, see clpt.render.records.tables
 INNER = ("perturbation", "emission", "factor", "layer", "mixture")
 

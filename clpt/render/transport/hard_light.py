@@ -89,7 +89,9 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
         plain = Path(light_paths=former.light_paths, guiding=guiding, guide_paths=guide_paths)
         chosen = former if keeps else plain
         reason = "as before the scene was edited"
-    if index.light_layers and index.adaptive:
+    if index.timed:
+        chosen, reason = Path(light_paths=0), "the film sorts light by time"
+    elif index.light_layers and index.adaptive:
         chosen, reason = Path(light_paths=0), "layers of light have no guides of noise"
     elif "light_groups" in index.layers and chosen.has_photons:
         chosen, reason = Path(light_paths=chosen.light_paths), "photons do not know their group"

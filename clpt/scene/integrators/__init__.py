@@ -1,6 +1,7 @@
 """Integrators, samplers, filters and the film: how a scene becomes a picture."""
 
 from clpt.scene.integrators.film import (
+    LIGHT_SPEED,
     MOST_BANDS,
     BlackmanHarris,
     Box,
@@ -35,14 +36,15 @@ NO_AOV = (  # for scenes of former versions
 )
 KINDS = (Auto, Path, Vcm, Direct, Whitted, ParticleTracer)
 HAVE_LAYERS = (Auto, Path, Vcm, Direct)  # beside the picture
+TIMED = (Auto, Path, Direct)  # whose light has known times
 SAMPLERS = (Sobol, Zsobol, Independent)
 PIXELWISE = (Sobol, Independent)  # samplers whose pixels do not know of each other
 FILTERS = (Box, Tent, Gaussian, Mitchell, Lanczos, BlackmanHarris)
 
 __all__ = [
-    "DEEPEST", "FILTERS", "HAVE_LAYERS", "KINDS", "MOST_BANDS", "MOST_GUIDE_PATHS",
-    "NO_AOV", "PIXELWISE", "SAMPLERS", "Auto", "BlackmanHarris", "Box", "Direct", "Film",
-    "Filter", "Gaussian", "Independent", "Integrator", "Lanczos", "Mitchell",
+    "DEEPEST", "FILTERS", "HAVE_LAYERS", "KINDS", "LIGHT_SPEED", "MOST_BANDS",
+    "MOST_GUIDE_PATHS", "NO_AOV", "PIXELWISE", "SAMPLERS", "TIMED", "Auto", "BlackmanHarris", "Box",
+    "Direct", "Film", "Filter", "Gaussian", "Independent", "Integrator", "Lanczos", "Mitchell",
     "ParticleTracer", "Path", "Sampler", "Sobol", "Tent", "Vcm", "Whitted", "Zsobol",
     "is_long", "shared",
 ]  # fmt: skip

@@ -22,6 +22,8 @@ from clpt.spectra.spaces import TEMPERATURES
 from clpt.spectra.spectrum import LONGEST, SHORTEST
 
 MOST_BANDS = 1024
+MOST_TIME_BINS = 1 << 16
+LIGHT_SPEED = 0.299792458  # [m/ns]
 GAUSSIAN_CUT = 4.0  # radius of a Gaussian without `radius` [standard deviations]
 NARROWEST = 0.01  # [nm], a range of wavelengths
 
@@ -163,6 +165,9 @@ class Film(Kind):
     radiance of each part [W m^-2 sr^-1 nm^-1]. `white_balance` makes its illuminant the white of
     `output_space` (Bradford). Without it colours are those of the sensor. `bands` and a `sensor`
     other than cie1931 need the spectral mode.
+
+    With `time_bins` light is sorted by its time from the lamp to the film: the range of times has
+    so many equal parts, and a pixel holds the light of each part beside the picture.
     """
 
     shorthands = (
@@ -201,6 +206,9 @@ class Film(Kind):
         "cie1931", "its curves: cie1931, cie1964 or a clpt.spectra.Sensor", form="sensor"
     )
     bands: int = host(0, "of a spectral picture; 0: a picture of three colours")
+    time_bins: int = host(0, "of light by its time from the lamp to the film; 0: none")
+    time_min: float = real(0.0, "where the first of them begins", "ns", 0.0)
+    time_max: float = real(100.0, "where the last ends; light goes 0.3 m in 1 ns", "ns", 0.0)
     white_balance: str | float | tuple[float, float] = host(
         "none",
         "the colour that becomes white: none, an illuminant, a temperature [K], or (x, y)",
@@ -233,6 +241,11 @@ class Film(Kind):
         ends = np.linspace(self.lambda_min, self.lambda_max, self.bands + 1)
         return (ends[1:] + ends[:-1]) / 2.0
 
+    @property
+    def time_edges(self) -> np.ndarray:
+        """The ends of the bins of time (time_bins + 1,) float64 [ns]."""
+        return np.linspace(self.time_min, self.time_max, self.time_bins + 1)
+
     def check(self) -> None:
         for name, size in (("width", self.width), ("height", self.height)):
             whole(size, 1, 65536, where=f"film.{name}")
@@ -250,6 +263,9 @@ class Film(Kind):
                 where="film.lambda_min",
             )
         whole(self.bands, 0, MOST_BANDS, where="film.bands")
+        whole(self.time_bins, 0, MOST_TIME_BINS, where="film.time_bins")
+        if self.time_bins and not self.time_min < self.time_max < np.inf:
+            raise SceneError("must be above time_min, and finite", where="film.time_max")
         named = isinstance(self.sensor, str) and self.sensor in OBSERVERS
         if not named and not isinstance(self.sensor, Sensor):
             known = f"{', '.join(OBSERVERS)}, nor a Sensor"

@@ -65,6 +65,10 @@ class Principled(Material):
     clearcoat_gloss: TexturedNumber = share(0.0, "how smooth that is")
 
     @property
+    def inside_index(self) -> IndexLike:
+        return self.eta
+
+    @property
     def transmits(self) -> bool:
         return self.spec_trans != 0.0
 

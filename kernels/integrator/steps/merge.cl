@@ -7,8 +7,8 @@ inline void merge_at_vertex(Scene scene, Slab path, uint at, mask met, Vertex v,
         integer sample = load_path_sample(path, at);
         Spectrum merged = merge_photons(scene, merges, v, scatter, mis_ratio, ratio, sample MERGE_PASSED);
         /* This light has been at a specular vertex and at this vertex, so its depth is 2. Its group is unknown. */
-        light_layers_add(scene, path, at, merges, (integer)(2), (integer)(0), spectrum_mul(v.beta, merged)
-                         LIGHT_LAYER_PASSED);
+        light_layers_add(scene, path, at, merges, (integer)(2), (integer)(0), (real)(0.0f),
+                         spectrum_mul(v.beta, merged) LIGHT_LAYER_PASSED);
         merged = spectrum_add(load_path_radiance(path, at), spectrum_mul(v.beta, merged));
         store_path_radiance(path, at, merges, merged);
     }

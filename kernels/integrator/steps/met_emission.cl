@@ -1,6 +1,7 @@
 /* Step. */
 /* Light that a path from the camera meets, on surfaces that shine. */
 #include "generated/met_weight.cl"
+#include "generated/optical_length.cl"
 
 /* Adds the emission of the surface to the `active` paths. Returns the paths that do not see this light: camera rays, if
  * `hide_lights` is set. They continue behind the light. */
@@ -19,7 +20,7 @@ inline mask add_emission(Scene scene, Slab path, uint at, mask active, Vertex v 
         Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(v.s), v.lambdas);
         le = spectrum_scale(spectrum_mul(v.beta, le), w);
         store_path_radiance(path, at, lit, spectrum_add(load_path_radiance(path, at), le));
-        light_layers_add(scene, path, at, lit, v.depth, light, le LIGHT_LAYER_PASSED);
+        light_layers_add(scene, path, at, lit, v.depth, light, length_after(path, at, v.t), le LIGHT_LAYER_PASSED);
     }
     return hidden;
 }

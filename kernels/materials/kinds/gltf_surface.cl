@@ -402,3 +402,5 @@ BsdfSample gltf_surface_sample(GltfSurface m, vec3 wo, vec3 u)
 }
 
 Spectrum gltf_surface_albedo(GltfSurface m) { return m.base_color; }
+
+real gltf_surface_across(GltfSurface m) { return sel(m.thin != 0, (real)(1.0f), gltf_parts(m).eta.x); }

@@ -459,3 +459,5 @@ BsdfSample openpbr_sample(Openpbr m, vec3 wo, vec3 u)
 }
 
 Spectrum openpbr_albedo(Openpbr m) { return m.base_color; }
+
+real openpbr_across(Openpbr m) { return sel(m.thin_walled != 0, (real)(1.0f), openpbr_index(m).x); }

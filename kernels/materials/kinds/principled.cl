@@ -173,3 +173,5 @@ BsdfSample principled_sample(Principled m, vec3 wo, vec3 u)
 }
 
 Spectrum principled_albedo(Principled m) { return m.base_color; }
+
+real principled_across(Principled m) { return principled_index(m).x; }

@@ -112,3 +112,5 @@ BsdfSample rough_dielectric_sample(RoughDielectric m, vec3 wo, vec3 u)
 }
 
 Spectrum rough_dielectric_albedo(RoughDielectric m) { return m.specular_transmittance; }
+
+real rough_dielectric_across(RoughDielectric m) { return rough_dielectric_index(m).x; }
