@@ -142,6 +142,8 @@ def is_affine(matrix: Matrix) -> bool:
 def is_singular(matrix: ArrayLike) -> bool:
     """Whether a 4x4 matrix flattens space (or holds inf or nan), whatever its overall scale."""
     matrix = np.asarray(matrix, np.float64)
+    if matrix.tobytes() == IDENTITY.tobytes():  # of most files of meshes
+        return False
     if not np.isfinite(matrix).all():
         return True
     linear = matrix if matrix[3, :3].any() else matrix[:3, :3]

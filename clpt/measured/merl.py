@@ -148,8 +148,9 @@ def _seen(
     return wi[:, 2], light * lit[:, None], solid
 
 
-def _nearest(values: NDArray[Any], m: Floats, wo: Floats, wi: Floats) -> Floats:
-    """Return the table's nearest values (n, 3) at halfway directions m."""
+def angles(m: Floats, wo: Floats, wi: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the angles [rad] of directions (n, 3): of m, the halfway direction, to the normal; of
+    wi to m; and the azimuth of wi about m."""
     halfway = np.arctan2(np.hypot(m[:, 0], m[:, 1]), m[:, 2])
     difference = np.arctan2(np.linalg.norm(wi - wo, axis=1), np.linalg.norm(wi + wo, axis=1))
     turn = np.arctan2(m[:, 1], m[:, 0])
@@ -157,6 +158,12 @@ def _nearest(values: NDArray[Any], m: Floats, wo: Floats, wi: Floats) -> Floats:
     along = wi[:, 0] * c + wi[:, 1] * s
     side = wi[:, 1] * c - wi[:, 0] * s
     phi = np.arctan2(side, np.cos(halfway) * along - np.sin(halfway) * wi[:, 2])
+    return halfway, difference, phi
+
+
+def _nearest(values: NDArray[Any], m: Floats, wo: Floats, wi: Floats) -> Floats:
+    """Return the table's nearest values (n, 3) at halfway directions m."""
+    halfway, difference, phi = angles(m, wo, wi)
     at = np.sqrt(halfway * 2.0 / np.pi), difference * 2.0 / np.pi, (phi / np.pi) % 1.0
     cells = [np.clip((a * n).astype(int), 0, n - 1) for a, n in zip(at, values.shape, strict=False)]
     return np.asarray(values[tuple(cells)], np.float64)

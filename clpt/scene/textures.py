@@ -9,6 +9,7 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clpt import images
 from clpt.arrays import Floats, Floats32, on_host
@@ -46,6 +47,7 @@ from clpt.scene.values import (
     separated,
 )
 from clpt.scene.values import Texture as Texture
+from clpt.scene.volumes import Volume, check_volume
 from clpt.spectra import Constant, RGBIlluminant, Spectrum
 
 ATTRIBUTES = ("vertex_", "face_")  # prefixes of the names of attributes
@@ -433,7 +435,52 @@ class Marble(Solid):
         return {**octaves, "scale": self.scale, "variation": self.variation}
 
 
-KINDS = (Bitmap, Checkerboard, Product, Mix, MeshAttribute, Dots, Checkers, Noise, Marble)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Voxels(Solid):
+    """Numbers or colours on a grid in a box, which is the unit cube of the texture's space.
+
+    The values are those at the centres of the box's cells. A parameter that is a number takes the
+    luminance of colours. The texture budget does not count them.
+    """
+
+    values: NDArray[Any] | Volume = host(
+        np.full((1, 1, 1), 0.5, np.float32),
+        "(nx, ny, nz), (nx, ny, nz, 1) or colours (nx, ny, nz, 3), none of them negative; the box "
+        "of a `Volume` lies in the texture's space",
+        form="colour_volume",
+    )
+    filter: str = choice("trilinear", "between the centres", ("trilinear", "nearest"))
+    wrap: str = choice("clamp", "outside of the box; zero: black", WRAPS)
+
+    def check(self) -> None:
+        super().check()
+        stored = self.values
+        if isinstance(stored, Volume):
+            inverse = np.linalg.inv(np.asarray(stored.to_world, float))
+            object.__setattr__(self, "to_texture", inverse @ self.to_texture)
+            stored = stored.values
+        values = np.asarray(on_host(stored))
+        values = values[..., 0] if values.shape[3:] == (1,) else values
+        check_volume(values, f"{self.kind}.values", colours=values.ndim > 3)
+        values = values if values.ndim > 3 else values[..., None]
+        object.__setattr__(self, "values", np.asarray(values, np.float32))
+
+    @property
+    def slices(self) -> Floats32:
+        """Its values (nz, ny, nx, 1 or 3)."""
+        return np.asarray(self.values).transpose(2, 1, 0, 3)
+
+    def channel_factors(self, channel: int) -> list[Any]:
+        values = np.asarray(self.values)
+        number = channel if values.shape[3] > 1 else 0
+        return [dataclasses.replace(self, values=values[..., number])]
+
+    def mean(self, look: Look) -> float:
+        rgb = np.broadcast_to(self.slices.mean(axis=(0, 1, 2), dtype=np.float64), 3)
+        return look.brightness(RGBIlluminant(*rgb.tolist()))
+
+
+KINDS = (Bitmap, Checkerboard, Product, Mix, MeshAttribute, Dots, Checkers, Noise, Marble, Voxels)
 
 
 def _matrix(texture: Texture, name: str, size: int) -> None:

@@ -21,7 +21,9 @@ from clpt.scene.textures import (
     Mix,
     Noise,
     Product,
+    Voxels,
 )
+from clpt.scene.volumes import Volume
 from clpt.transforms import rotate, scale, translate
 
 from .studio import PLACES, SMALL, WIDE, Picture, arc, lathe, near_camera, studio
@@ -111,6 +113,12 @@ def squares(n: float, dark: Any = DARK, light: Any = CREAM) -> Checkerboard:
     return Checkerboard(color0=light, color1=dark, to_uv=uv_scale(4 * n, 3 if n == 1 else 4))
 
 
+def voxels() -> Voxels:
+    colours = np.random.default_rng(2).uniform(0.02, 0.75, (8, 5, 5, 3))
+    box = translate([-1.7, 0.0, -1.0]) @ scale([3.4, 1.7, 2.0])
+    return Voxels(values=Volume(colours, box))
+
+
 def dots(n: float) -> Mix:
     spots = Dots(to_uv=uv_scale(10 * n, 7.5 if n == 1 else 8))
     return Mix(first=CREAM, second=RED, amount=spots)
@@ -139,4 +147,7 @@ TEXTURES = {
     ),
     "noise": Picture("`fbm`, `wrinkled` and `windy`, as the `amount` of a `mix`.", noises),
     "marble": board_and_ball("The same in space on both.", lambda _: Marble(scale=2.0)),
+    "voxels": board_and_ball(
+        "Random colours at 8 x 5 x 5 points in a box around both.", lambda _: voxels()
+    ),
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.ndimage import map_coordinates
 
 from clpt import spectra
 from clpt.errors import SceneError
@@ -12,7 +13,9 @@ from clpt.render.textures.cases import dispatch_text
 from clpt.render.textures.encode import MARBLE, PERMUTATION
 from clpt.scene import textures as scene
 from clpt.scene.roles import NAMED, Param
+from clpt.scene.volumes import Volume
 from clpt.spectra.spectrum import d65
+from clpt.spectra.upsampling import evaluate
 from tests.kernels.harness import assert_lanes_agree
 from tests.kernels.scene_harness import SceneProbe
 from tests.kernels.test_textures import FILE, LAMBDAS, reference
@@ -137,6 +140,66 @@ def test_dots():
     assert (found != inside).mean() < 0.01  # at an edge rounding may choose either
 
 
+VALUES = np.random.default_rng(5).random((3, 4, 5, 3)).astype(np.float32)
+
+
+@pytest.mark.parametrize("wrap", scene.WRAPS)
+def test_voxels(wrap):
+    """Colours and numbers beside one another, against scipy in float64."""
+    p = placed(PLACES[3:])
+    modes = {"clamp": "nearest", "repeat": "grid-wrap", "mirror": "reflect"}
+    mode = modes.get(wrap, "grid-constant")
+    points = (p * VALUES.shape[:3] - 0.5).T
+    each = [
+        map_coordinates(VALUES[..., i].astype(float), points, order=1, mode=mode) for i in range(3)
+    ]
+    expected = np.stack(each, axis=1)
+    made = [
+        scene.Voxels(values=VALUES, wrap=wrap, to_texture=MOVED),
+        scene.Voxels(values=Volume(VALUES, np.linalg.inv(MOVED)), wrap=wrap),
+    ]
+    for lanes in (1, 8):
+        found = look_up(made, "reflectance", PLACES[3:], lanes=lanes)
+        np.testing.assert_allclose(found, expected, atol=2e-5)
+    grey = scene.Voxels(values=VALUES[..., 0], wrap=wrap, to_texture=MOVED)
+    np.testing.assert_allclose(look_up([grey], "real", PLACES[3:]), expected[:, 0], atol=2e-5)
+    numbers = look_up(made, "real", PLACES[3:])
+    np.testing.assert_allclose(numbers, spectra.luminance(expected), atol=2e-5)
+    lamp = look_up(made, "emission", PLACES[3:])
+    np.testing.assert_allclose(lamp, expected, atol=2e-5)
+
+
+def test_nearest_voxels_of_spectra():
+    p = placed(PLACES[3:])
+    index = np.clip(np.floor(p * VALUES.shape[:3]).astype(int), 0, np.array(VALUES.shape[:3]) - 1)
+    colours = VALUES[tuple(index.T)]
+    voxels = scene.Voxels(values=VALUES, filter="nearest", to_texture=MOVED)
+    expected = evaluate(spectra.uplift(colours), np.array(LAMBDAS))
+    found = look_up([voxels], "reflectance", PLACES[3:], mode="spectral")
+    off = np.abs(found - expected).max(axis=1) > 1e-4
+    assert off.mean() < 0.01  # at a border rounding may choose either
+
+
+@pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror"])
+@pytest.mark.parametrize("smoothing", ["trilinear", "nearest"])
+def test_same_voxels_as_mitsuba(wrap, smoothing):
+    mi = pytest.importorskip("mitsuba", reason="the renderer that we compare with is not installed")
+    mi.set_variant("scalar_rgb")
+    entry = {"type": "gridvolume", "grid": mi.VolumeGrid(VALUES.transpose(2, 1, 0, 3).copy())}
+    entry |= {"filter_type": smoothing, "wrap_mode": wrap, "raw": True}
+    entry |= {"to_world": mi.ScalarTransform4f(np.linalg.inv(MOVED))}
+    theirs = mi.load_dict({"type": "volume", "volume": entry})
+    si, places = mi.SurfaceInteraction3f(), PLACES[3:]
+    expected = np.empty((len(places), 3))
+    for i, place in enumerate(places):
+        si.p = mi.Point3f(*map(float, place))
+        expected[i] = theirs.eval_3(si)
+    voxels = scene.Voxels(values=VALUES, filter=smoothing, wrap=wrap, to_texture=MOVED)
+    found = look_up([voxels], "reflectance", places)
+    off = np.abs(found - expected).max(axis=1) > 1e-4
+    assert off.mean() < (0.01 if smoothing == "nearest" else 1e-9)
+
+
 @pytest.mark.parametrize("lanes", [1, 8])
 def test_mappings(lanes):
     """Each beside the others, and beside the surface's own uv."""
@@ -163,6 +226,9 @@ def test_mappings(lanes):
         (lambda: scene.Marble(octaves=99), "marble.octaves"),
         (lambda: scene.Checkers(to_texture=np.eye(3)), "checkers.to_texture"),
         (lambda: scene.Bitmap(mapping="cubic"), "planar"),
+        (lambda: scene.Voxels(values=VALUES[..., :2]), "voxels.values: must be an array"),
+        (lambda: scene.Voxels(values=VALUES[0, 0]), "voxels.values"),
+        (lambda: scene.Voxels(values=-VALUES), "negative"),
     ],
 )
 def test_unusable(make, part):

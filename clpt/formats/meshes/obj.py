@@ -30,6 +30,7 @@ NUMBERS, INDICES = b"0123456789+-.eE \t\n", b"0123456789+- \t\n"
 # A comment is not continued, nor is a name whose last letter ends in a backslash in Shift-JIS.
 CONTINUED = re.compile(rb"#[^\n]*|(?<![\x80-\xff])\\\n")
 LINES = {VERTEX: re.compile(rb"\n[ \t]*v[ \t]"), FACE: re.compile(rb"\n[ \t]*fo?[ \t]")}
+DIGITS = b"0123456789"
 INDEX = re.compile(rb"[+-]?\d+")
 NUMBER = re.compile(rb"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|nan|inf(inity)?)", re.IGNORECASE)
 NOT_FINITE = re.compile(rb"[+-]?1\.#(q?nan|snan|ind|inf)\d*", re.IGNORECASE)  # of Microsoft's C
@@ -249,18 +250,15 @@ class _Reader:
         """Read the faces of a piece; before: how many of each kind of numbers precede the piece."""
         rows = np.flatnonzero(lines.kind == FACE)
         cut = _cut(plain, lines, rows)
-        fields, counts = _fields(cut)
-        values = _parsed(cut.replace(b"/", b" "), INDICES, np.int64, len(fields))
-        if values is None or (fields < 0).any() or not values.all():
+        counts = lines.words[rows] - 1
+        indices = _alike(cut, len(rows), int(counts.sum()))
+        if indices is None:
+            indices = _named(cut, int(counts.sum()))
+        if indices is None:
             self.explain(at, plain, lines, rows)
-        is_vertex = fields == 0
         corners = np.empty((int(counts.sum()), 3), np.int32)
         for column, kind in enumerate(NAMES):
-            mine = fields == column
-            named = values[mine]
-            if len(named) != len(corners):
-                named = np.zeros(len(corners), np.int64)
-                named[(np.cumsum(is_vertex) - 1)[mine]] = values[mine]
+            named = indices[column]
             if named.min(initial=0) < 0:
                 precede = before[kind] + np.cumsum(lines.kind == kind)[rows]
                 counted = np.repeat(precede, counts) + named + 1
@@ -403,8 +401,43 @@ def _columns(values: Floats32, words: Integers, first: int, last: int) -> Floats
     return columns
 
 
-def _fields(cut: bytes) -> tuple[NDArray[np.int8], Integers]:
-    """Return for each number of faces what it names, and for each face how many corners it has.
+def _alike(cut: bytes, faces: int, corners: int) -> NDArray[np.int64] | None:
+    """Return the indices (3, corners) of faces that are all written alike; None of others.
+
+    A corner has a vertex, an uv and a normal, or fewer from the first on; 0 stands for the rest.
+    """
+    marks = cut.translate(None, DIGITS)
+    line = marks[: marks.find(b"\n") + 1]
+    each, odd = divmod(line.count(b"/") * faces + corners, max(corners, 1))
+    if b"//" in cut or odd or not 1 <= each <= 3:
+        return None
+    if len(marks) != len(line) * faces or marks != line * faces:
+        return None
+    if not {b"/" * (each - 1)}.issuperset(line.split()):
+        return None
+    values = _parsed(cut.replace(b"/", b" "), INDICES, np.int64, each * corners)
+    if values is None or not values.all():
+        return None
+    indices = np.zeros((3, corners), np.int64)
+    indices[:each] = values.reshape(-1, each).T
+    return indices
+
+
+def _named(cut: bytes, corners: int) -> NDArray[np.int64] | None:
+    """Return the indices (3, corners) of faces, 0 where a corner names none; None if one is
+    wrong."""
+    fields = _fields(cut)
+    values = _parsed(cut.replace(b"/", b" "), INDICES, np.int64, len(fields))
+    vertex = fields == 0
+    if values is None or (fields < 0).any() or not values.all() or vertex.sum() != corners:
+        return None
+    indices = np.zeros((3, corners), np.int64)
+    indices[fields, np.cumsum(vertex) - 1] = values
+    return indices
+
+
+def _fields(cut: bytes) -> NDArray[np.int8]:
+    """Return for each number of faces what it names.
 
     0: a vertex, 1: an uv, 2: a normal; -1: more than a corner can have.
     """
@@ -423,6 +456,4 @@ def _fields(cut: bytes) -> tuple[NDArray[np.int8], Integers]:
         fields[(slash & (before == 2)) | (twice & (before != 0))] = -1
     if b"///" in cut or b" /" in cut or b"\t/" in cut:
         fields[:1] = -1
-    newlines = np.flatnonzero(letters == NEWLINE)
-    ends = np.searchsorted(starts[fields == 0], newlines)
-    return fields, np.diff(ends, prepend=0)
+    return fields

@@ -8,16 +8,10 @@ from typing import Any
 import numpy as np
 
 from clpt import measured, spectra
+from clpt.formats.mitsuba.coats import KINDS as COATS
+from clpt.formats.mitsuba.coats import SMOOTHEST, Coat
 from clpt.formats.mitsuba.limits import within
-from clpt.formats.mitsuba.principled import KINDS as COATS
-from clpt.formats.mitsuba.principled import (
-    SMOOTHEST,
-    Coat,
-    fluorescent,
-    hair,
-    principled,
-    principled_thin,
-)
+from clpt.formats.mitsuba.principled import fluorescent, hair, principled, principled_thin
 from clpt.formats.mitsuba.properties import Context, PluginReader, Properties, numbers, unknown
 from clpt.formats.mitsuba.spectra import (
     coefficient,
@@ -295,6 +289,17 @@ def _measured(props: Properties) -> Parameters:
         return {"data": measured.read(path)}
 
 
+def _measured_polarized(props: Properties) -> Parameters:
+    """Take the unpolarised part of a measurement; `alpha_sample` changes no picture."""
+    props.ignore("alpha_sample")
+    props.context.warn(props.element, "light has no polarisation here: its first number is taken")
+    wavelength = props.number("wavelength", -1.0)
+    child, path = props.named.get("filename", props.element), props.file()
+    with child.locating():
+        alone = None if wavelength == -1.0 else wavelength
+        return {"data": measured.read_polarized(path, alone)}
+
+
 def _null(props: Properties) -> Parameters:
     return {}
 
@@ -354,7 +359,7 @@ def _ward(props: Properties) -> Parameters:
 
 
 def _coated(element: Element, context: Context) -> Material:
-    """Read Mitsuba 0.6's `coating` and `roughcoating`, see principled.py."""
+    """Read Mitsuba 0.6's `coating` and `roughcoating`, see coats.py."""
     props = Properties(element, context)
     (inner,) = _nested(props, 1, 1)
     rough = element.type == "roughcoating"
@@ -444,6 +449,7 @@ PLUGINS: dict[str, tuple[type[Material], PluginReader[Parameters]]] = {
     "fluorescent": (materials.Fluorescent, fluorescent),
     "hair": (materials.Hair, hair),
     "measured": (materials.Measured, _measured),
+    "measured_polarized": (materials.Merl, _measured_polarized),
     "difftrans": (materials.DiffuseTransmission, _diffuse_transmission),
     "mixturebsdf": (materials.Blend, _mixture),
     "null": (materials.Null, _null),

@@ -1,5 +1,7 @@
 """<volume>s of a Mitsuba scene: constants, and numbers on grids, brought to the points of a medium.
 
+A grid of a surface is a texture by itself.
+
 A medium of clpt has all its numbers at the points of a single lattice, and ends with its box. In
 Mitsuba each volume has its own lattice, and continues beyond the lattice with its outermost
 values; a heterogeneous medium ends with the box of `sigma_t`, a homogeneous medium does not end.
@@ -17,6 +19,7 @@ from clpt import transforms
 from clpt.formats import volumes
 from clpt.formats.mitsuba.properties import Context, Properties
 from clpt.formats.mitsuba.xml import Element
+from clpt.scene.textures import Voxels
 from clpt.scene.volumes import Volume, resampled
 
 Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -60,8 +63,28 @@ def _colours(element: Element, context: Context) -> Volume:
 
 
 def channels(element: Element, context: Context) -> Volume:
-    """Return the numbers of a grid (nx, ny, nz, 1 or 3), read once for all references."""
-    return _kept("channels", element, context, _read)
+    """Return the numbers of a grid (nx, ny, nz, 1 or 3) of a medium."""
+    return _kept("channels", element, context, _channels)
+
+
+def _channels(element: Element, context: Context) -> Volume:
+    volume, smoothing, wrap = _kept("grid", element, context, _read)
+    if wrap != "clamp":
+        context.warn(element, "at its ends the grid goes on as 'clamp'")
+    if smoothing != "trilinear":
+        context.warn(element, "the grid is trilinear, not 'nearest'")
+    return volume
+
+
+def voxels(element: Element, context: Context) -> Voxels:
+    """Return the texture of a surface that a grid is, the same for all references."""
+    return _kept("voxels", element, context, _voxels)
+
+
+def _voxels(element: Element, context: Context) -> Voxels:
+    volume, smoothing, wrap = _kept("grid", element, context, _read)
+    with element.locating():
+        return Voxels(values=volume, filter=smoothing, wrap=wrap)
 
 
 def _kept(
@@ -74,7 +97,8 @@ def _kept(
     return context.volumes[key]
 
 
-def _read(element: Element, context: Context) -> Volume:
+def _read(element: Element, context: Context) -> tuple[Volume, str, str]:
+    """Return a grid (nx, ny, nz, 1 or 3), and how it goes on between its points and outside."""
     props = Properties(element, context)
     props.ignore("raw", "accel")
     to_world, array = props.placement(), props.array("data", "grid")
@@ -89,17 +113,15 @@ def _read(element: Element, context: Context) -> Volume:
         )
     if props.flag("use_grid_bbox", context.old):  # 0.6: src/volume/gridvolume.cpp
         to_world = to_world @ box
-    if props.text("wrap_mode", "clamp", ("clamp", "repeat", "mirror")) != "clamp":
-        context.warn(element, "at its ends the grid goes on as 'clamp'")
-    if props.text("filter_type", "trilinear", ("trilinear", "nearest")) != "trilinear":
-        context.warn(element, "the grid is trilinear, not 'nearest'")
+    wrap = props.text("wrap_mode", "clamp", ("clamp", "repeat", "mirror"))
+    smoothing = props.text("filter_type", "trilinear", ("trilinear", "nearest"))
     props.finish()
     if values.shape[3] not in (1, 3):
         raise element.error(f"its file has {values.shape[3]} channels; read are 1 and 3")
     if (least := float(np.min(values, initial=0.0))) < 0.0:
         context.warn(element, f"the grid is negative somewhere, down to {least:.3g}: 0 counts")
         values = np.maximum(values, 0)
-    return Volume(values, to_world)
+    return Volume(values, to_world), smoothing, wrap
 
 
 def even_box(props: Properties, name: str) -> NDArray[np.float64]:

@@ -29,7 +29,7 @@ OBJECTS = {
     "volume", "medium", "phase", "ref",
 }  # fmt: skip
 UNSUPPORTED = {
-    "measured", "measured_polarized", "sdfgrid", "ellipsoids", "ellipsoidsmesh",
+    "measured", "sdfgrid", "ellipsoids", "ellipsoidsmesh",
     "timed_sunsky", "distant", "irradiancemeter", "radiancemeter", "batch", "specfilm",
 }  # fmt: skip
 LEFT_OUT = VALUES | OLD_VALUES | {"texture"}  # parameters that old files may have in vain

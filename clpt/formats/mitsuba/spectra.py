@@ -13,6 +13,7 @@ import numpy as np
 
 from clpt import images, spectra
 from clpt.errors import UnknownKindError
+from clpt.formats.mitsuba import grids
 from clpt.formats.mitsuba.properties import (
     Context,
     PluginReader,
@@ -161,9 +162,9 @@ def _held(element: Element, role: Spectral, context: Context) -> Any:
 
 
 def _volume(element: Element, role: Spectral, context: Context) -> Any:
-    """Make the value of a constant volume."""
+    """Make the value of a volume: a constant, or a texture by a grid."""
     if element.type == "gridvolume":
-        raise element.error("a grid cannot stand here: only that of a medium is read")
+        return grids.voxels(element, context)
     if element.type != "constvolume":
         raise UnknownKindError("volume", element.type, VOLUMES, **element.location())
     props = Properties(element, context)

@@ -1,18 +1,18 @@
 """Materials of PBRT versions 2 and 3, by the formulas of pbrt-v3 (src/materials).
 
-A sum of lobes becomes a blend of them, each so much stronger as its share is smaller. That is the
-same light as long as the largest albedos add up to at most 1; beyond that the sum is made darker,
-with a warning.
+A sum of lobes becomes a blend, see lobes.py.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from clpt.errors import UnknownKindError
+from clpt.formats.pbrt.lobes import Lobe, Values, is_dark, rgb, summed
 from clpt.formats.pbrt.params import Parameters
 from clpt.formats.pbrt.scattering import blended, both, hair, rough, subsurface
 from clpt.formats.pbrt.spectra import named, spectrum
@@ -21,15 +21,11 @@ from clpt.formats.pbrt.textures import map_values, textured
 from clpt.scene import materials
 from clpt.scene.materials import Material
 from clpt.scene.roles import INDEX, REAL, REFLECTANCE
-from clpt.scene.textures import Bitmap, Mix, Product, Texture
+from clpt.scene.textures import Product, Texture
 from clpt.spectra import RGB, Constant, RGBUnbounded
 
 MIRRORS = ("mirror", "glass")
 VERSION_1 = ("bluepaint", "brushedmetal", "clay", "felt", "primer", "shinymetal", "skin")
-LARGEST = 1.0  # what a texture of unknown values may reach
-TINY = 1e-6
-Values = Any  # a number, a colour, a spectrum or a texture
-Lobe = tuple[Any, Callable[[Any], Material]]
 
 
 def material(kind: str, params: Parameters, state: State) -> Material:
@@ -133,7 +129,8 @@ def _plastic(params: Parameters, state: State) -> Material:
     alphas = _alphas(params, state, 0.1)
     diffuse = textured(params, "Kd", REFLECTANCE, state, 0.25)
     specular = textured(params, "Ks", REFLECTANCE, state, 0.25)
-    return both(_sum([(diffuse, _diffuse_of), (specular, _coat_of(1.5, alphas))], params, state))
+    warn = partial(state.warn, params)
+    return both(summed([(diffuse, _diffuse_of), (specular, _coat_of(1.5, alphas))], warn))
 
 
 def _diffuse_of(reflectance: Values) -> Material:
@@ -168,15 +165,15 @@ def _uber(params: Parameters, state: State) -> Material:
         (values["Kr"], lambda v: materials.Conductor(eta=eta, k=0.0, specular_reflectance=v)),
         (values["Kt"], _transmission),
     ]
-    summed = _sum(lobes, params, state)
-    if not _is_dark(values["Kt"]):
+    blend = summed(lobes, partial(state.warn, params))
+    if not is_dark(values["Kt"]):
         state.warn(params, "beside 'Kt' the rest is as seen from the front alone")
     else:
-        summed = both(summed)
+        blend = both(blend)
     opacity = _number(textured(params, "opacity", REFLECTANCE, state, 1.0), params, state)
     if opacity == 1.0:
-        return summed
-    return materials.Mask(material=summed, opacity=opacity)
+        return blend
+    return materials.Mask(material=blend, opacity=opacity)
 
 
 def _substrate(params: Parameters, state: State) -> Material:
@@ -193,7 +190,7 @@ def _translucent(params: Parameters, state: State) -> Material:
     base = textured(params, "Kd", REFLECTANCE, state, 0.25)
     specular = textured(params, "Ks", REFLECTANCE, state, 0.25)
     params.ignore("roughness", "remaproughness")
-    if not _is_dark(specular):
+    if not is_dark(specular):
         state.warn(params, "'Ks' of translucent is left out: the diffuse lobes remain")
     names = {"reflectance": "reflect", "transmittance": "transmit"}
     shares = {
@@ -206,7 +203,7 @@ def _translucent(params: Parameters, state: State) -> Material:
 def _product(first: Values, second: Values) -> Values:
     if isinstance(first, Texture) or isinstance(second, Texture):
         return Product(first=first, second=second)
-    return tuple(float(v) for v in np.broadcast_to(_rgb(first), 3) * _rgb(second))
+    return tuple(float(v) for v in np.broadcast_to(rgb(first), 3) * rgb(second))
 
 
 def _disney(params: Parameters, state: State) -> Material:
@@ -221,7 +218,7 @@ def _disney(params: Parameters, state: State) -> Material:
     values["base_color"] = textured(params, "color", REFLECTANCE, state, 0.5)
     values["eta"] = spectrum(params, "eta", INDEX, state, 1.5)
     distance = textured(params, "scatterdistance", REFLECTANCE, state, 0.0)
-    if not _is_dark(distance):
+    if not is_dark(distance):
         state.warn(params, "'scatterdistance' is left out: light leaves where it entered")
     if params.one("thin", "bool", False):
         for name in ("metallic", "clearcoat", "clearcoat_gloss"):
@@ -244,61 +241,16 @@ def _none(params: Parameters, state: State) -> Material:
     return materials.Null()
 
 
-def _sum(lobes: Sequence[Lobe], params: Parameters, state: State) -> Material:
-    """Return the sum of lobes, each a factor and a function that makes its material of a factor."""
-    shining = [(value, make) for value, make in lobes if not _is_dark(value)]
-    if not shining:
-        return materials.Diffuse(reflectance=0.0)
-    peaks = [max(_largest(value), TINY) for value, _ in shining]
-    total = sum(peaks)
-    if total > 1.0 + TINY and len(shining) > 1:
-        state.warn(params, f"its lobes may reflect {total:.3g} in all: each is divided by that")
-    excess = max(total, 1.0)
-    summed, share = shining[0][1](_over(shining[0][0], peaks[0] / total * excess)), peaks[0]
-    for (value, make), peak in list(zip(shining, peaks, strict=True))[1:]:
-        share += peak
-        lobe = make(_over(value, peak / total * excess))
-        summed = materials.Blend(first=summed, second=lobe, weight=peak / share)
-    return summed
-
-
-def _over(value: Values, divisor: float) -> Values:
-    if isinstance(value, Texture):
-        return Product(first=value, second=1.0 / divisor)
-    return map_values(value, lambda v: np.minimum(v / divisor, 1.0))
-
-
-def _rgb(value: Values) -> Values:
-    if isinstance(value, (float, int, tuple)):
-        return np.asarray(value, np.float64)
-    return np.asarray(value.to_rgb("unbounded"), np.float64)
-
-
-def _largest(value: Values) -> float:
-    """Return the largest number of a factor; of an image its largest texel."""
-    if isinstance(value, Bitmap):
-        return min(float(map_values(value, lambda v: v).image.max()), LARGEST)
-    if isinstance(value, Product):
-        return min(_largest(value.first) * _largest(value.second), LARGEST)
-    if isinstance(value, Mix):
-        return max(_largest(value.first), _largest(value.second))
-    return LARGEST if isinstance(value, Texture) else float(np.max(_rgb(value)))
-
-
-def _is_dark(value: Values) -> bool:
-    return not isinstance(value, Texture) and not np.any(_rgb(value))
-
-
 def _number(value: Values, params: Parameters, state: State) -> Values:
     """Return a colour as a number: its mean, with a warning where it is not grey."""
     if isinstance(value, (Texture, float)):
         return value
     if isinstance(value, Constant):
         return value.value
-    rgb = np.broadcast_to(_rgb(value), 3)
-    if np.ptp(rgb) > 1e-3 and isinstance(value, (tuple, RGB, RGBUnbounded)):
+    channels = np.broadcast_to(rgb(value), 3)
+    if np.ptp(channels) > 1e-3 and isinstance(value, (tuple, RGB, RGBUnbounded)):
         state.warn(params, "a share is a number here: the mean of its colour is taken")
-    return float(np.clip(rgb.mean(), 0.0, 1.0))
+    return float(np.clip(channels.mean(), 0.0, 1.0))
 
 
 MAKERS: dict[str, Maker[Material]] = {

@@ -213,8 +213,9 @@ class Lexer:
     Raises SceneError with the file and line for an invalid word.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, outer: Lexer | None = None):
         self.path, self.data = path, input_files.plain(read_bytes(path))
+        self.outer = outer  # of the file that includes this one, behind the name of this one
         self.at = 0  # after the blanks before the next word
         self._ahead: bytes | None = None
         self._counted, self._line = 0, 1
@@ -280,10 +281,16 @@ class Lexer:
         return values
 
     def parameters(self, where: str) -> list[Parameter]:
-        """Take the parameters that follow a directive; `where` is its name for messages."""
+        """Take the parameters that follow a directive; `where` is its name for messages.
+
+        At the end of an included file they go on behind its Include, as in pbrt, whose tokens come
+        from a stack of files (pbrt-v4: src/pbrt/parser.cpp, nextToken).
+        """
         parameters: list[Parameter] = []
         while self.peek().startswith(b'"'):
             parameters.append(self._parameter(where))
+        if self.outer is not None and not self.peek():
+            parameters += self.outer.parameters(where)
         return parameters
 
     def _parameter(self, where: str) -> Parameter:

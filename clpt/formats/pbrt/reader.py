@@ -189,7 +189,7 @@ class _Reader(TransformDirectives):
         self.contents.uses.append(Definition(name, params, self.state.copy()))
 
     def include(self) -> None:
-        self.go_through(self._named_file())
+        self.go_through(self._named_file(), self.lexer)
 
     def import_file(self) -> None:
         """As an Include, but the state is as before at its end."""

@@ -56,14 +56,17 @@ class Files(Located):
     def directive(self) -> None:
         """Take the next directive and carry it out."""
 
-    def go_through(self, path: Path) -> None:
-        """Read a file, which an Include may have named."""
+    def go_through(self, path: Path, continued: Lexer | None = None) -> None:
+        """Read a file, which an Include or an Import may have named.
+
+        continued: that of the file which has the parameters after the last directive of this file.
+        """
         real = path.resolve()
         if real in self.files:
             raise self.lexer.error(f"{path.name} includes itself")
         if len(self.files) >= DEEPEST:
             raise self.lexer.error(f"{path.name} is included too deep: {DEEPEST} files in others")
-        outer, lexer = getattr(self, "lexer", None), Lexer(path)
+        outer, lexer = getattr(self, "lexer", None), Lexer(path, continued)
         shared = self.contents.shared
         if outer is None:
             shared.old = old_words.is_old(lexer.data)

@@ -31,6 +31,7 @@ from clpt.scene.textures import (
     Noise,
     Product,
     Texture,
+    Voxels,
 )
 from clpt.spectra import RGB, Constant, RGBUnbounded, Spectrum, Tabulated, cie
 
@@ -52,6 +53,8 @@ def map_values(value: object, function: Callable[[Any], Any], *, bytes_stay: boo
         return Tabulated(cie.GRID, function(value.sample(cie.GRID)), "hold")
     if isinstance(value, Bitmap):
         return _bitmap(value, function, bytes_stay)
+    if isinstance(value, Voxels):
+        return replace(value, values=function(np.asarray(value.values, np.float64)))
     if isinstance(value, Texture) and type(value) not in ENDS:  # patterns between 0 and 1
         return Mix(first=float(function(0.0)), second=float(function(1.0)), amount=value)
     if isinstance(value, Texture):

@@ -66,6 +66,18 @@ RECORDS["marble"] = Record(
     colours=("integer", "first of five words of each of nine in `textures`"),
 )
 
+RECORDS["voxels"] = Record(
+    "Voxels",
+    "Values on a grid in a box.",
+    **_SOLID,
+    nx=("integer", "points along x"),
+    ny=("integer", "points along y"),
+    nz=("integer", "points along z"),
+    first=("integer", "of its words in `images`, x fastest"),
+    nearest=("integer", "1: without interpolation"),
+    wrap=("integer", "BITMAP_WRAP_"),
+)
+
 RECORDS["mesh_attribute"] = Record(
     "MeshAttribute",
     "Values per vertex or face.",

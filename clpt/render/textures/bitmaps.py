@@ -28,7 +28,7 @@ from clpt.images import Stored
 from clpt.images.stored import checked
 from clpt.render.records.tables import LoweringCache, TableStore, version
 from clpt.render.records.textures import KINDS, MIPS
-from clpt.render.textures.texels import negative_notes, texels
+from clpt.render.textures.texels import negative_notes, texel_words
 from clpt.scene.pixels import channel, image_file
 from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role
 from clpt.scene.textures import Bitmap
@@ -263,13 +263,11 @@ class Images:
         decoded = Stored(values, curved).decoded()
         if role is REAL:
             numbers = np.nan_to_num(channel(decoded, texture.channel).astype(np.float32))
-            return _Packed(numbers.reshape(-1).view(np.uint32), size)
+            return _Packed(texel_words(numbers, role, self.spectral), size)
         is_light = role is EMISSION and texture.spectral(role) is None  # else colours of spectra
         name = image_file(texture.image) or "bitmap.image"
         notes = negative_notes(decoded[..., :3], name) if is_light else []
-        colours = texels(np.nan_to_num(decoded[..., :3]), role, self.spectral)
-        colours = colours if self.spectral else colours[:, :3]
-        words = np.ascontiguousarray(colours).reshape(-1).view(np.uint32)
+        words = texel_words(np.nan_to_num(decoded[..., :3]), role, self.spectral)
         return _Packed(words, size, notes=notes)
 
     def _read(self, image: object) -> _Pixels:

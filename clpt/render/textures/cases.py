@@ -45,7 +45,8 @@ def dispatch_text(features: TextureFeatures, stochastic: bool = False, where: Wh
         f"#define TEXTURE_PERMUTATION {RECORDS['spectral_bitmap'].words}",
     ]
     used |= {level for kind, level in MIPS.items() if kind in used}
-    used |= {"bitmap"} if used & {"spectral_bitmap", "packed_bitmap"} else set()  # addresses texels
+    addressed = {"spectral_bitmap", "packed_bitmap", "voxels"}  # as the texels of bitmaps
+    used |= {"bitmap"} if used & addressed else set()
     present = [kind for kind in RECORDS if kind in used]
     by_kind = {cls.kind: cls for cls in TEXTURE_KINDS}
     parts = [*lines, '#include "textures/texture.cl"'] if used else []

@@ -32,8 +32,9 @@ from clpt.render.records.textures import (
 )
 from clpt.render.spectra.encode import SpectraTable
 from clpt.render.textures.bitmaps import Images, has_levels
-from clpt.render.textures.texels import bands
+from clpt.render.textures.texels import bands, texel_words
 from clpt.scene.params import params
+from clpt.scene.pixels import channel
 from clpt.scene.roles import EMISSION, FACTOR, INDEX, REAL, REFLECTANCE, Role, Spectral
 from clpt.scene.textures import (
     MAPPINGS,
@@ -45,6 +46,7 @@ from clpt.scene.textures import (
     MeshAttribute,
     Placed,
     Solid,
+    Voxels,
 )
 from clpt.scene.values import Operation, Texture, Use, constant_number, is_texture, separated
 from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, luminance
@@ -273,6 +275,26 @@ def _marble(texture: Marble, role: Role, table: TextureTable) -> int:
     return table.append_leaf(texture, role, colours=first, **members)
 
 
+def _voxels(texture: Voxels, role: Role, table: TextureTable) -> int:
+    slices = texture.slices
+    nz, ny, nx, depth = slices.shape
+    rows = slices.reshape(nz * ny, nx, depth)
+    chosen = channel(rows, "luminance") if role is REAL else rows
+    words = texel_words(chosen, role, table.spectra.spectral)
+    if table.store.size("images") + words.size > LARGEST:
+        raise SceneError("all images together have too many texels", where="voxels.values")
+    members = {
+        **_place(texture, table),
+        "nx": nx,
+        "ny": ny,
+        "nz": nz,
+        "first": table.store.append("images", words),
+        "nearest": texture.filter == "nearest",
+        "wrap": WRAPS.index(texture.wrap),
+    }
+    return table.append_leaf(texture, role, **members)
+
+
 def _plain(texture: Texture, role: Role, table: TextureTable) -> int:
     """Append the row of a texture whose members are numbers."""
     return table.append_leaf(texture, role, **_place(texture, table), **texture.record_members())
@@ -284,6 +306,7 @@ APPENDERS: dict[type[Texture], Callable[..., int]] = {
     Checkerboard: _checkerboard,
     MeshAttribute: _mesh_attribute,
     Marble: _marble,
+    Voxels: _voxels,
 }
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from clpt import spectra
-from clpt.arrays import Floats32
+from clpt.arrays import Floats32, Words
 from clpt.errors import SceneError
 from clpt.files import budget
 from clpt.images.spectral_exr import SpectralImage
@@ -62,6 +62,13 @@ def texels(image: Floats32, role: Role, spectral: bool) -> Floats32:
     else:
         rows[:, 3], rows[:, :3] = spectra.unbounded(colours)
     return rows
+
+
+def texel_words(image: Floats32, role: Role, spectral: bool) -> Words:
+    """Return `texels` as the words of `images`: a colour takes three where not `spectral`."""
+    values = texels(image, role, spectral)
+    colours = values if role is REAL or spectral else values[:, :3]
+    return np.ascontiguousarray(colours, np.float32).reshape(-1).view(np.uint32)
 
 
 def bands(image: SpectralImage, lo: float, hi: float) -> tuple[Floats32, Tabulated]:

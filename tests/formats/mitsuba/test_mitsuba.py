@@ -667,7 +667,7 @@ ERRORS = {
     '<shape type="cube"><bsdf type="normalmap"><texture type="checkerboard" name="normalmap"/>'
     '<bsdf type="diffuse"/></bsdf></shape>': "must be a bitmap, or one colour",
     '<bsdf type="diffuse"><texture type="volume" name="reflectance"><volume type="gridvolume" '
-    'name="volume"/></texture></bsdf>': "<volume type=.gridvolume.>: a grid cannot stand",
+    'name="volume"/></texture></bsdf>': "<volume type=.gridvolume.>: needs",
     '<bsdf type="roughconductor"><spectrum name="alpha" value="400:0, 500:0.1"/></bsdf>':
         "must be a number or a texture",
     '<float value="1"/>': "needs the attribute 'name'",

@@ -15,7 +15,9 @@ from clpt.formats import load
 from clpt.formats.mitsuba import old_words, sensors
 from clpt.formats.pbrt.scattering import EVEN, internal_fresnel, transmitted
 from clpt.scene import integrators, lights, materials, textures
+from clpt.scene.params import device_params, fields_of
 from clpt.spectra import RGB, Blackbody, Constant, RGBIlluminant, RGBUnbounded
+from tests.kernels.harness import Probe
 
 QUOTED = '"reflectance"'
 NAMES = sorted({old for _, old, *_ in old_words.PLUGINS})
@@ -323,8 +325,65 @@ def test_coats(material):
         assert inside == pytest.approx(0.5963, abs=2e-3)  # of an index of 1.5 over 1.000277
     metal = material(coat.format("coating", '<bsdf type="roughconductor"/>'))
     assert isinstance(metal, materials.CoatedConductor) and level(metal.coat_ior) == 1.5
-    other = material(coat.format("coating", '<bsdf type="plastic"/>'))
-    assert isinstance(other, materials.Plastic)
+    other = material(coat.format("coating", '<bsdf type="dielectric"/>'))
+    assert isinstance(other, materials.Dielectric)
+
+
+@pytest.mark.parametrize("kind", ["phong", "ward", "plastic", "roughplastic"])
+def test_coats_over_a_diffuse_and_a_glossy_reflection(material, kind):
+    coated = material(f'<bsdf type="coating"><bsdf type="{kind}"/></bsdf>')
+    assert isinstance(coated, materials.Blend)
+    assert isinstance(coated.first, materials.Plastic)
+    assert isinstance(coated.second, materials.CoatedConductor)
+    alpha = {"phong": 0.25, "plastic": 1e-4}.get(kind, 0.1)
+    assert coated.second.alpha_u == coated.second.alpha_v == pytest.approx(alpha)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind, error", [("phong", 0.03), ("ward", 0.015), ("plastic", 0.002)])
+def test_how_bright_coats_are(material, kind, error):
+    """Directional albedos of 0.6's formula; docs/mitsuba.md tells the largest errors."""
+    base = material(f'<bsdf type="{kind}"/>')
+    coated = material(f'<bsdf type="coating"><bsdf type="{kind}"/></bsdf>')
+    share, ratio, count = level(coated.weight), 1.5046 / 1.000277, 20000
+    u = np.random.default_rng(1).random((count, 3))
+    r, turn = np.sqrt(u[:, 0]), 2.0 * np.pi * u[:, 1]
+    wi = np.stack([r * np.cos(turn), r * np.sin(turn), np.sqrt(1.0 - u[:, 0])], axis=1)
+    for angle in (1.0, 45.0, 70.0):
+        sine, cosine = np.sin(np.radians(angle)), np.cos(np.radians(angle))
+        wo = np.broadcast_to([sine, 0.0, cosine], wi.shape)
+        o, i = below(wo, ratio), below(wi, ratio)
+        mirror, passed = reflected(cosine, ratio), 1.0 - reflected(wi[:, 2], ratio)
+        inner = values(base, o, i, u)["eval"][:, 1] / i[:, 2]
+        exact = mirror + (1.0 - mirror) * np.pi * float((inner * passed).mean()) / ratio**2
+        if kind == "plastic":
+            exact += (1.0 - mirror) ** 2 * reflected(o[0, 2], 1.49 / 1.000277)
+        ours = [values(part, wo, wi, u)["weight"].mean() for part in (coated.first, coated.second)]
+        assert (1.0 - share) * ours[0] + share * ours[1] == pytest.approx(exact, abs=error)
+
+
+def values(made, wo, wi, u):
+    """What the kernels of a material say in RGB, see clpt.testing.probe."""
+    numbers = {
+        name: param.choices.index(value) if param.choices else level(value)
+        for name, param in device_params(type(made)).items()
+        for value in [fields_of(made)[name]]
+    }
+    return Probe(type(made), "rgb")(numbers, wo, wi, u)
+
+
+def below(w, ratio):
+    """Directions (n, 3) refracted into a coat."""
+    across = w[:, :2] / ratio
+    return np.column_stack([across, np.sqrt(1.0 - (across**2).sum(axis=1))])
+
+
+def reflected(cosine, ratio):
+    """Fresnel's reflectance of unpolarised light from outside."""
+    inner = np.sqrt(1.0 - (1.0 - np.square(cosine)) / ratio**2)
+    across = (cosine - ratio * inner) / (cosine + ratio * inner)
+    along = (ratio * cosine - inner) / (ratio * cosine + inner)
+    return 0.5 * (across**2 + along**2)
 
 
 def test_a_coat_of_a_sum_is_the_sum_of_coats(read):

@@ -11,6 +11,7 @@ import clpt
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.formats.volumes import VOL_HEADER
 from clpt.scene import media
+from clpt.scene.textures import Voxels
 from clpt.scene.volumes import resampled
 from clpt.spectra import RGB, Constant
 from tests.pictures.support import assert_agree, assert_mean, blocks, exposures, mitsubas, with_film
@@ -182,16 +183,20 @@ def test_errors_name_the_volume(medium, kind, inner, error, message):
         medium(kind, inner)
 
 
-def test_a_grid_is_no_reflectance(tmp_path):
+def test_a_grid_is_a_texture_of_surfaces(tmp_path):
     write_grid(tmp_path / "a.vol", NUMBERS)
     path = tmp_path / "scene.xml"
-    texture = f'<texture name="reflectance" type="volume">{grid("volume", "a.vol")}</texture>'
+    more = '<string name="wrap_mode" value="mirror"/><transform name="to_world">'
+    more += '<scale value="2"/></transform>'
+    texture = f'<texture name="reflectance" type="volume">{grid("volume", "a.vol", more)}</texture>'
     path.write_text(
         f'<scene version="3.0.0"><shape type="cube"><bsdf type="diffuse">{texture}</bsdf></shape>'
         "</scene>"
     )
-    with pytest.raises(SceneError, match="only that of a medium is read"):
-        clpt.load(path)
+    voxels = clpt.load(path).shapes[0].material.reflectance
+    assert isinstance(voxels, Voxels) and (voxels.wrap, voxels.filter) == ("mirror", "trilinear")
+    np.testing.assert_allclose(voxels.to_texture, np.diag([0.5, 0.5, 0.5, 1.0]))
+    np.testing.assert_array_equal(voxels.values[..., 0], NUMBERS)
 
 
 COLUMNS = """<scene version="3.0.0">

@@ -149,6 +149,20 @@ def test_files_in_files(write):
     assert moved == [1.0, 0.0, 1.0, 1.0]  # an Import keeps its changes to itself
 
 
+def test_parameters_go_on_behind_an_include(write):
+    """pbrt reads words from a stack of files, so an Include ends where its words do."""
+    write('MakeNamedMedium "smoke" "string type" "homogeneous"\n', "inner.pbrt")
+    write('Shape "sphere"\nInclude "inner.pbrt" "rgb sigma_a" [1 2 3]\n# the end', "outer.pbrt")
+    text = 'WorldBegin\nInclude "outer.pbrt" "rgb sigma_s" [4 5 6]\nShape "sphere" "float radius" 2'
+    contents = reader.read(write(text))
+    medium = contents.shared.media["smoke"].params
+    assert [parameter.name for parameter in medium.given] == ["type", "sigma_a", "sigma_s"]
+    assert [parameter.file.name for parameter in medium.given][1:] == ["outer.pbrt", "scene.pbrt"]
+    assert [len(shape.params.given) for shape in contents.shapes] == [0, 1]
+    with pytest.raises(SceneError, match=r"scene\.pbrt:2: expected a directive"):  # of an Import
+        reader.read(write('WorldBegin\nImport "inner.pbrt" "rgb sigma_a" [1 2 3]'))
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
