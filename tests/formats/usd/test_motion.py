@@ -103,6 +103,9 @@ def test_render_settings(stage: Loader) -> None:
     cropped = stage(mesh + text % 'uniform token aspectRatioConformPolicy = "cropAperture"')
     assert cropped.camera.fov == pytest.approx(90.0)
     assert stage(mesh + text % "", camera="A").camera.fov < 40.0
+    lost = stage((mesh + text % "").replace("rel camera = </B>", "rel camera = </Gone>"))
+    assert lost.camera.fov == stage(mesh + text % "", camera="A").camera.fov
+    assert lost.warnings == ["render settings: its camera /Gone is not there; /A replaces it"]
 
 
 def test_variables_become_layers(stage: Loader) -> None:
