@@ -88,7 +88,8 @@ def _over_shutter(document: Document, variables: dict[str, Any]) -> Scene:
     opening, length = scene.extra.pop("shutter")
     if "shutter" in variables:
         opening, length = 0.0, _number(document.file, variables, "shutter", 0.0)
-    moves = any(layer.ListAllTimeSamples() for layer in stage.GetUsedLayers())
+    # A value with a single sample is the same at all times.
+    moves = any(len(layer.ListAllTimeSamples()) > 1 for layer in stage.GetUsedLayers())
     if not length > 0.0 or not moves:
         return scene
     rate = stage.GetTimeCodesPerSecond()
