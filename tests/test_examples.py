@@ -13,7 +13,10 @@ import clpt
 FOLDER = Path(__file__).resolve().parents[1] / "examples"
 EXAMPLES = sorted(FOLDER.glob("*.py"))
 # Quick tests elsewhere have what these show.
-LONG = ("custom_material", "deforming_mesh", "nbody", "smoke", "textured_mesh", "turntable")
+LONG = (
+    "bin_picking", "canopy", "custom_material", "deforming_mesh", "lidar", "nbody", "office",
+    "smoke", "textured_mesh", "turntable",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(

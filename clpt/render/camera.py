@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats
+from clpt.errors import SceneError
 from clpt.lenses import COATINGS, Prescription
 from clpt.lenses.prescription import DESIGN, LINE_D, reflectance
 from clpt.lenses.tracing import ZONES, FocusedLens, sag
@@ -31,6 +32,10 @@ EVEN = 0.1  # share of the ghosts' samples that is divided evenly among all pair
 def check_camera(camera: Camera, film: Film) -> None:
     """Raise SceneError for a camera whose parameters cannot be used with a film."""
     camera.checked_members(film.width, film.height)
+    lit = camera.connects or camera.traced_lens is not None
+    if lit and camera.shutter is not None and camera.shutter.readout:
+        message = "light paths do not know the time of a row; take the camera calibrated"
+        raise SceneError(message, where=f"{camera.kind}.shutter.readout")
     for glass in camera.dispersive_glasses:
         check_index(glass, film, f"{camera.kind}.glass")
 

@@ -38,16 +38,16 @@ def track(keys: Keys | None) -> NDArray[np.float32]:
 def shutter_words(shutter: Shutter) -> NDArray[np.float32]:
     """Return the words of a shutter.
 
-    They are the number of steps, the opening time and the open time [s], then for each step the
-    share of light before it and the density at both ends.
+    They are the number of steps, the opening time and the open time of a row [s], then for each
+    step the share of light before it and the density at both ends, and last the readout [s].
     """
     density = shutter.density()
     shares = (density[1:] + density[:-1]) / 2.0
     shares, density = shares / shares.sum(), density / shares.mean()
     before = np.cumsum([0.0, *shares[:-1]])
     rows = np.column_stack([before, density[:-1], density[1:]])
-    head = [len(shares), shutter.open, shutter.close - shutter.open]
-    return np.concatenate([head, rows.ravel()]).astype(np.float32)
+    head = [len(shares), shutter.open, shutter.close - shutter.open - shutter.readout]
+    return np.concatenate([head, rows.ravel(), [shutter.readout]]).astype(np.float32)
 
 
 def lower_motion(motions: Motions, shapes: int, rows: list[int], store: TableStore) -> int:

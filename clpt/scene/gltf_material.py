@@ -11,7 +11,7 @@ import numpy as np
 
 from clpt.scene.lights import Area
 from clpt.scene.materials import Mask, Material, NormalMap, Null, TwoSided
-from clpt.scene.textures import Bitmap, Product
+from clpt.scene.textures import Bitmap, Graph, Product
 from clpt.scene.values import Texture, Textured, TexturedNumber
 from clpt.spectra import RGBUnbounded
 
@@ -56,7 +56,7 @@ def opacity(
     return None if alpha is None and factor == 1.0 else times(alpha, factor)
 
 
-def with_normals(inner: Material, image: Bitmap | None, scale: float = 1.0) -> Material:
+def with_normals(inner: Material, image: Bitmap | Graph | None, scale: float = 1.0) -> Material:
     """Return a material with a normal map, if any."""
     if image is None:
         return inner

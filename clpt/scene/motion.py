@@ -210,20 +210,30 @@ class Shutter:
     beginning to its end, linear in between. Each path has a time by this density, and the picture
     is as bright as with a box. Without length all is still, as it is when the shutter opens.
 
-    Raises SceneError for a shutter that closes before it opens, and a shape that is never open.
+    readout: [s] of a rolling shutter, from the exposure of the first row of the film to that of the
+    last; 0: all rows get light at once. A row gets light for close - open - readout: the first row
+    from `open` on, the last until `close`.
+
+    Raises SceneError for a shutter that closes before it opens, a shape that is never open, and a
+    readout that is longer than all of it.
     """
 
     open: float = 0.0
     close: float = 1.0
     shape: str | Sequence[float] | NDArray[Any] = "box"
+    readout: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in (("open", self.open), ("close", self.close)):
+        for name in ("open", "close", "readout"):
+            value = vars(self)[name]
             time = number(value, f"shutter.{name}", "a time [s]")
             object.__setattr__(self, name, time)
         if self.close < self.open:
             message = f"{self.close:g} s is before it opens, {self.open:g} s"
             raise SceneError(message, where="shutter.close")
+        if not 0.0 <= self.readout <= self.close - self.open:
+            message = f"must be 0 to {self.close - self.open:g} s, while it is open"
+            raise SceneError(message, where="shutter.readout")
         self.density()
 
     def density(self) -> NDArray[np.float64]:

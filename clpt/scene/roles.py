@@ -377,6 +377,7 @@ HostForm = Literal[
     "boolean", "integer", "number", "text", "names", "numbers",
     "vector", "direction", "matrix3", "matrix4",
     "material", "medium", "media", "phase", "texture", "filter", "area_light", "group",
+    "textures", "nodes",
     "rows2", "rows3", "rows4", "grid", "normals", "triangles", "attributes",
     "number_or_list", "lengths",
     "image", "volume", "colour_volume", "cube_images", "crop", "sensor", "white_balance",

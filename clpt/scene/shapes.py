@@ -128,7 +128,7 @@ class Mesh(Shape):
     )
     subdivision: int = host(0, "levels of Loop subdivision, to the smooth limit surface; 0: none")
     displacement: Bitmap | None = host(
-        None, "heights by uv, along smooth normals, after subdivision; or None", form="texture"
+        None, "bitmap: heights by uv, along smooth normals, after subdivision", form="texture"
     )
     displacement_scale: float = host(1.0, "factor on them", "m")
     displacement_edge: float = host(0.05, "longest edge of displaced triangles, in the world", "m")

@@ -41,6 +41,10 @@ class Look(Protocol):
     def levels(self, image: Any) -> Floats:
         """Return the weights of the texels of a bitmap (h, w), top row first."""
 
+    @property
+    def white(self) -> float:
+        """The weight of a white light whose channels are 1."""
+
 
 Attributes = Mapping[str, Any]  # values (m, c) of mesh attributes at faces, by name
 Use = Literal["own", "factor", "real"]  # an operand's role: the texture's, a reflectance, a number
@@ -53,12 +57,13 @@ class Texture(Kind):
 
     factor_name: the parameter that stays a factor in an emission, "" without such a parameter;
     attributes: the names of the mesh attributes that the texture itself reads; fills: "uv" or
-    "space", where its pattern lies, or "".
+    "space", where its pattern lies, or ""; alpha: whether it has a fourth channel.
     """
 
     is_texture = True
     attributes: ClassVar[tuple[str, ...]] = ()
     fills: ClassVar[str] = ""
+    alpha: ClassVar[bool] = False
 
     def record_members(self) -> dict[str, Any]:
         """Return members of its record beside its place and its colours, by name."""
@@ -99,7 +104,11 @@ class Texture(Kind):
 
     def channel_factors(self, channel: int) -> list[Any]:
         """Return numbers, and textures of numbers, whose product is a channel 0 to 2 of it."""
-        return [self]
+        return [self.with_channel("rgb"[channel])]
+
+    def with_channel(self, channel: str) -> Texture:
+        """Return it as numbers of a channel of "rgba"; a pattern of numbers is its own."""
+        return self
 
     def mean(self, look: Look) -> float:
         """Return its mean brightness as an emission; a guess costs noise and no truth."""
@@ -111,6 +120,10 @@ class Texture(Kind):
         area (m,): of a lookup, in uv; attributes: values (m, c) of mesh attributes, by name.
         """
         return np.full(uv.shape[:2], self.mean(look))
+
+    def number_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
+        """Return its number at uv (m, k), see `brightness_at`."""
+        return self.brightness_at(look, uv, area, attributes)
 
     def clamped_at_poles(self) -> Texture:
         """Return it as an image around a point, whose last rows do not wrap to the first."""

@@ -51,6 +51,7 @@ from clpt.spectra.spectrum import (
     absorption,
     on_grid,
 )
+from clpt.spectra.upsampling import table as uplift_table
 from clpt.spectra.upsampling import unbounded, uplift
 
 __all__ = [
@@ -102,6 +103,7 @@ __all__ = [
     "scaled",
     "unbounded",
     "uplift",
+    "uplift_table",
     "watts",
     "wavelength_pdf",
     "xyz_to_rgb",

@@ -115,6 +115,15 @@ def evaluate(coefficients: ArrayLike, lambdas: ArrayLike) -> Floats:
     return 0.5 + 0.5 * x / np.sqrt(1.0 + x * x)
 
 
+def table() -> NDArray[np.float32]:
+    """Return the tables as kernels look them up: values, ratios, and rows of three coefficients.
+
+    (2 NODES + 9 NODES^3,) float32; the coefficients are over the unit coordinate times `shrinkage`.
+    """
+    nodes = (node_values().astype(np.float32), node_ratios().astype(np.float32))
+    return np.concatenate([*nodes, _table().reshape(-1)])
+
+
 @cache
 def _table() -> NDArray[np.float32]:
     with np.load(ROOT / "uplift.npz", allow_pickle=False) as file:

@@ -16,6 +16,7 @@ from clpt.scene.textures import (
     Checkerboard,
     Checkers,
     Dots,
+    Graph,
     Marble,
     MeshAttribute,
     Mix,
@@ -124,6 +125,21 @@ def dots(n: float) -> Mix:
     return Mix(first=CREAM, second=RED, amount=spots)
 
 
+def wood(_: float) -> Graph:
+    """Rings around an axis, which noise bends."""
+    nodes: dict[str, Any] = {
+        "bend": {"type": "fractal3d", "amplitude": 0.12, "channels": 3},
+        "place": {"type": "add", "in1": "position", "in2": "bend"},
+        "across": {"type": "multiply", "in1": "place", "in2": [1, 0.15, 1]},
+        "radius": {"type": "magnitude", "in": "across"},
+        "rings": {"type": "multiply", "in1": "radius", "in2": 11},
+        "ring": {"type": "fract", "in": "rings"},
+        "color": {"type": "ramp", "in": "ring", "interpolation": 2,
+                  "stops": [[0, 0.36, 0.16, 0.05], [0.7, 0.62, 0.36, 0.15], [1, 0.2, 0.08, 0.03]]},
+    }  # fmt: skip
+    return Graph(nodes=nodes)
+
+
 TEXTURES = {
     "bitmap": board_and_ball("An image: once on a board, twice around a ball.", field),
     "checkerboard": board_and_ball("Two colours over uv.", squares),
@@ -150,4 +166,5 @@ TEXTURES = {
     "voxels": board_and_ball(
         "Random colours at 8 x 5 x 5 points in a box around both.", lambda _: voxels()
     ),
+    "graph": board_and_ball("Wood: rings in space that noise bends, and a ramp of colors.", wood),
 }

@@ -152,3 +152,15 @@ inline vec3 vertex_point(Scene scene, integer number, integer prim, real u, real
     vec3 b = vertex_keyed(scene.vertices, as_integer(corners.y), k);
     return madd3(a, 1.0f - u - v, madd3(b, u, scale3(vertex_keyed(scene.vertices, as_integer(corners.z), k), v)));
 }
+
+/* Step rolling: how much later than the first row of the film a row gets light; position: on the whole film, 0 to 1. */
+inline real row_delay(Scene scene, vec2 position)
+{
+    global const float *shutter = scene.distributions + as_int(scene.distributions[MOTION_ROW]);
+    int last = scene.settings->film_height - 1;
+    real row = clamp_r(floor(position.y * (float)(last + 1)), (real)(0.0f), (real)(last));
+    return row * (shutter[3 + 3 * (int)shutter[0]] / (float)(last > 0 ? last : 1));
+}
+
+/* Twin, where all rows get light at once. */
+inline real row_delay(Scene scene, vec2 position) { return 0.0f; }

@@ -55,6 +55,13 @@ inline Spectrum spectrum_packed_texel(global const uint *table, PackedTexel t, i
 }
 /* Light of a grey: as bright in all channels. */
 inline Spectrum spectrum_grey_light(Scene scene, real value, Wavelengths lambdas) { return spectrum_of(value); }
+/* A computed colour, in [0, 1] where `bounded`; `table` is of spectra/spectral.cl. */
+inline Spectrum spectrum_colour(Scene scene, integer table, vec3 rgb, mask bounded, Wavelengths lambdas)
+{
+    real most = sel(bounded, (real)(1.0f), (real)(FAR));
+    return (Spectrum){clamp_r(rgb.x, (real)(0.0f), most), clamp_r(rgb.y, (real)(0.0f), most),
+                      clamp_r(rgb.z, (real)(0.0f), most)};
+}
 inline Wavelengths wavelengths_sample(Scene scene, real u) { return spectrum_of(0.0f); }
 /* What a sample adds to a pixel: rgb. */
 inline vec3 film_value(Scene scene, Spectrum radiance, Wavelengths lambdas)

@@ -103,3 +103,63 @@ inline Spectrum spectrum_packed_texel(global const uint *table, PackedTexel t, i
 #undef C
     return r;
 }
+/* The spectrum of a computed colour (Jakob and Hanika 2019), as clpt/spectra/upsampling.py looks it up. `table` is the
+ * first float in `texels` of 40 values of the largest component, 40 ratios of the others to it, and rows of three
+ * coefficients by the largest component, its value and the two ratios. */
+#define UPLIFT_NODES 40
+inline integer uplift_cell(Scene scene, integer nodes, real x, real *t)
+{
+    integer low = 0;
+    for (int step = 32; step > 0; step >>= 1) {
+        integer next = min_i(low + step, (integer)(UPLIFT_NODES - 2));
+        low = sel_i(x >= gather(scene.texels, nodes + next), next, low);
+    }
+    real a = gather(scene.texels, nodes + low), b = gather(scene.texels, nodes + low + 1);
+    *t = clamp_r((x - a) / (b - a), (real)(0.0f), (real)(1.0f));
+    return low;
+}
+/* Three coefficients over (lambda - 595 nm) / 235 nm, of a colour in [0, 1]. */
+inline vec3 uplifted(Scene scene, integer table, vec3 rgb)
+{
+    mask blue = (rgb.z > rgb.x) & (rgb.z > rgb.y), green = !blue & (rgb.y > rgb.x);
+    real value = sel(blue, rgb.z, sel(green, rgb.y, rgb.x)), t, u, v;
+    real first = sel(blue, rgb.x, sel(green, rgb.z, rgb.y)), second = sel(blue, rgb.y, sel(green, rgb.x, rgb.z));
+    real over = 1.0f / max_r(value, (real)(1e-30f));
+    first = sel(value > 0.0f, first * over, (real)(1.0f));
+    second = sel(value > 0.0f, second * over, (real)(1.0f));
+    integer row = sel_i(blue, (integer)(2), sel_i(green, (integer)(1), (integer)(0)));
+    row = row * UPLIFT_NODES + uplift_cell(scene, table, value, &t);
+    row = row * UPLIFT_NODES + uplift_cell(scene, table + UPLIFT_NODES, first, &u);
+    row = row * UPLIFT_NODES + uplift_cell(scene, table + UPLIFT_NODES, second, &v);
+    vec3 sum = v3(0.0f, 0.0f, 0.0f);
+    for (int corner = 0; corner < 8; corner++) {
+        int i = corner & 1, j = (corner >> 1) & 1, k = corner >> 2;
+        integer at = row + (i * UPLIFT_NODES + j) * UPLIFT_NODES + k;
+        real weight = (i ? t : 1.0f - t) * (j ? u : 1.0f - u) * (k ? v : 1.0f - v);
+        sum = madd3(gather3(scene.texels, table + 2 * UPLIFT_NODES + 3 * at), weight, sum);
+    }
+    real mean = (rgb.x + rgb.y + rgb.z) * (1.0f / 3.0f);
+    real over_shrinkage = 1.0f / sqrt(max_r(mean * (1.0f - mean), (real)(1e-9f)));
+    mask grey = (first == 1.0f) & (second == 1.0f);
+    sum = sel3(grey, v3((real)(0.0f), (real)(0.0f), value - 0.5f), sum);
+    return scale3(sum, over_shrinkage);
+}
+/* bounded: a reflectance, in [0, 1]; else twice the largest component times a reflectance. */
+inline Spectrum spectrum_colour(Scene scene, integer table, vec3 rgb, mask bounded, Wavelengths lambdas)
+{
+    rgb = v3(max_r(rgb.x, (real)(0.0f)), max_r(rgb.y, (real)(0.0f)), max_r(rgb.z, (real)(0.0f)));
+    real most = max_r(max_r(rgb.x, rgb.y), rgb.z), scale = sel(bounded, (real)(1.0f), 2.0f * most);
+    vec3 shape = scale3(rgb, 1.0f / max_r(scale, (real)(1e-30f)));
+    vec3 c = uplifted(scene, table, v3(min_r(shape.x, (real)(1.0f)), min_r(shape.y, (real)(1.0f)),
+                                       min_r(shape.z, (real)(1.0f))));
+    Spectrum r;
+#define C(c_)                                                     \
+    {                                                             \
+        real u = (lambdas.c_ - 595.0f) * (1.0f / 235.0f);         \
+        real x = (c.x * u + c.y) * u + c.z;                       \
+        r.c_ = scale * (0.5f + 0.5f * x / sqrt(1.0f + x * x));    \
+    }
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}

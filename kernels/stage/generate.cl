@@ -23,6 +23,7 @@
 #include "generated/first_cone.cl"
 #include "generated/layer_sums.cl"
 #include "generated/scouts_begin.cl"
+#include "generated/row_delay.cl"
 #include "generated/optical_length.cl"
 
 /* The beginning of a sample. */
@@ -44,7 +45,7 @@ inline SampleBegin sample_begin(Scene scene, Slab path, uint at, mask go, intege
     vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
     SampleBegin b;
     b.position = film_position(settings, pixel, offset);
-    b.time = motion_time(scene, merging_moment(scene, u.x, u.y, sample));
+    b.time = motion_time(scene, merging_moment(scene, u.x, u.y, sample)) + row_delay(scene, b.position);
     b.lambdas = wavelengths_sample(scene, merging_wavelength(scene, u.x, sample));
     b.lens = sampler_pair(sampler, (natural)(DIMENSION_LENS));
     scene.time = b.time;

@@ -350,3 +350,16 @@ def test_other_bad_input(tmp_path):
 
 def _fails(index, rng):
     raise SceneError("no place")
+
+
+def test_warm_pictures_wait_for_no_compiler(caplog):
+    """A second warming finds all programs, and a picture that fails is passed over."""
+
+    def sometimes(index: int, rng: np.random.Generator) -> Scene:
+        if index == 1:
+            raise ValueError("no scene")
+        return scene(index, rng)
+
+    dataset.warm(sometimes, range(3), seed=2)
+    assert dataset.warm(sometimes, range(3), seed=2) == 0
+    assert "picture 1 would fail: no scene" in caplog.text

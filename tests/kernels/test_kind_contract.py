@@ -197,6 +197,14 @@ def board(**more: object) -> textures.Checkerboard:
 
 
 GREY = textures.Bitmap(image=TEXELS.mean(axis=2), filter="nearest")
+GRAPH = {
+    "fine": {"type": "multiply", "in1": "texcoord", "in2": (5.0, 3.0)},
+    "noise": {"type": "noise2d", "texcoord": "fine", "amplitude": 2.0, "pivot": 0.5},
+    "image": {"type": "texture", "channels": 4},
+    "color": {"type": "convert", "in": "image"},
+    "board": {"type": "texture", "texture": 1},
+    "node": {"type": "mix", "fg": "color", "bg": "board", "mix": "noise"},
+}
 KNOWN = {
     "bitmap": bitmap(),
     "moved bitmap": bitmap(to_uv=MOVED, wrap="mirror", wrap_v="clamp"),
@@ -206,6 +214,7 @@ KNOWN = {
     "product": textures.Product(first=bitmap(), second=2.0),
     "mix": textures.Mix(first=bitmap(), second=0.25, amount=GREY),
     "screen": Screen(first=GREY, second=GREY),
+    "graph": textures.Graph(nodes=GRAPH, textures=[bitmap(to_uv=MOVED), board()]),
 }
 
 
@@ -219,7 +228,7 @@ def test_a_texture_knows_its_brightness(texture: Texture) -> None:
     np.testing.assert_allclose(found, expected, rtol=ROUGH, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["bitmap", "product", "mix"])
+@pytest.mark.parametrize("name", ["bitmap", "product", "mix", "graph"])
 def test_a_mean_is_that_of_all_points(name: str) -> None:
     texture = {**KNOWN, "mix": textures.Mix(first=bitmap(), second=0.25, amount=0.3)}[name]
     axis = (np.arange(64) + 0.5) / 64.0

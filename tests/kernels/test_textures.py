@@ -32,9 +32,9 @@ COLOURS = np.random.default_rng(1).random((5, 7, 3)).astype(np.float32)
 
 
 @cache
-def _dispatch(roles):
+def _dispatch(roles, graphs=()):
     stochastic = any(role == "reflectance" for _, role in roles)
-    return dispatch_text(TextureFeatures(roles, depth=4), stochastic=stochastic)
+    return dispatch_text(TextureFeatures(roles, depth=4, graphs=graphs), stochastic=stochastic)
 
 
 def _body(role, mode):
@@ -75,7 +75,7 @@ def look_up(made, role, uv, mode="rgb", lanes=8, rows=None, u=()):
         files=(FILE,),
         mode=mode,
         lanes=lanes,
-        virtual={FILE: _dispatch(frozenset(encoder.textures.roles))},
+        virtual={FILE: _dispatch(frozenset(encoder.textures.roles), (*encoder.textures.graphs,))},
         defines={
             "SPECTRA_SIZE": encoder.spectra.samples,
             "STOCHASTIC_FILTERING": int(role == "texel"),

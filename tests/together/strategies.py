@@ -345,6 +345,8 @@ FORMS: dict[str, Callable[[Drawer, Param, Any], Any]] = {
     "media": lambda self, p, d: tuple(self.medium() for _ in self.several(2, 1)),
     "phase": lambda self, p, d: self.nested(phases.Phase, phases.KINDS, phases.Isotropic()),
     "texture": lambda self, p, d: self.texture((textures.Bitmap,)),
+    "textures": lambda self, p, d: (textures.Bitmap(image=_image(self)),),
+    "nodes": lambda self, p, d: self.one(GRAPHS),
     "filter": lambda self, p, d: self.kind(integrators.FILTERS),
     "area_light": _area_light,
     "group": _group,
@@ -361,6 +363,16 @@ FORMS: dict[str, Callable[[Drawer, Param, Any], Any]] = {
     "keys": _keys,
     "shutter": _shutter,
 }
+GRAPHS: tuple[dict[str, Any], ...] = (
+    {"a": {"type": "noise3d", "channels": 3}, "b": {"type": "clamp", "in": "a"}},
+    {"a": {"type": "ramplr", "valuer": (0.9, 0.5, 0.1)}},
+    {"a": {"type": "fractal2d"}, "b": {"type": "ramp", "in": "a"}},
+    {
+        "a": {"type": "multiply", "in1": "texcoord1"},
+        "b": {"type": "worleynoise2d", "texcoord": "a"},
+    },
+    {"a": {"type": "extract", "in": "position"}},
+)
 NEEDED = ("image", "cube_images", "group")  # forms that a kind cannot be without
 NAMED: dict[str, Sequence[Any]] = {  # parameters that few values suit
     "max_depth": (8, -1, 1, 2, 3),

@@ -154,7 +154,8 @@ class Property:
         return ""
 
 
-PROPERTIES = {"UV0": "ND_texcoord_vector2"}
+PLACE = "ND_position_vector3"  # in the world: an object's place in its own space is not known
+PROPERTIES = {"UV0": "ND_texcoord_vector2", "Pobject": PLACE, "Pworld": PLACE}
 
 
 def _of_surface(definition: Any, name: str, path: str) -> tuple[Node, str] | None:

@@ -1,15 +1,13 @@
-"""Graphs of MaterialX nodes as textures: what readers of networks tell, and how graphs are baked.
+"""Networks of MaterialX nodes as values and textures, and what readers of networks provide.
 
-A graph that varies with nothing is a value. A graph over one image, whatever is done with its
-colors, is an image with that done to its pixels, in the image's own place. All other graphs over
-texture coordinates become an image of the unit square, which repeats.
+What varies with nothing is a value, and an image that nothing is done to is that image. All else
+becomes a `clpt.scene.textures.Graph`, whose nodes have MaterialX's names.
 """
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -18,17 +16,18 @@ from numpy.typing import NDArray
 
 from clpt import images
 from clpt.arrays import Floats
+from clpt.errors import SceneError
 from clpt.images.interop import Encoding
+from clpt.scene.roles import REAL
 from clpt.scene.textures import Bitmap
+from clpt.scene.textures import Graph as GraphTexture
+from clpt.scene.textures import graph as scene_graph
+from clpt.scene.textures.nodes import NODES, SOURCES
 from clpt.scene.values import Texture
 
-LEAST, MOST = 256, 2048  # pixels along a side of a baked image
-PATTERN = 1024  # of a baked pattern without images
 DEEPEST = 200  # nodes, one after the other
-WRAPS = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror", "constant": "zero"}
-PLACES = np.random.default_rng(8).uniform(-1.0, 1.0, (4, 4, 3))  # in space, likewise
-PASSING = ("dot", "extract", "separate2", "separate3", "separate4")
-PROBES = np.random.default_rng(7).uniform(-1.0, 2.0, (4, 4, 2))  # places that tell how uv are moved
+PROBES = np.random.default_rng(7).uniform(-1.0, 2.0, (16, 2))  # of texture coordinates
+PLACES = np.random.default_rng(8).uniform(-1.0, 1.0, (16, 3))
 
 
 class Node(Protocol):
@@ -72,118 +71,229 @@ class LeftOut(Exception):
     """A node that cannot be said; the message names it."""
 
 
-@dataclass
-class Leaf:
-    """An image in a graph: where its texture coordinates are, (h, w, 2), and its pixels."""
+@dataclass(frozen=True)
+class Value:
+    """An output of a node: numbers (n,) that vary with nothing, or a node of `Nodes` by its name.
 
-    node: Node
-    uv: Floats
-    wraps: tuple[str, str]
-    filter: str
-    pixels: NDArray[np.float32]
-
-
-@dataclass
-class Domain:
-    """The places where a graph is evaluated: texture coordinates (h, w, 2), v = 0 at the bottom.
-
-    own: whether the pixels of images are taken as they are. leaves, sets: what the graph has read;
-    patterns: whether it reads coordinates beside those of images; varies: whether it reads any.
-    places: (h, w, 3) in space, None where there are none; solid: whether it reads them. outputs:
-    those of nodes that have been evaluated.
+    width: its channels.
     """
 
-    uv: Floats
-    own: bool = False
-    leaves: list[Leaf] = field(default_factory=list)
-    sets: list[str] = field(default_factory=list)
-    patterns: bool = False
-    places: Floats | None = None
-    solid: bool = False
-    outputs: dict[tuple[str, str], Floats] = field(default_factory=dict)
+    width: int
+    name: str = ""
+    numbers: Floats | None = None
 
     @property
-    def varies(self) -> bool:
-        return bool(self.leaves or self.sets or self.solid)
+    def said(self) -> Any:
+        """The value as an input of a node."""
+        return self.name if self.numbers is None else tuple(self.numbers.tolist())
+
+    def is_all(self, number: float) -> bool:
+        """Return whether it is this number in all channels."""
+        return self.numbers is not None and bool(np.all(self.numbers == number))
 
 
-def probing() -> Domain:
-    """Return a domain of random places."""
-    return Domain(PROBES, places=PLACES)
+def numbers_value(values: object) -> Value:
+    """Return numbers as a value. Raises LeftOut for a text."""
+    array = numbers(values)
+    return Value(len(array), numbers=array)
 
 
-Evaluate = Callable[["Graph", Node, str, Domain], Floats]
-Solid = Callable[["Graph", Node, str, bool], Any]
+@dataclass
+class Nodes:
+    """The nodes and textures that a network has become."""
+
+    nodes: dict[str, dict[str, Any]] = field(default_factory=dict)
+    textures: list[Texture] = field(default_factory=list)
+
+    def add(self, kind: str, inputs: Mapping[str, Value], **settings: int) -> Value:
+        """Return what a kind of node gives: numbers of numbers, and no node without an effect.
+
+        Raises LeftOut for inputs that do not fit to each other.
+        """
+        declared = NODES[kind]
+        try:
+            width = declared.width_of({name: v.width for name, v in inputs.items()}, settings)
+        except SceneError as error:
+            raise LeftOut(f"{kind}: {error.message}") from None
+        plain = {name: v.numbers for name, v in inputs.items() if v.numbers is not None}
+        if len(plain) == len(inputs):
+            return numbers_value(np.nan_to_num(declared.evaluated(plain, settings, width)))
+        kept = _unchanged(kind, inputs, settings)
+        if kept is not None and kept.width == width:
+            return kept
+        said = {name: value.said for name, value in inputs.items()}
+        return self._named({"type": kind, **said, **settings}, width)
+
+    def look_up(self, texture: Texture, channels: int, uv: Value | None = None) -> Value:
+        """Return a texture; uv: where it lies, None for the surface's own."""
+        self.textures.append(texture)
+        at = {} if uv is None else {"texcoord": uv.said}
+        node = {"type": scene_graph.TEXTURE, "texture": len(self.textures) - 1, **at}
+        return self._named({**node, "channels": channels}, channels)
+
+    def texture(self, value: Value, *, wide: bool) -> Texture:
+        """Return a value that varies as a texture; wide: of a color."""
+        node = self.nodes.get(value.name, {})
+        inner = self.nodes.get(str(node.get("in")), node) if node.get("type") == "extract" else node
+        if inner.get("type") == scene_graph.TEXTURE and "texcoord" not in inner:
+            plain = self.textures[inner["texture"]]
+            if inner is not node:
+                return plain if wide else plain.with_channel("rgba"[node["index"]])
+            if wide == (inner["channels"] > 1):
+                return plain
+        return self.graph(value)
+
+    def graph(self, value: Value) -> GraphTexture:
+        """Return a value as a graph of the nodes that it needs."""
+        needed, waiting = set[str](), [value.name]
+        while waiting:
+            name = waiting.pop()
+            if name in self.nodes and name not in needed:
+                needed.add(name)
+                waiting += [
+                    v for k, v in self.nodes[name].items() if k != "type" and v in self.nodes
+                ]
+        nodes = {name: node for name, node in self.nodes.items() if name in needed}
+        used = sorted({n["texture"] for n in nodes.values() if "texture" in n})
+        for name in [name for name, node in nodes.items() if "texture" in node]:
+            nodes[name] = {**nodes[name], "texture": used.index(nodes[name]["texture"])}
+        if value.name in SOURCES:
+            nodes = {"value": {"type": "convert", "in": value.name}}
+        output = value.name if value.name in nodes else "value"
+        return GraphTexture(nodes=nodes, output=output, textures=[self.textures[i] for i in used])
+
+    def place(self, uv: Value) -> tuple[Floats, str] | None:
+        """Return the transform of coordinates (3, 3) that a value is, and its source.
+
+        None for a value that is no such transform.
+        """
+        if uv.name in SOURCES:
+            return (np.eye(3), uv.name) if uv.name != "position" else None
+        graph = self.graph(uv) if uv.numbers is None else None
+        if (
+            graph is None
+            or len(graph.sources) != 1
+            or graph.textures
+            or "position" in graph.sources
+        ):
+            return None
+        places = np.concatenate([PROBES, np.ones((len(PROBES), 1))], axis=1)
+        moved = graph.evaluated(Probing(graph))[..., :2]
+        matrix, *_ = np.linalg.lstsq(places, moved, rcond=None)
+        if not np.allclose(places @ matrix, moved, atol=1e-6):
+            return None
+        return np.vstack([matrix.T, [0.0, 0.0, 1.0]]).round(9), next(iter(graph.sources))
+
+    def _named(self, node: dict[str, Any], width: int) -> Value:
+        name = f"{node['type']}{len(self.nodes)}"
+        self.nodes[name] = node
+        return Value(width, name)
+
+
+def _unchanged(kind: str, inputs: Mapping[str, Value], settings: Mapping[str, int]) -> Value | None:
+    """Return the input that a node returns as it is; None for a node that changes something."""
+    values = [*inputs.values()]
+    if kind in NEUTRAL:
+        a, b = values[:2]
+        if b.is_all(NEUTRAL[kind]):
+            return a
+        if a.is_all(NEUTRAL[kind]) and kind in ("add", "multiply"):
+            return b
+        return Value(b.width, numbers=a.numbers) if kind == "multiply" and a.is_all(0.0) else None
+    if kind == "mix":
+        return values[0] if values[2].is_all(1.0) else values[1] if values[2].is_all(0.0) else None
+    return values[0] if kind in ("convert", "extract") else None
+
+
+NEUTRAL = {"add": 0.0, "subtract": 0.0, "multiply": 1.0, "divide": 1.0, "power": 1.0}
+
+
+@dataclass(frozen=True)
+class Probing:
+    """Random places at which a graph is evaluated; a texture is its mean there."""
+
+    graph: GraphTexture
+
+    def source(self, name: str) -> Floats:
+        return PLACES if name == "position" else PROBES
+
+    def texture(self, number: int, uv: Floats | None, channels: int) -> Floats:
+        texture = self.graph.textures[number]
+        means = [
+            part.pixels(REAL).mean() if isinstance(part, Bitmap) else 0.5
+            for part in scene_graph.parts_of(texture, channels)
+        ]
+        return np.broadcast_to(np.array(means, np.float64), (len(PROBES), channels))
+
+
+Read = Callable[["Graph", Node, str], Value]
 Inner = Callable[[Node, str], "tuple[Node, str] | None"]
 
 
 class Graph:
     """The network of a material.
 
-    functions: what a node of each category computes, see `nodes`; solid: returns a graph over
-    places in space as a texture, see `solids`; library: returns the node in a
+    readers: what reads a node of each category, see `nodes`; library: returns the node in a
     definition's graph that an output of a node stands for, None where there is none.
     """
 
-    def __init__(self, host: Host, functions: dict[str, Evaluate], library: Inner, solid: Solid):
-        self.host, self.functions, self.library, self.solid = host, functions, library, solid
+    def __init__(self, host: Host, readers: Mapping[str, Read], library: Inner):
+        self.host, self.readers, self.library = host, readers, library
+        self.built = Nodes()
+        self._outputs: dict[tuple[str, str], Value] = {}
         self._stored: dict[str, images.Stored | None] = {}
         self._deep = 0
 
     def constant(self, node: Node, name: str, default: object) -> Floats:
         """Return an input (n,) that varies with nothing; of others, with a warning, the mean."""
-        probe = probing()
-        value = self._or_default(node, name, default, probe)
-        if probe.varies:
+        value = self._or_default(node, name, default)
+        mean = value.numbers
+        if mean is None:
             self.host.warn(f"{name} is one value for all of the surface: a mean", node.path)
-        mean = value.reshape(-1, value.shape[-1]).mean(axis=0)
+            graph = self.built.graph(value)
+            mean = graph.evaluated(Probing(graph)).mean(axis=0)[: value.width]
         return np.array([float(f"{number:.7g}") for number in mean])
 
     def texture(self, node: Node, name: str, default: object, *, wide: bool) -> Any:
         """Return an input as a number or three of them, or as a texture."""
-        source = node.source(name)
-        plain = None if source is None else self._plain(*source, wide=wide)
-        if plain is not None:
-            return plain
-        probe = probing()
-        value = self._or_default(node, name, default, probe)
-        if not probe.varies:
-            return said(value.reshape(-1), wide)
-        if probe.solid and source is not None:
-            return self._solid(*source, name, default, wide=wide)
-        return self._baked(node, name, default, probe, wide=wide)
+        value = self._or_default(node, name, default)
+        if value.numbers is not None:
+            return said(value.numbers, wide)
+        return self.built.texture(value, wide=wide)
 
-    def evaluated(self, node: Node, name: str, default: object, domain: Domain) -> Floats:
-        """Return an input (..., channels) at the places of a domain. Raises LeftOut."""
+    def value(self, node: Node, name: str, default: object) -> Value:
+        """Return an input. default: numbers, or the name of a source. Raises LeftOut."""
         source = node.source(name)
-        if source is None:
-            value = node.value(name)
-            given = default if value is None else value
-            if given is None:
-                raise LeftOut(f"{node.kind} without {name}")
-            return from_space(numbers(given), node.color_space(name))
-        return self.output(*source, domain)
+        if source is not None:
+            return self.output(*source)
+        given = node.value(name)
+        given = default if given is None else given
+        if given is None:
+            raise LeftOut(f"{node.kind} without {name}")
+        if isinstance(given, str) and given in SOURCES:
+            return Value(SOURCES[given], given)
+        return numbers_value(from_space(numbers(given), node.color_space(name)))
 
-    def output(self, node: Node, output: str, domain: Domain) -> Floats:
-        """Return an output of a node (..., channels). Raises LeftOut."""
+    def output(self, node: Node, output: str) -> Value:
+        """Return an output of a node. Raises LeftOut."""
         key = node.path, output
-        if key in domain.outputs:
-            return domain.outputs[key]
+        if key in self._outputs:
+            return self._outputs[key]
         self._deep += 1
         try:
             if self._deep > DEEPEST:
                 raise LeftOut("a graph of more than 200 nodes in a row, or in a circle")
-            function = self.functions.get(category(node.kind))
-            inner = None if function else self.library(node, output)
-            if function is not None:
-                value = function(self, node, output, domain)
+            read = self.readers.get(category(node.kind))
+            inner = None if read else self.library(node, output)
+            if read is not None:
+                value = read(self, node, output)
             elif inner is not None:
-                value = self.output(*inner, domain)
+                value = self.output(*inner)
             else:
                 raise LeftOut(f"{node.kind} is not read")
         finally:
             self._deep -= 1
-        domain.outputs[key] = value
+        self._outputs[key] = value
         return value
 
     def stored(self, node: Node) -> images.Stored | None:
@@ -194,80 +304,19 @@ class Graph:
             self._stored[node.path] = self.host.image(asset, node.path)
         return self._stored[node.path]
 
-    def _or_default(self, node: Node, name: str, default: object, domain: Domain) -> Floats:
+    def _or_default(self, node: Node, name: str, default: object) -> Value:
         try:
-            return self.evaluated(node, name, default, domain)
+            return self.value(node, name, default)
         except LeftOut as left_out:
             self.host.warn(f"{left_out}; the default of {name} stands for it", node.path)
-            domain.leaves.clear()
-            domain.sets.clear()
-            domain.solid = False
-            return numbers(default)
-
-    def _solid(self, node: Node, output: str, name: str, default: object, *, wide: bool) -> Any:
-        try:
-            return self.solid(self, node, output, wide)
-        except LeftOut as left_out:
-            self.host.warn(f"{left_out}; the default of {name} stands for it", node.path)
-            return said(numbers(default), wide)
-
-    def _plain(self, node: Node, output: str, *, wide: bool) -> Any:
-        """Return an image that nothing is done to, or an attribute of a mesh; else None."""
-        channel = None
-        while (kind := category(node.kind)) in PASSING:
-            if kind == "extract":
-                channel = "rgba"[int(numbers(node.value("index", 0))[0])]
-            elif kind != "dot":
-                channel = {"x": "r", "y": "g", "z": "b", "w": "a"}.get(output[3:], output[3:])
-            source = node.source("in")
-            if source is None or (channel and wide):
-                return None
-            node, output = source
-        if kind == "geompropvalue" and width(node.kind) == (3 if wide else 1):
-            return self.host.attribute(str(node.value("geomprop", "")), width(node.kind))
-        if kind != "image" or (wide and width(node.kind) < 3):
-            return None
-        probe = probing()
-        try:
-            self.output(node, "out", probe)
-        except LeftOut:
-            return None
-        placed = _placed(probe)
-        stored = self.stored(node)
-        if placed is None or stored is None:
-            return None
-        how = bitmap_of(stored, node.color_space("file") if _is_color(node.kind) else "raw")
-        mapping = self.host.uv_mapping(probe.sets[0])
-        return Bitmap(**how, **placed, mapping=mapping, channel=channel or "r")
-
-    def _baked(
-        self, node: Node, name: str, default: object, probe: Domain, *, wide: bool
-    ) -> Bitmap:
-        if len(set(probe.sets)) > 1:
-            message = f"{name} reads several sets of coordinates; one stands for all"
-            self.host.warn(message, node.path)
-        placed = None if probe.patterns else _placed(probe)
-        mapping = self.host.uv_mapping(probe.sets[0] if probe.sets else "")
-        if placed is not None:
-            leaf = probe.leaves[0]
-            domain = Domain(np.zeros((*leaf.pixels.shape[:2], 2)), own=True)
-        else:
-            placed = {"wrap": "repeat"}
-            domain = Domain(_square(_resolution(probe)))
-        value = self._or_default(node, name, default, domain)
-        pixels = np.broadcast_to(value, (*domain.uv.shape[:2], value.shape[-1]))
-        pixels = pixels[..., :3] if wide else pixels[..., :1]
-        if wide and pixels.shape[-1] == 1:
-            pixels = np.repeat(pixels, 3, axis=-1)
-        image = np.nan_to_num(pixels).astype(np.float32)
-        return Bitmap(image=np.ascontiguousarray(image), raw=True, mapping=mapping, **placed)
+            return numbers_value(default)
 
 
 TYPES = {
     "float": 1, "integer": 1, "boolean": 1, "vector2": 2, "vector3": 3, "vector4": 4, "color3": 3,
     "color4": 4, "matrix33": 9, "matrix44": 16,
 }  # fmt: skip
-_TYPE = re.compile(rf"({'|'.join(TYPES)}|surfaceshader|string|filename)(FA|[IBVM]|\d)*")
+_TYPE = re.compile(rf"({'|'.join(TYPES)}|surfaceshader|string|filename)(FA|CF|VF|[IBVM]|\d)*")
 
 
 def category(kind: str) -> str:
@@ -284,10 +333,6 @@ def width(kind: str) -> int:
     """Return how many numbers a definition's output has; 0 where it does not say so."""
     found = _TYPE.fullmatch(kind.rsplit("_", 1)[-1])
     return TYPES.get(found[1], 0) if found else 0
-
-
-def _is_color(kind: str) -> bool:
-    return "_color" in kind
 
 
 def numbers(value: object) -> Floats:
@@ -355,71 +400,3 @@ def said(value: Floats, wide: bool) -> Any:
     """Return numbers without what single precision has added to them."""
     said = [float(f"{number:.7g}") for number in value]
     return tuple(np.broadcast_to(said[:3], 3).tolist()) if wide else said[0]
-
-
-def _placed(probe: Domain) -> dict[str, Any] | None:
-    """Return where bitmaps lie, by where their coordinates are.
-
-    None without images, for images in several places, and where a place is no matrix.
-    """
-    if not probe.leaves or not all(_same_place(leaf, probe.leaves[0]) for leaf in probe.leaves):
-        return None
-    leaf = probe.leaves[0]
-    places = np.concatenate([probe.uv.reshape(-1, 2), np.ones((probe.uv[..., 0].size, 1))], axis=1)
-    moved = np.broadcast_to(leaf.uv, probe.uv.shape).reshape(-1, 2)
-    matrix, *_ = np.linalg.lstsq(places, moved, rcond=None)
-    if not np.allclose(places @ matrix, moved, atol=1e-6):
-        return None
-    to_uv = np.vstack([matrix.T, [0.0, 0.0, 1.0]]).round(9)
-    place: dict[str, Any] = {"wrap": leaf.wraps[0], "filter": leaf.filter}
-    if leaf.wraps[1] != leaf.wraps[0]:
-        place["wrap_v"] = leaf.wraps[1]
-    return place if np.array_equal(to_uv, np.eye(3)) else {**place, "to_uv": to_uv}
-
-
-def _same_place(a: Leaf, b: Leaf) -> bool:
-    alike = a.pixels.shape[:2] == b.pixels.shape[:2] and a.wraps == b.wraps
-    return alike and np.allclose(np.broadcast_to(a.uv, PROBES.shape), b.uv)
-
-
-def _resolution(probe: Domain) -> int:
-    """Return the pixels along a side that keep the detail of a graph's images."""
-    most = PATTERN if probe.patterns else LEAST
-    for leaf in probe.leaves:
-        spread, whole = (np.ptp(uv.reshape(-1, 2), axis=0).max() for uv in (leaf.uv, probe.uv))
-        most = max(most, math.ceil(max(leaf.pixels.shape[:2]) * max(spread / whole, 0.1)))
-    return min(most, MOST)
-
-
-def _square(side: int) -> Floats:
-    """Return the texture coordinates of an image's pixels, (side, side, 2)."""
-    at = (np.arange(side) + 0.5) / side
-    return np.stack(np.meshgrid(at, at[::-1]), axis=-1)
-
-
-def sampled(leaf: Leaf) -> Floats:
-    """Return an image's colors at its texture coordinates, bilinear; outside by its wraps."""
-    h, w, count = leaf.pixels.shape
-    x, y = leaf.uv[..., 0] * w - 0.5, (1.0 - leaf.uv[..., 1]) * h - 0.5
-    if leaf.filter == "nearest":
-        x, y = np.round(x), np.round(y)
-    left, top = np.floor(x), np.floor(y)
-    total = np.zeros((*leaf.uv.shape[:2], count))
-    for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
-        weight = np.abs(1 - dx - (x - left)) * np.abs(1 - dy - (y - top))
-        column, in_x = _wrapped(left + dx, w, leaf.wraps[0])
-        row, in_y = _wrapped(top + dy, h, leaf.wraps[1])
-        total += (weight * in_x * in_y)[..., None] * leaf.pixels[row, column]
-    return total
-
-
-def _wrapped(at: Floats, count: int, wrap: str) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    whole, inside = at.astype(np.int64), np.ones(at.shape, bool)
-    if wrap == "repeat":
-        return whole % count, inside
-    if wrap == "mirror":
-        turned = whole % (2 * count)
-        return np.minimum(turned, 2 * count - 1 - turned), inside
-    if wrap == "zero":
-        inside = (whole >= 0) & (whole < count)
-    return np.clip(whole, 0, count - 1), inside

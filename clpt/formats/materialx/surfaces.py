@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from clpt.errors import SceneError
-from clpt.formats.materialx import document, noise
+from clpt.formats.materialx import document
 from clpt.formats.materialx.graph import Graph, Host, Node, category
-from clpt.formats.materialx.nodes import FUNCTIONS
+from clpt.formats.materialx.nodes import READERS as NODES
 from clpt.scene import gltf_material, insides
 from clpt.scene.lights import Area
 from clpt.scene.materials import (
@@ -32,6 +32,7 @@ from clpt.scene.media import Homogeneous
 from clpt.scene.params import defaults, params
 from clpt.scene.phases import HenyeyGreenstein, Isotropic
 from clpt.scene.textures import Bitmap, Product, Texture
+from clpt.scene.textures import Graph as GraphTexture
 from clpt.spectra import RGBUnbounded
 
 MATT = {"specular_weight": 0.0}
@@ -225,9 +226,7 @@ def surface(node: Node, host: Host, name: str = "", *, walk: bool = True) -> Sur
         named = node.kind or "a shader without a kind"
         host.warn(f"{named} is not read; grey stands for it", node.path)
         return Surface(*gltf_material.finished(_grey(name), None, None, both=True))
-    read: Surface = READERS[kind](
-        Graph(host, FUNCTIONS, document.inner, noise.texture), node, name, walk
-    )
+    read: Surface = READERS[kind](Graph(host, NODES, document.inner), node, name, walk)
     return read
 
 
@@ -405,7 +404,8 @@ def _with_normals(graph: Graph, node: Node, name: str, inner: Material) -> Mater
             return inner
         return BumpMap(material=inner, height=height, scale=scale)
     map_ = graph.texture(map_node, "in", (0.5, 0.5, 1.0), wide=True)
-    return gltf_material.with_normals(inner, map_ if isinstance(map_, Bitmap) else None, scale)
+    image = map_ if isinstance(map_, (Bitmap, GraphTexture)) else None
+    return gltf_material.with_normals(inner, image, scale)
 
 
 GLTF = {

@@ -427,10 +427,22 @@ FORMS: dict[str, Form] = {
         lambda value, writer: writer.kind(value),
     ),
     "texture": Form(
-        "`bitmap` texture",
+        "texture",
         ref("texture"),
         lambda cursor, reader: reader.kind(cursor, "texture"),
         lambda value, writer: writer.kind(value),
+    ),
+    "textures": Form(
+        "list of textures",
+        {"type": "array", "items": ref("texture")},
+        lambda cursor, reader: [reader.kind(entry, "texture") for entry in cursor.entries()],
+        lambda value, writer: [writer.kind(texture) for texture in value],
+    ),
+    "nodes": Form(
+        "[nodes](graphs.md) by their names",
+        {"type": "object", "additionalProperties": json_schema.NODES},
+        lambda cursor, _: {name: node.expect(dict) for name, node in cursor.items()},
+        lambda value, _: {name: {k: plain(v) for k, v in n.items()} for name, n in value.items()},
     ),
     "filter": Form(
         "object with a `type`",

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from clpt.scene.textures.graph import TEXTURE
+from clpt.scene.textures.nodes import NODES as NODES_OF_GRAPHS
+
 Schema = dict[str, Any]
 
 STRING: Schema = {"type": "string"}
@@ -35,6 +38,18 @@ def object_of(properties: Schema, required: list[str], description: str = "") ->
     }
 
 
+VALUE: Schema = {"anyOf": [NUMBER, STRING, {**NUMBERS, "minItems": 1, "maxItems": 4}]}
+
+
+NODES: Schema = {
+    "type": "object",
+    "required": ["type"],
+    "properties": {
+        "type": {"enum": [*NODES_OF_GRAPHS, TEXTURE]},
+        "stops": {"type": "array", "items": NUMBERS, "minItems": 2},
+    },
+    "additionalProperties": VALUE,
+}
 INDEX_FILE_OBJECT = object_of(
     {"file": {**STRING, "description": "columns, or a page of refractiveindex.info"}}, ["file"]
 )

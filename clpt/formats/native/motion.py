@@ -17,7 +17,7 @@ from clpt.formats.native.json_schema import NUMBER, NUMBERS, STRING, Schema, obj
 from clpt.formats.native.spectra import find_file
 from clpt.scene.motion import SHAPES, Deformation, Keys, Shutter
 
-MEMBERS = ("open", "close", "shape")
+MEMBERS = ("open", "close", "shape", "readout")
 
 
 def _keys_schema(name: str, **properties: Schema) -> Schema:
@@ -45,6 +45,7 @@ SHUTTER_SCHEMA: Schema = {
         "open": {**NUMBER, "description": "[s]"},
         "close": {**NUMBER, "description": "[s]"},
         "shape": {"anyOf": [{"enum": [*SHAPES]}, {**NUMBERS, "minItems": 2}]},
+        "readout": {**NUMBER, "description": "from the first row to the last [s]", "minimum": 0},
     },
     "additionalProperties": False,
 }
@@ -142,7 +143,8 @@ def shutter(cursor: Cursor) -> Shutter | None:
 def write_shutter(value: Shutter) -> dict[str, Any]:
     """Return what stands for a shutter in JSON."""
     shape = value.shape if isinstance(value.shape, str) else [float(v) for v in value.shape]
-    return {"open": value.open, "close": value.close, "shape": shape}
+    rolling = {"readout": value.readout} if value.readout else {}
+    return {"open": value.open, "close": value.close, "shape": shape, **rolling}
 
 
 STEPS: dict[str, ReadCursor] = {

@@ -17,6 +17,7 @@ from clpt.arrays import Floats, Floats32
 from clpt.files import output_files
 from clpt.formats import as_openpbr
 from clpt.formats.as_openpbr import Surface, dispersion, rgb
+from clpt.formats.usd.export_graphs import OF_USD, GraphWriter, Lost
 from clpt.scene import materials
 from clpt.scene.lights import Area
 from clpt.scene.media import Homogeneous, Medium
@@ -24,7 +25,7 @@ from clpt.scene.params import fields_of, params
 from clpt.scene.phases import HenyeyGreenstein
 from clpt.scene.pixels import image_file
 from clpt.scene.roles import REAL, REFLECTANCE, Param, Spectral
-from clpt.scene.textures import Bitmap, Checkerboard, MeshAttribute, Mix, Product
+from clpt.scene.textures import Bitmap, Checkerboard, Graph, MeshAttribute, Mix, Product
 from clpt.scene.values import Texture, Textured
 
 TYPES = Sdf.ValueTypeNames
@@ -199,7 +200,7 @@ class Network:
         path = unused(self.writer.stage, self.path, name)
         shader = UsdShade.Shader.Define(self.writer.stage, path)
         shader.CreateIdAttr(f"ND_{kind}")
-        shader.CreateOutput("out", _type(output))
+        shader.CreateOutput("out", OF_USD[output])
         return shader
 
     def set(self, shader: UsdShade.Shader, name: str, value: Textured, param: Param | None) -> None:
@@ -227,7 +228,13 @@ class Network:
         if isinstance(texture, Checkerboard):
             texture = _two_by_two(texture)
         if isinstance(texture, Bitmap):
-            return self._image(texture, wide)
+            return self._image(texture, form)
+        if isinstance(texture, Graph):
+            try:
+                return GraphWriter(self, texture).written(form)
+            except Lost as lost:
+                self.writer.warn(f"{lost} in a graph; grey stands for it")
+                return self._grey(form, wide)
         if isinstance(texture, MeshAttribute) and texture.name.startswith("vertex_"):
             node = self.shader("attribute", f"geompropvalue_{form}", form)
             node.CreateInput("geomprop", TYPES.String).Set(texture.name.removeprefix("vertex_"))
@@ -240,6 +247,17 @@ class Network:
             self._operand(node, "mix", texture.amount, wide=False)
             return self._operands(node, {"bg": texture.first, "fg": texture.second}, wide)
         self.writer.warn(f"the pattern {texture.kind}; grey stands for it")
+        return self._grey(form, wide)
+
+    def look_up(
+        self, texture: Texture, form: str, uv: UsdShade.Shader | None = None
+    ) -> UsdShade.Shader:
+        """Return a texture of a graph as a type; uv: coordinates in the place of the surface's."""
+        if isinstance(texture, Bitmap):
+            return self._image(texture, form, uv)
+        return self.texture(texture, wide=form != "float")
+
+    def _grey(self, form: str, wide: bool) -> UsdShade.Shader:
         node = self.shader("constant", f"constant_{form}", form)
         return self._operands(node, {"value": 0.5}, wide)
 
@@ -259,27 +277,31 @@ class Network:
         else:
             node.CreateInput(name, kind).Set(float(np.mean(rgb(value, "unbounded"))))
 
-    def _image(self, bitmap: Bitmap, wide: bool, vector: bool = False) -> UsdShade.Shader:
-        form = "vector3" if vector else "color3" if wide else "float"
-        file, space = self.writer.image(bitmap, number=not wide)
+    def _image(
+        self, bitmap: Bitmap, form: str, uv: UsdShade.Shader | None = None
+    ) -> UsdShade.Shader:
+        file, space = self.writer.image(bitmap, number=form == "float")
         node = self.shader("image", f"image_{form}", form)
         source = node.CreateInput("file", TYPES.Asset)
         source.Set(Sdf.AssetPath(f"./{file}"))
-        source.GetAttr().SetColorSpace("raw" if vector else space)
+        source.GetAttr().SetColorSpace("raw" if form == "vector3" else space)
         for side, wrap in zip("uv", bitmap.wraps, strict=True):
             node.CreateInput(f"{side}addressmode", TYPES.String).Set(ADDRESSES[wrap])
         nearest = bitmap.filter == "nearest"
         node.CreateInput("filtertype", TYPES.String).Set("closest" if nearest else "linear")
-        self._place(node, bitmap)
+        self._place(node, bitmap, uv or self.coordinates(bitmap.mapping))
         return node
 
-    def _place(self, node: UsdShade.Shader, bitmap: Bitmap) -> None:
-        """Connect an image's coordinates: u and v of the mesh, moved by `to_uv`."""
-        if bitmap.mapping not in ("uv", "uv1"):
-            self.writer.warn(f"the mapping {bitmap.mapping}; texture coordinates stand for it")
-        set_name = "st1" if bitmap.mapping == "uv1" else "st"
+    def coordinates(self, mapping: str) -> UsdShade.Shader:
+        """Return u and v of the mesh."""
+        if mapping not in ("uv", "uv1"):
+            self.writer.warn(f"the mapping {mapping}; texture coordinates stand for it")
         uv = self.shader("uv", "geompropvalue_vector2", "vector2")
-        uv.CreateInput("geomprop", TYPES.String).Set(set_name)
+        uv.CreateInput("geomprop", TYPES.String).Set("st1" if mapping == "uv1" else "st")
+        return uv
+
+    def _place(self, node: UsdShade.Shader, bitmap: Bitmap, uv: UsdShade.Shader) -> None:
+        """Connect an image's coordinates, moved by `to_uv`."""
         to_uv = np.asarray(bitmap.to_uv, np.float64)
         if not np.array_equal(to_uv, np.eye(3)):
             uv = self._moved(uv, to_uv)
@@ -307,13 +329,6 @@ def unused(stage: Usd.Stage, parent: str, name: str) -> str:
         count += 1
         path = f"{parent}/{valid}_{count}"
     return path
-
-
-def _type(name: str) -> Any:
-    return {
-        "float": TYPES.Float, "color3": TYPES.Color3f, "vector2": TYPES.Float2,
-        "vector3": TYPES.Vector3f, "surfaceshader": TYPES.Token,
-    }[name]  # fmt: skip
 
 
 def _connect(
@@ -383,9 +398,15 @@ def _color_at_depth(shader: UsdShade.Shader, extinction: Floats) -> float:
 def _bend(network: Network, shader: UsdShade.Shader, surface: Surface) -> None:
     """Connect a map of normals, or of heights."""
     if isinstance(surface.normals, Bitmap):
-        image = network._image(dataclasses.replace(surface.normals, raw=True), True, vector=True)
+        image = network.look_up(dataclasses.replace(surface.normals, raw=True), "vector3")
         node = network.shader("normals", "normalmap_float", "vector3")
         _connect(node, "in", TYPES.Vector3f, image)
+    elif isinstance(surface.normals, Graph):
+        node = network.shader("normals", "normalmap_float", "vector3")
+        color = network.texture(surface.normals, wide=True)
+        vector = network.shader("vector", "convert_color3_vector3", "vector3")
+        _connect(vector, "in", TYPES.Color3f, color)
+        _connect(node, "in", TYPES.Vector3f, vector)
     elif surface.bump is not None and isinstance(surface.bump, Texture):
         node = network.shader("bump", "bump_vector3", "vector3")
         _connect(node, "height", TYPES.Float, network.texture(surface.bump, wide=False))

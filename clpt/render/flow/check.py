@@ -51,6 +51,9 @@ def check_at_rest(scene: Scene, cache: LoweringCache) -> None:
     shapes_ = list(distinct(scene.shapes))
     check_film(scene)
     check_camera(scene.camera, scene.film)
+    if scene.integrator.merging and scene.camera.shutter and scene.camera.shutter.readout:
+        message = "photons of a pass are all at one time, rows are not: use path"
+        raise SceneError(message, where="camera.shutter.readout")
     for light in scene.lights:
         check_light(light)
     check_shapes(shapes_)

@@ -97,6 +97,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *when(f.film.layers.light_pictures, "generated/sampler.cl"),
         *either(f.film.layers.light_pictures, "film/light_layers.cl"),
     ),
+    "generated/row_delay.cl": lambda f, _: either(f.motion.rolling, "motion/motion.cl#rolling"),
     "generated/optical_length.cl": lambda f, _: either(
         f.film.layers.time_bins, "transport/optical_length.cl"
     ),

@@ -178,7 +178,8 @@ def motion_features(index: SceneIndex, geometry: Geometry, row: int) -> MotionFe
         emitters=any(emitter.keys > 1 for emitter in geometry.emitters),
         scales=motions.scales,
     )
-    return replace(features, row=row) if features.present else features
+    rolling = motions.shutter.readout > 0.0
+    return replace(features, row=row, rolling=rolling) if features.present else features
 
 
 def geometry_features(

@@ -25,7 +25,7 @@ from clpt.scene.params import fields_of
 from clpt.scene.phases import Phase
 from clpt.scene.scatterer import Scatterer
 from clpt.scene.shapes import Shape
-from clpt.scene.textures import Bitmap, Placed, placed_in
+from clpt.scene.textures import Bitmap, Graph, Placed, Texture, placed_in
 from clpt.spectra import RGB, RGBUnbounded, Spectrum
 
 _BLACK = mt.Diffuse(reflectance=0.0)
@@ -63,9 +63,10 @@ def _flags(outer: Map) -> int:
     return (0 if outer.flip_invalid else AS_IT_IS) | (0 if outer.shadowing else UNSHADED)
 
 
-def _channel(texture: Bitmap, channel: str) -> Bitmap:
+def _channel(texture: Bitmap | Graph, channel: str) -> Texture:
     """Return a coordinate of the normals as a texture of numbers, 0 to 1."""
-    return dataclasses.replace(texture, channel=channel, raw=True)
+    raw = dataclasses.replace(texture, raw=True) if isinstance(texture, Bitmap) else texture
+    return raw.with_channel(channel)
 
 
 @dataclass(frozen=True)

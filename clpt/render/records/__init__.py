@@ -102,6 +102,9 @@ class MediaFeatures:
         return self.absorption or self.present
 
 
+NO_PARTS = ("scales", "rolling", "row")  # fields of features of motion that are no parts
+
+
 @dataclass(frozen=True)
 class MotionFeatures:
     """The things that move, and where the table of them is."""
@@ -114,12 +117,13 @@ class MotionFeatures:
     spheres: bool = flag("MOVES_SPHERES")  # of shapes `spheres` have a row for each key
     emitters: bool = False  # triangles of lights have a row for each key
     scales: bool = flag("MOTION_SCALES")  # some motion scales
+    rolling: bool = False  # rows of the film get light one after the other
     row: int | None = number("MOTION_ROW", None)  # where in `distributions` its table begins
 
     @property
     def parts(self) -> tuple[str, ...]:
         """The names of the parts that move."""
-        parts = (field.name for field in fields(self) if field.name not in ("scales", "row"))
+        parts = (field.name for field in fields(self) if field.name not in NO_PARTS)
         return tuple(name for name in parts if vars(self)[name])
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from clpt.layout import Record
 from clpt.render.records.macros import flag
@@ -86,6 +87,17 @@ RECORDS["mesh_attribute"] = Record(
     per_face=("integer", "1: a value for each face; 0: for each vertex"),
 )
 
+RECORDS["graph"] = Record(
+    "Graph",
+    "A value that nodes compute.",
+    kind=_COMMON["kind"],
+    structure=("integer", "number of the function that computes it"),
+    first=("integer", "of its constants and of the rows of its textures, in `textures`"),
+    channel=("integer", "GRAPH_CHANNEL_"),
+    bounded=("integer", "1: a reflectance, in [0, 1]"),
+    uplift=("integer", "first of the table in `texels` that makes spectra of colours"),
+)
+
 RECORDS["spectral_bitmap"] = Record(
     "SpectralBitmap",
     "An image of spectra.",
@@ -123,6 +135,32 @@ END = 32
 ROLES = ("reflectance", "emission", "index", "factor", "real")
 
 
+# An operand of a node: ("step", number), (a source, perhaps a word), or a run of words: of numbers
+# ("words", first, count), or of rows in tables ("rows", first, count).
+Operand: TypeAlias = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class GraphNode:
+    """A node of a graph, without its numbers.
+
+    operands: of its inputs, in their order; of a texture the words of its rows before the place.
+    """
+
+    kind: str
+    operands: tuple[Operand, ...]
+    settings: tuple[int, ...]
+    width: int
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A graph without its numbers: kernels have a function for each. Each node has a number."""
+
+    nodes: tuple[GraphNode, ...]
+    result: Operand
+
+
 @dataclass(frozen=True)
 class TextureFeatures:
     """The textures of a scene; roles: their (kind, role) pairs, in their order."""
@@ -130,6 +168,7 @@ class TextureFeatures:
     roles: tuple[tuple[str, str], ...] = ()
     mappings: bool = False  # some texture makes uv of the place
     depth: int = 0  # how many values their programs stack
+    graphs: tuple[Structure, ...] = ()  # of the graphs, in the order of their numbers
     attributes: bool = flag("USES_ATTRIBUTES")  # some reads what meshes say per vertex or face
 
     @property

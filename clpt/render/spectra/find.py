@@ -240,12 +240,17 @@ class Look:
             return seen
         return seen + self.unseen * max(float(gridded(light, self.grid).mean()), 0.0)
 
+    @property
+    def white(self) -> float:
+        """The weight of a white light whose channels are 1."""
+        return 1.0 + self.unseen * self.spectral
+
     def levels(self, image: Bitmap) -> Floats:
         """Return the weights of the texels of an emission (h, w), top row first."""
         seen = np.maximum(image.pixels(EMISSION), 0.0).mean(axis=2, dtype=np.float64)
         spectra = image.spectral(EMISSION) if self.spectral else None
         if spectra is None:
-            return seen * (1.0 + self.unseen * self.spectral)
+            return seen * self.white
         within = (spectra.lambdas >= self.lo) & (spectra.lambdas <= self.hi)
         power = np.maximum(spectra.values[..., within], 0.0)
         beyond = power.mean(axis=2, dtype=np.float64) if within.any() else 0.0

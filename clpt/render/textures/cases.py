@@ -16,10 +16,12 @@ from clpt.render.records.textures import (
     PROGRAM,
     RECORDS,
     ROLES,
+    Structure,
 )
+from clpt.render.textures.graphs import graph_text
 from clpt.scene.params import device_params
 from clpt.scene.textures import KINDS as TEXTURE_KINDS
-from clpt.scene.textures import MAPPINGS, Texture
+from clpt.scene.textures import MAPPINGS, Graph, Texture
 
 _LOOKED_UP = "(Scene scene, integer row, TexturePoint point, Wavelengths lambdas)"
 
@@ -48,11 +50,7 @@ def dispatch_text(features: TextureFeatures, stochastic: bool = False, where: Wh
     addressed = {"spectral_bitmap", "packed_bitmap", "voxels"}  # as the texels of bitmaps
     used |= {"bitmap"} if used & addressed else set()
     present = [kind for kind in RECORDS if kind in used]
-    by_kind = {cls.kind: cls for cls in TEXTURE_KINDS}
-    parts = [*lines, '#include "textures/texture.cl"'] if used else []
-    for kind in present:
-        parts += _choice_lines(by_kind[kind]) if kind in by_kind else []
-        parts += [RECORDS[kind].row_text(), f'#include "textures/kinds/{kind}.cl"']
+    parts = [*lines, *_kinds_text(present, features)] if used else []
     leaves = {
         role: [kind for kind in present if (kind, role) in pairs]
         for role in sorted({role for _, role in pairs})
@@ -68,6 +66,40 @@ def dispatch_text(features: TextureFeatures, stochastic: bool = False, where: Wh
     if stochastic:
         parts += _texel_text(leaves["reflectance"], "reflectance" in programs, where)
     return "\n".join([*parts, ""])
+
+
+def _kinds_text(present: list[str], features: TextureFeatures) -> list[str]:
+    """Return the text of kinds; graphs come last, as they look up the others."""
+    by_kind = {cls.kind: cls for cls in TEXTURE_KINDS}
+    plain = [kind for kind in present if kind != "graph"]
+    parts = ['#include "textures/texture.cl"']
+    for kind in plain:
+        parts += _choice_lines(by_kind[kind]) if kind in by_kind else []
+        parts += [RECORDS[kind].row_text(), f'#include "textures/kinds/{kind}.cl"']
+    numbers = [kind for kind in plain if (kind, "real") in features.roles]
+    return parts + (_graph_text(features.graphs, numbers) if "graph" in present else [])
+
+
+def _graph_text(structures: tuple[Structure, ...], textures: list[str]) -> list[str]:
+    """Return the text of graphs; textures: the kinds that they may look up as numbers."""
+    cases = [
+        Case(
+            f"kind == {KINDS.index(kind)}",
+            f"{kind}_real({kind}_row(scene.textures, {active('row')}), scene, point)",
+        )
+        for kind in textures
+    ]
+    kind_of = ("integer kind = gather_i(scene.textures, row);",)
+    signature = "real graph_texture(Scene scene, integer row, TexturePoint point)"
+    return [
+        f"#define TEXTURE_GRAPH {KINDS.index('graph')}",
+        *_choice_lines(Graph),
+        '#include "textures/graph.cl"',
+        Function(signature, "0.0f", cases, kind_of).text(),
+        RECORDS["graph"].row_text(),
+        *graph_text(structures),
+        '#include "textures/kinds/graph.cl"',
+    ]
 
 
 def _texel_text(kinds: list[str], programs: bool, where: Where) -> list[str]:

@@ -28,10 +28,12 @@ from clpt.render.records.textures import (
     OPERATIONS,
     PROGRAM,
     RECORDS,
+    Structure,
     TextureFeatures,
 )
 from clpt.render.spectra.encode import SpectraTable
 from clpt.render.textures.bitmaps import Images, has_levels
+from clpt.render.textures.graphs import Encoded
 from clpt.render.textures.texels import bands, texel_words
 from clpt.scene.params import params
 from clpt.scene.pixels import channel
@@ -42,6 +44,7 @@ from clpt.scene.textures import (
     WRAPS,
     Bitmap,
     Checkerboard,
+    Graph,
     Marble,
     MeshAttribute,
     Placed,
@@ -88,7 +91,7 @@ class TextureTable:
 
     roles: the (kind, role) pairs that occur; attributes: the index in directories by (name, role,
     channel); mappings: whether a texture has a mapping other than a mesh's uv; depth: the most
-    values that a program stacks.
+    values that a program stacks; graphs: the structures of graphs, with their numbers.
     """
 
     def __init__(self, store: TableStore, spectra: SpectraTable, images: Images):
@@ -97,6 +100,8 @@ class TextureTable:
         self.attributes: dict[tuple[str, Role, str], int] = {}
         self.mappings = False
         self.depth = 0
+        self.graphs: dict[Structure, int] = {}  # their numbers
+        self._uplift: int | None = None
         self._rows: dict[tuple[Any, Role], int] = {}
         self._folded: dict[tuple[int, Role], Any] = {}
         self._alive: list[Any] = []  # textures whose ids are keys
@@ -131,6 +136,7 @@ class TextureTable:
             roles=tuple(sorted(self.roles)),
             mappings=self.mappings,
             depth=self.depth,
+            graphs=tuple(self.graphs),
             attributes=bool(self.attributes),
         )
 
@@ -150,6 +156,13 @@ class TextureTable:
         role: as in `row`; channel: of a colour, for a number: "r", "g" or "b", "" for luminance.
         """
         return self.attributes.setdefault((name, role, channel), len(self.attributes))
+
+    def uplift(self) -> int:
+        """Return the first float in `texels` of the table of spectra of colours; 0 in RGB mode."""
+        if self._uplift is None:
+            table = spectra.uplift_table() if self.spectra.spectral else np.zeros(0, np.float32)
+            self._uplift = self.store.append_floats("texels", table) if table.size else 0
+        return self._uplift
 
     def append_row(self, kind: str, members: dict[str, Any]) -> tuple[int, np.ndarray]:
         """Append a row; return its first word, and the row, which may still be written to."""
@@ -275,6 +288,25 @@ def _marble(texture: Marble, role: Role, table: TextureTable) -> int:
     return table.append_leaf(texture, role, colours=first, **members)
 
 
+def _graph(texture: Graph, role: Role, table: TextureTable) -> int:
+    encoded = Encoded(
+        texture,
+        row_of=lambda part: table.row(part, REAL),
+        second_uv=lambda: _second_uv(table),
+        ramp=lambda words: table.store.append("textures", words),
+    )
+    table.mappings |= "texcoord1" in texture.sources
+    channel, few = params(Graph)["channel"].choices.index(texture.channel), texture.width < 3
+    members = {
+        "structure": table.graphs.setdefault(encoded.structure, len(table.graphs)),
+        "first": table.store.append("textures", np.array([*encoded.words, 0], np.uint32)),
+        "channel": 1 if few and texture.channel == "luminance" else channel,
+        "bounded": role is REFLECTANCE,
+        "uplift": 0 if role is REAL else table.uplift(),
+    }
+    return table.append_leaf(texture, role, **members)
+
+
 def _voxels(texture: Voxels, role: Role, table: TextureTable) -> int:
     slices = texture.slices
     nz, ny, nx, depth = slices.shape
@@ -304,6 +336,7 @@ def _plain(texture: Texture, role: Role, table: TextureTable) -> int:
 APPENDERS: dict[type[Texture], Callable[..., int]] = {
     Bitmap: _bitmap,
     Checkerboard: _checkerboard,
+    Graph: _graph,
     MeshAttribute: _mesh_attribute,
     Marble: _marble,
     Voxels: _voxels,

@@ -11,7 +11,7 @@ from clpt.scene.materials.diffuse import Diffuse
 from clpt.scene.materials.material import Material
 from clpt.scene.params import flag, host, real
 from clpt.scene.scatterer import Scatterer
-from clpt.scene.textures import Bitmap
+from clpt.scene.textures import Bitmap, Graph
 from clpt.scene.values import TexturedNumber
 
 
@@ -97,9 +97,9 @@ class NormalMap(NormalMapped):
 
     slot = "normal"
 
-    map: Bitmap | None = host(
+    map: Bitmap | Graph | None = host(
         None,
-        "bitmap, read raw; its colours are (x, y, z) / 2 + 1/2; or None",
+        "bitmap, read raw, or graph; its colours are (x, y, z) / 2 + 1/2; or None",
         form="texture",
     )
     along_v: bool = flag(
@@ -109,8 +109,10 @@ class NormalMap(NormalMapped):
     )
 
     def check(self) -> None:
-        if self.map is not None and not isinstance(self.map, Bitmap):
-            raise SceneError(f"must be a bitmap, not {self.map!r}", where="normal_map.map")
+        if self.map is not None and not isinstance(self.map, (Bitmap, Graph)):
+            raise SceneError(
+                f"must be a bitmap or a graph, not {self.map!r}", where="normal_map.map"
+            )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -15,9 +15,9 @@ import clpt
 from clpt import images
 from clpt.errors import SceneError
 from clpt.formats import materialx
-from clpt.formats.materialx import document, noise
-from clpt.formats.materialx.graph import Domain, Graph, category, width
-from clpt.formats.materialx.nodes import FUNCTIONS
+from clpt.formats.materialx import document
+from clpt.formats.materialx.graph import Graph, Probing, category, width
+from clpt.formats.materialx.nodes import READERS
 from clpt.scene.materials import (
     Blend,
     BumpMap,
@@ -28,7 +28,8 @@ from clpt.scene.materials import (
     TwoSided,
     parts,
 )
-from clpt.scene.textures import Bitmap, MeshAttribute
+from clpt.scene.textures import Bitmap, MeshAttribute, noise
+from clpt.scene.textures import Graph as GraphTexture
 from clpt.spectra import Cauchy
 
 HEAD = '<?xml version="1.0"?><materialx version="1.39" colorspace="lin_rec709">'
@@ -112,7 +113,12 @@ def test_emission_opacity_and_heights(tmp_path: Path) -> None:
     radiance = surface.emission.radiance.first
     np.testing.assert_allclose([radiance.r, radiance.b], [10 * through, 30 * through], rtol=1e-6)
     assert any(isinstance(part, Mask) and part.opacity == 0.25 for part in parts(surface.material))
-    assert isinstance(_leaf(surface, BumpMap).height, Bitmap)
+    assert _kinds(_leaf(surface, BumpMap).height) == ["ramplr"]
+
+
+def _kinds(graph: GraphTexture) -> list[str]:
+    """The kinds of a graph's nodes, in their order."""
+    return [step.kind for step in graph.steps]
 
 
 def test_standard_surface_by_the_library(tmp_path: Path) -> None:
@@ -163,8 +169,8 @@ def test_a_color_space_is_heeded(tmp_path: Path) -> None:
     np.testing.assert_allclose(bitmap.image[..., 0], red, atol=1e-4)
 
 
-def test_what_is_done_to_an_image_is_done_to_its_pixels(tmp_path: Path) -> None:
-    pixels = _picture(tmp_path) / 255.0
+def test_what_is_done_to_an_image_is_a_graph(tmp_path: Path) -> None:
+    pixels = _picture(tmp_path)
     nodes = _image("I", "p.png", "vector3")
     nodes += '<tiledimage name="T" type="float">' + _input("file", "filename", "p.png")
     nodes += _input("uvtiling", "vector2", "2, 3") + "</tiledimage>"
@@ -174,9 +180,31 @@ def test_what_is_done_to_an_image_is_done_to_its_pixels(tmp_path: Path) -> None:
     nodes += _input("in2", "float", "2") + "</power>"
     shader = _input("base_color", "color3", node="C") + _input("coat_weight", "float", node="P")
     leaf = _leaf(_read(tmp_path, shader, nodes)[0])
-    np.testing.assert_allclose(leaf.base_color.image, 1.0 - pixels, atol=1e-6)
-    np.testing.assert_allclose(leaf.coat_weight.image[..., 0], pixels[..., 0] ** 2, atol=1e-6)
-    assert np.array_equal(leaf.coat_weight.to_uv, np.diag([2.0, 3.0, 1.0]))
+    assert _kinds(leaf.base_color) == ["texture", "invert"]
+    assert np.array_equal(leaf.base_color.textures[0].image, pixels)
+    assert _kinds(leaf.coat_weight) == ["texture", "power"]
+    tiled = leaf.coat_weight.textures[0]
+    assert tiled.channel == "r" and np.array_equal(tiled.to_uv, np.diag([2.0, 3.0, 1.0]))
+    found = leaf.base_color.evaluated(Probing(leaf.base_color))
+    np.testing.assert_allclose(found[0], 1.0 - pixels.mean(axis=(0, 1)) / 255.0, atol=1e-6)
+
+
+def test_what_changes_nothing_leaves_an_image(tmp_path: Path) -> None:
+    """As the library's translation of standard_surface multiplies a color by a weight of 1."""
+    pixels = _picture(tmp_path)
+    shader = _input("base_color", "color3", node="I") + _input("base", "float", "1")
+    leaf = _leaf(_read(tmp_path, shader, _image("I", "p.png"), kind="standard_surface")[0])
+    assert isinstance(leaf.base_color, Bitmap) and np.array_equal(leaf.base_color.image, pixels)
+
+
+def test_an_image_where_a_graph_bends_its_coordinates(tmp_path: Path) -> None:
+    _picture(tmp_path)
+    nodes = '<noise2d name="W" type="vector2"/><image name="I" type="color3">'
+    nodes += _input("file", "filename", "p.png") + _input("texcoord", "vector2", node="W")
+    nodes += "</image>"
+    graph = _leaf(_read(tmp_path, _input("base_color", "color3", node="I"), nodes)[0]).base_color
+    assert _kinds(graph) == ["noise2d", "texture"]
+    assert graph.steps[1].operands == {"texcoord": 0} and graph.steps[0].width == 2
 
 
 def test_a_channel_and_a_normal_map(tmp_path: Path) -> None:
@@ -193,14 +221,13 @@ def test_a_channel_and_a_normal_map(tmp_path: Path) -> None:
     assert normals.scale == 0.5 and normals.map.raw
 
 
-def test_a_pattern_becomes_an_image(tmp_path: Path) -> None:
+def test_patterns_cost_no_image(tmp_path: Path) -> None:
     nodes = '<ramptb name="R" type="color3">' + _input("valuet", "color3", "1, 0, 0") + "</ramptb>"
-    image = _leaf(
-        _read(tmp_path, _input("base_color", "color3", node="R"), nodes)[0]
-    ).base_color.image
-    rows = 1.0 - (np.arange(len(image)) + 0.5) / len(image)
-    np.testing.assert_allclose(image[:, 5, 0], rows, atol=1e-6)
-    assert not image[..., 1:].any()
+    graph = _leaf(_read(tmp_path, _input("base_color", "color3", node="R"), nodes)[0]).base_color
+    assert _kinds(graph) == ["ramptb"] and not graph.textures
+    found = graph.evaluated(Probing(graph))
+    v = Probing(graph).source("texcoord")[:, 1]
+    np.testing.assert_allclose(found, np.outer(np.clip(v, 0.0, 1.0), [1.0, 0.0, 0.0]))
 
 
 def test_a_tangent_is_turned(tmp_path: Path) -> None:
@@ -216,7 +243,7 @@ def test_a_tangent_is_turned(tmp_path: Path) -> None:
 
 
 def test_noise_in_space(tmp_path: Path) -> None:
-    """Noise of scaled places is ours in a texture's space; heights of it are a bump map."""
+    """Noise of scaled places, by its formula; heights of it are a bump map."""
     nodes = '<position name="Q" type="vector3"/><multiply name="V" type="vector3">'
     nodes += (
         _input("in1", "vector3", node="Q") + _input("in2", "vector3", "5, 4, 3") + "</multiply>"
@@ -233,12 +260,14 @@ def test_noise_in_space(tmp_path: Path) -> None:
     )
     surface, warnings = _read(tmp_path, shader, nodes)
     color = _leaf(surface).base_color
-    value = color.amount.amount
-    assert not warnings and (color.second.r, color.second.g) == (1.0, 0.0)
-    assert (value.octaves, value.roughness) == (2, 0.4)
-    assert np.array_equal(value.to_texture, np.diag([5.0, 4.0, 3.0, 1.0]))
+    assert not warnings and _kinds(color) == ["multiply", "fractal3d", "mix"]
+    at = Probing(color).source("position")
+    octaves = noise.fractal(
+        at * [5.0, 4.0, 3.0], np.ones(1) * 2.0, np.ones(1) * 2.0, np.ones(1) * 0.4, 1
+    )
+    np.testing.assert_allclose(color.evaluated(Probing(color)), octaves * [1.0, 0.0, 0.0])
     bump = _leaf(surface, BumpMap)
-    assert bump.scale == 0.01 and bump.height.amount.octaves == 2
+    assert bump.scale == 0.01 and _kinds(bump.height) == ["multiply", "fractal3d"]
 
 
 def test_nodes_of_scattering(tmp_path: Path) -> None:
@@ -357,8 +386,9 @@ def test_a_network_of_a_stage() -> None:
     host = _Told()
     leaf = _leaf(materialx.surface(shader, host, "m"))
     assert not host.told and leaf.coat_weight == 1.0 and leaf.base_metalness == 1.0
-    np.testing.assert_allclose(leaf.base_color.image, 0.125)
-    assert leaf.base_color.mapping == "uv1"
+    assert _kinds(leaf.base_color) == ["texture", "multiply"]
+    assert leaf.base_color.textures[0].mapping == "uv1"
+    np.testing.assert_allclose(leaf.base_color.evaluated(Probing(leaf.base_color)), 0.125)
 
 
 def test_a_shader_that_is_not_read_is_grey() -> None:
@@ -400,14 +430,15 @@ NODES: list[tuple[str, dict[str, Any], Any]] = [
 
 @pytest.mark.parametrize(("kind", "values", "expected"), NODES, ids=[row[0] for row in NODES])
 def test_nodes(kind: str, values: dict[str, Any], expected: Any) -> None:
-    graph = Graph(_Told(), FUNCTIONS, document.inner, noise.texture)
-    found = graph.output(_Shader(kind, values), "out", Domain(np.zeros((1, 1, 2))))
-    np.testing.assert_allclose(found.reshape(-1), np.atleast_1d(expected), atol=1e-6)
+    graph = Graph(_Told(), READERS, document.inner)
+    found = graph.output(_Shader(kind, values), "out")
+    np.testing.assert_allclose(found.numbers, np.atleast_1d(expected), atol=1e-6)
 
 
 def test_definitions_are_named() -> None:
     assert category("ND_ifgreater_vector2I") == "ifgreater" and width("ND_ifgreater_vector2I") == 2
     assert category("ND_open_pbr_surface_surfaceshader") == "open_pbr_surface"
+    assert category("ND_combine2_color4CF") == category("ND_combine2_vector4VV") == "combine2"
     assert category("ND_multiply_color3FA") == "multiply" and width("ND_image_color4") == 4
 
 
@@ -421,12 +452,12 @@ def test_noises() -> None:
         assert 0.5 < np.abs(values).max() < 1.05 and abs(values.mean()) < 0.03
         near = noise.perlin(at + 1e-4, 1)
         assert np.abs(near - values).max() < 1e-3
-        octaves = noise.fractal(at, 1, 2, np.ones(1) * 2.0, np.ones(1) * 0.5)
+        octaves = noise.fractal(at, np.array([2.0]), np.array([2.0]), np.array([0.5]), 1)
         np.testing.assert_allclose(octaves, values + 0.5 * noise.perlin(2.0 * at, 1))
         cells = noise.cells(at, 1)
         np.testing.assert_array_equal(cells, noise.cells(np.floor(at) + 0.5, 1))
         assert abs(cells.mean() - 0.5) < 0.03
-        distances = noise.worley(at, 3, 1.0, 0)
+        distances = noise.worley(at, np.ones(1), 3, 0)
         assert np.all(np.diff(distances, axis=-1) >= 0.0) and distances.max() < 2.5
 
 

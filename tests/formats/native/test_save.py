@@ -42,6 +42,7 @@ PAINT = reradiation.Fluorophore(CURVE, CURVE, 0.5)
 GROUP = shapes.Group((shapes.Sphere(radius=0.5),), "group")
 
 NEEDED: dict[type, dict[str, Any]] = {
+    textures.Graph: {"nodes": {"vertex_named": {"type": "noise3d"}, "b": {"type": "sin"}}},
     shapes.Mesh: {"vertices": POINTS, "faces": ROWS},
     shapes.Curves: {"points": RNG.random((4, 4)).astype(np.float32), "lengths": (4,)},
     shapes.Spheres: {"centers": POINTS, "radii": np.full(4, 0.5, np.float32)},
@@ -73,6 +74,8 @@ VALUES: dict[str, Any] = {
     "names": ("depth",),
     "material": materials.Diffuse(reflectance=(0.1, 0.2, 0.3)),
     "texture": textures.Bitmap(image=TEXELS),
+    "textures": (textures.Checkerboard(),),
+    "nodes": {"a": {"type": "mix", "fg": [0.1, 0.2, 0.3], "mix": "b"}, "b": {"type": "noise2d"}},
     "filter": integrators.Tent(radius=1.5),
     "area_light": lights.Area(radiance=3.0),
     "medium": media.Homogeneous(sigma_s=2.0, phase=phases.HenyeyGreenstein(g=0.4), name="fog"),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from clpt.formats.materialx.graph import Probing
 from clpt.scene.materials import Openpbr, parts
 from clpt.scene.shapes import Mesh
 from clpt.scene.textures import MeshAttribute
@@ -67,7 +68,10 @@ def test_an_image_under_arithmetic(stage: Loader, tmp_path: Path) -> None:
     mesh, warnings = _mesh(stage, inputs + "\nfloat inputs:coat_weight = 0.25", nodes)
     leaf = _leaf(mesh)
     assert not warnings and leaf.coat_weight == 0.25 and leaf.name == "Look"
-    np.testing.assert_allclose(leaf.base_color.image, 0.5 * 0.21586, rtol=1e-3)
+    graph = leaf.base_color
+    assert [step.kind for step in graph.steps] == ["texture", "multiply"]
+    found = graph.evaluated(Probing(graph))
+    np.testing.assert_allclose(found, 0.5 * 0.21586, rtol=1e-3)
 
 
 def test_what_is_inside_and_what_is_emitted(stage: Loader) -> None:

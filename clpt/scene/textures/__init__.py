@@ -28,6 +28,8 @@ from clpt.scene.params import (
 )
 from clpt.scene.pixels import averaged, channel, check_image, image_file, thinned
 from clpt.scene.roles import EMISSION, REAL, REFLECTANCE, Role
+from clpt.scene.textures.graph import SECOND_UV as SECOND_UV
+from clpt.scene.textures.graph import Graph as Graph
 from clpt.scene.values import (
     Attributes,
     ImageLike,
@@ -54,7 +56,6 @@ ATTRIBUTES = ("vertex_", "face_")  # prefixes of the names of attributes
 PATTERNS = ("fbm", "wrinkled", "windy")
 MOST_OCTAVES = 32
 MAPPINGS = ("uv", "planar", "spherical", "cylindrical", "uv1")
-SECOND_UV = ("vertex_u1", "vertex_v1")  # the attributes of a mesh that the mapping uv1 takes
 WRAPS = ("repeat", "clamp", "mirror", "zero")
 
 
@@ -120,6 +121,8 @@ class Bitmap(Placed):
     no copies.
     """
 
+    alpha = True
+
     image: ImageLike | None = host(
         None,
         "path of an image, or an array (h, w) or (h, w, 1|3|4), float32, or uint8 as 8-bit files "
@@ -178,8 +181,8 @@ class Bitmap(Placed):
         plain = stored.decoded(not self.raw)
         return np.nan_to_num(channel(plain, self.channel) if role is REAL else plain[..., :3])
 
-    def channel_factors(self, channel: int) -> list[Any]:
-        return [dataclasses.replace(self, channel="rgb"[channel])]
+    def with_channel(self, channel: str) -> Texture:
+        return dataclasses.replace(self, channel=channel)
 
     def mean(self, look: Look) -> float:
         return float(look.levels(self).mean())
@@ -188,6 +191,11 @@ class Bitmap(Placed):
         linear, offset = self.affine[:2, :2], self.affine[:2, 2]
         area = area * abs(np.linalg.det(linear))
         return averaged(look.levels(self), uv @ linear.T + offset, area, self.wraps)
+
+    def number_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
+        linear, offset = self.affine[:2, :2], self.affine[:2, 2]
+        area, values = area * abs(np.linalg.det(linear)), self.pixels(REAL)[..., 0]
+        return averaged(values.astype(np.float64), uv @ linear.T + offset, area, self.wraps)
 
     def clamped_at_poles(self) -> Texture:
         """Return it with `wrap_v` "clamp", unless it has a `wrap_v` or `to_uv` moves it along v."""
@@ -226,17 +234,32 @@ class Checkerboard(Placed):
         pattern = Checkerboard(color0=0.0, color1=1.0, to_uv=self.to_uv)
         return Mix(first=self.color0, second=self.color1, amount=pattern).folded(role)
 
+    def with_channel(self, channel: str) -> Texture:
+        ends = (
+            channel_factors(value, "rgb".index(channel)) for value in (self.color0, self.color1)
+        )
+        (first,), (second,) = ends  # colors: with textures it is a mixture, see `folded`
+        return dataclasses.replace(self, color0=first, color1=second)
+
     def mean(self, look: Look) -> float:
         return 0.5 * (mean(self.color0, look) + mean(self.color1, look))
 
     def brightness_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
-        cells = uv @ self.affine[:2, :2].T + self.affine[:2, 2]
-        same = np.equal(*np.moveaxis(cells % 1.0 < 0.5, -1, 0))
         first, second = (
             brightness_at(colour, look, uv, area, attributes)
             for colour in (self.color0, self.color1)
         )
-        return np.where(same, first, second)
+        return np.where(self._first(uv), first, second)
+
+    def number_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
+        colours = self.color0, self.color1
+        first, second = (constant_number(colour, REAL) or 0.0 for colour in colours)
+        return np.where(self._first(uv), first, second)
+
+    def _first(self, uv: Floats) -> NDArray[np.bool_]:
+        """Return where the first colour is, at uv (..., 2)."""
+        cells = uv @ self.affine[:2, :2].T + self.affine[:2, 2]
+        return np.equal(*np.moveaxis(cells % 1.0 < 0.5, -1, 0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -378,14 +401,20 @@ class MeshAttribute(Texture):
     def attributes(self) -> tuple[str, ...]:  # type: ignore[override]
         return (self.name,)
 
-    def channel_factors(self, channel: int) -> list[Any]:
-        return [dataclasses.replace(self, channel="rgb"[channel])]
+    def with_channel(self, channel: str) -> Texture:
+        return dataclasses.replace(self, channel=channel)
 
     def brightness_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
         if self.name not in attributes:
             return super().brightness_at(look, uv, area, attributes)
         means = attributes[self.name].mean(axis=1, dtype=np.float64)
         return np.broadcast_to(np.maximum(means, 0.0)[:, None], uv.shape[:2])
+
+    def number_at(self, look: Look, uv: Floats, area: Floats, attributes: Attributes) -> Floats:
+        if self.name not in attributes:
+            return super().brightness_at(look, uv, area, attributes)
+        values = np.asarray(attributes[self.name], np.float64)[:, None]
+        return np.broadcast_to(channel(values, self.channel)[:, :, 0], uv.shape[:2])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -470,17 +499,19 @@ class Voxels(Solid):
         """Its values (nz, ny, nx, 1 or 3)."""
         return np.asarray(self.values).transpose(2, 1, 0, 3)
 
-    def channel_factors(self, channel: int) -> list[Any]:
+    def with_channel(self, channel: str) -> Texture:
         values = np.asarray(self.values)
-        number = channel if values.shape[3] > 1 else 0
-        return [dataclasses.replace(self, values=values[..., number])]
+        number = "rgb".index(channel) if values.shape[3] > 1 else 0
+        return dataclasses.replace(self, values=values[..., number])
 
     def mean(self, look: Look) -> float:
         rgb = np.broadcast_to(self.slices.mean(axis=(0, 1, 2), dtype=np.float64), 3)
         return look.brightness(RGBIlluminant(*rgb.tolist()))
 
 
-KINDS = (Bitmap, Checkerboard, Product, Mix, MeshAttribute, Dots, Checkers, Noise, Marble, Voxels)
+KINDS = (
+    Bitmap, Checkerboard, Product, Mix, MeshAttribute, Dots, Checkers, Noise, Marble, Voxels, Graph,
+)  # fmt: skip
 
 
 def _matrix(texture: Texture, name: str, size: int) -> None:
