@@ -11,6 +11,7 @@ from typing import Any, ClassVar, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.arrays import in_memory
 from clpt.errors import SceneError
 from clpt.scene import trimeshes
 from clpt.scene.lights import ON_SHAPES, PoweredLamp
@@ -64,6 +65,12 @@ class Shape(Kind):
         points, _ = cast(Deformation, self.deformation).at(time)
         changes: dict[str, Any] = {self.deformed_field: points, "deformation": None}
         return dataclasses.replace(self, **changes)
+
+    def placed(self: ShapeKind, to_world: ArrayLike) -> ShapeKind:
+        """Return the shape with another `to_world`, (4, 4); no other parameter is checked again."""
+        other = object.__new__(type(self))
+        vars(other).update(vars(self), to_world=in_memory(to_world))
+        return other
 
     material: Material = host(Diffuse(), "of the surface", form="material")
     emission: PoweredLamp | None = host(None, "an `area` light, or None", form="area_light")
