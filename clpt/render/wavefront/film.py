@@ -57,6 +57,7 @@ class Film:
             advice += " or the number of bands"
             sums["bands"] = SUM_WORDS * self._band_sums * self._word_bytes
         layers = features.film.layers
+        advice += " or time_bins" * (layers.time_bins > 0)
         self._layer_words, self._mattes = layers.words, layers.matte_count
         self._light_sums = 3 * layers.light_pictures * features.film_groups
         for name, count in (
