@@ -1,4 +1,6 @@
 /* A camera that moves, at the time of the path. */
+
+/* Step. */
 #include "motion/motion.cl"
 
 inline Motion camera_motion(Scene scene)
@@ -24,6 +26,8 @@ inline CameraRay camera_moved(Scene scene, CameraRay ray)
  * p: both are taken to where the camera was lowered. A solid angle there is |M d|^3 / |det M| of the angle in the
  * world, M being the motion's matrix and d the direction there; importance counts it per t^2, which is |M d|^2 as much
  * in the world. */
+#include "cameras/motion.cl"
+
 inline vec3 camera_point_back(Motion m, vec3 p, mask away)
 {
     vec3 d = motion_back(m, p);
@@ -55,6 +59,8 @@ inline CameraPoint camera_connect(Scene scene, vec3 p, mask away, vec2 lens)
 }
 
 /* Step front: the front of a lens that moves. */
+#include "cameras/motion.cl"
+
 inline CameraRay front_moved(Scene scene, CameraRay ray) { return camera_moved(scene, ray); }
 
 /* A direction from the front, as the camera was lowered; *grows: a solid angle there, over that in the world. */
@@ -75,6 +81,8 @@ inline CameraRay front_moved(Scene scene, CameraRay ray) { return ray; }
 inline vec3 front_lowered(Scene scene, vec3 to, real *grows) { return to; }
 
 /* Step axis: where the camera is, and along which axis it looks. */
+#include "cameras/motion.cl"
+
 inline void camera_axis_moved(Scene scene, vec3 *from, vec3 *axis)
 {
     Motion m = camera_motion(scene);

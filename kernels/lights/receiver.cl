@@ -31,6 +31,9 @@ inline Receiver receiver_of(vec3 hemisphere, natural toward, natural gloss)
     return r;
 }
 
+/* The receiver of a surface without gloss. */
+inline Receiver receiver_dull(vec3 hemisphere) { return receiver_of(hemisphere, (natural)(0), (natural)(0)); }
+
 /* The receiver of a surface with the material at `row`, for light that it scatters along `away`. */
 inline Receiver receiver_at(Scene scene, integer row, vec3 hemisphere, vec3 away)
 {
@@ -58,6 +61,7 @@ inline real receiver_reflects(Receiver r, vec3 wi, real sine, real cosine)
 /* Twin, where no light is sampled by gloss. */
 typedef struct { vec3 hemisphere; } Receiver;
 
+inline Receiver receiver_dull(vec3 hemisphere) { return (Receiver){hemisphere}; }
 inline Receiver receiver_at(Scene scene, integer row, vec3 hemisphere, vec3 away) { return (Receiver){hemisphere}; }
 inline real receiver_reflects(Receiver r, vec3 wi, real sine, real cosine) { return cosine; }
 

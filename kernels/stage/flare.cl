@@ -39,7 +39,7 @@ inline integer begin_ghost(Scene scene, Slab path, Slab shadow, uint at, mask en
                        matrix_vector(camera->to_world, f.n.x, f.n.y, f.n.z), (real)(FAR)};
     front = front_moved(scene, front);
     vec2 place = sampler_pair(sampler, (natural)(DIMENSION_LENS));
-    LightSample ls = light_sample(scene, front.o, front.d, u.y, place, lambdas);
+    LightSample ls = light_sample(scene, front.o, receiver_dull(front.d), u.y, place, lambdas);
     real grows = 1.0f; /* a solid angle where the camera was lowered, over that in the world */
     vec3 to = front_lowered(scene, ls.wi, &grows);
     global const float *m = camera->to_world; /* rigid, so that its transpose leads back */

@@ -26,6 +26,7 @@ from clpt.scene.materials import (
     RoughConductor,
 )
 from clpt.scene.media import Grid, Homogeneous, Mixture
+from clpt.scene.motion import Keys, Shutter
 from clpt.scene.phases import HenyeyGreenstein
 from clpt.scene.shapes import Cube, Disk, Sphere
 from clpt.scene.textures import Checkers, Mix
@@ -41,6 +42,7 @@ pytestmark = pytest.mark.skipif(CLANG is None, reason="clang is not installed")
 FOG, CLOUD = Homogeneous(sigma_s=1.0), Grid(sigma_s=1.0)
 IMAGE = Envmap(image=np.ones((4, 8, 3), np.float32))
 TABLE = Tabulated(lambdas=(400.0, 700.0), values=(1.0, 3.0))
+TURN = Keys((0.0, 1.0), (np.eye(4), np.diag([1.0, -1.0, -1.0, 1.0])))
 COATED = RoughConductor(layers=(Layer(),))
 
 
@@ -54,6 +56,14 @@ MET: dict[str, dict[str, Any]] = {  # parts that once could not be in one scene
     "a grid, and fluorescence": {"shapes": within(CLOUD, Disk(material=Fluorescent()))},
     "a medium, and thin films": {"shapes": within(FOG, Sphere(material=COATED))},
     "a medium, and a lens that reflects": {"shapes": within(FOG), "camera": Lens(losses=True)},
+    "ghosts that light paths find": {
+        "shapes": [Sphere(emission=Area())],
+        "camera": Lens(ghosts=0.5),
+    },
+    "ghosts of a lens that moves, in haze": {
+        "shapes": [Sphere(emission=Area())],
+        "camera": Lens(ghosts=0.5, medium=FOG, motion=TURN, shutter=Shutter(0.0, 1.0)),
+    },
     "a glowing grid": {"shapes": within(Grid(sigma_a=1.0, emission=1.0))},
     "a glowing grid, and a mixture": {
         "shapes": [*within(Grid(sigma_a=1.0, emission=1.0)), *within(Mixture(parts=(CLOUD, FOG)))]

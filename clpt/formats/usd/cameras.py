@@ -22,7 +22,7 @@ POLICIES = (
 # content; None: the picture itself.
 VARIABLES: dict[str, str | None] = {
     "ci": None, "color": None, "c.*": None, "beauty": None, "combined": None, "a": None,
-    "alpha": None,
+    "alpha": None, "rgba": None, "rgb": None,
     "albedo": "albedo", "diffuse_albedo": "albedo", "diffusealbedo": "albedo",
     "n": "shading_normal", "nn": "shading_normal", "normal": "shading_normal",
     "ng": "geometric_normal", "ngn": "geometric_normal",

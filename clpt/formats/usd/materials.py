@@ -23,7 +23,7 @@ from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.scene.values import Texture, Textured
 
 PREVIEW = "UsdPreviewSurface"
-CONTEXT = "mtlx"  # of renderers that read MaterialX
+CONTEXTS = ("mtlx", "", "arnold")  # of surfaces that may be nodes of MaterialX, in this order
 GREY = (0.18, 0.18, 0.18)
 COLOR, ATTRIBUTE = "displayColor", "vertex_"  # a primvar, and how names of attributes begin
 NORMALS = ((2.0, 2.0, 2.0), (-1.0, -1.0, -1.0))  # scale and bias of a map of 8 bits
@@ -123,7 +123,7 @@ def _bound(document: Document, material: UsdShade.Material, both: bool) -> Surfa
 
 def _network(document: Document, material: UsdShade.Material) -> Node | None:
     """Return the surface shader of MaterialX that a material has; None without one."""
-    for context in (CONTEXT, ""):
+    for context in CONTEXTS:
         found = material.ComputeSurfaceSource(context)[0]
         node = Node(document, found) if found else None
         if node is not None and node.kind.startswith("ND_") and "UsdPreview" not in node.kind:

@@ -88,7 +88,8 @@ def _over_shutter(document: Document, variables: dict[str, Any]) -> Scene:
     opening, length = scene.extra.pop("shutter")
     if "shutter" in variables:
         opening, length = 0.0, _number(document.file, variables, "shutter", 0.0)
-    moves = any(layer.ListAllTimeSamples() for layer in stage.GetUsedLayers())
+    # A value with a single sample is the same at all times.
+    moves = any(len(layer.ListAllTimeSamples()) > 1 for layer in stage.GetUsedLayers())
     if not length > 0.0 or not moves:
         return scene
     rate = stage.GetTimeCodesPerSecond()
@@ -185,7 +186,7 @@ def _scene(document: Document, variables: dict[str, Any]) -> Scene:
     for prim in world.volumes:
         shapes += gprims.volume(document, prim, document.placement(prim))
     settings = cameras.settings(document, world.settings)
-    chosen = _chosen(document, world.cameras, variables.get("camera", settings.camera))
+    chosen = _chosen(document, world.cameras, variables.get("camera"), settings.camera)
     if not shapes:
         document.warn("holds no shapes", "/")
     view = None if chosen is None else cameras.camera(document, chosen, settings)
@@ -212,12 +213,18 @@ def _scene(document: Document, variables: dict[str, Any]) -> Scene:
     return scene
 
 
-def _chosen(document: Document, shown: list[Usd.Prim], name: object) -> Usd.Prim | None:
-    """Return the camera of a name, path or number; the first one where none is asked for."""
-    if name is None:
-        return shown[0] if shown else None
+def _chosen(
+    document: Document, shown: list[Usd.Prim], name: object, usual: str | None
+) -> Usd.Prim | None:
+    """Return the camera of a name, path or number, else the usual camera, else the first."""
     for number, prim in enumerate(shown):
-        if str(name) in (str(number), prim.GetName(), str(prim.GetPath())):
+        called = (str(number), prim.GetName(), str(prim.GetPath()))
+        if (usual if name is None else str(name)) in called:
             return prim
+    if name is None:
+        if usual is not None and shown:
+            message = f"its camera {usual} is not there; {shown[0].GetPath()} replaces it"
+            document.warn(message, "render settings")
+        return shown[0] if shown else None
     names = ", ".join(str(prim.GetPath()) for prim in shown) or "none"
     raise SceneError(f"shows no camera {name!r}; it shows: {names}", file=document.file)

@@ -23,6 +23,9 @@ from clpt.scene import gltf_material
 from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.scene.values import Texture
 
+# Shaders of other renderers that are, input by input, nodes of MaterialX.
+SAME = {"arnold:standard_surface": "ND_standard_surface_surfaceshader"}
+
 
 @dataclass(frozen=True)
 class Node:
@@ -34,7 +37,8 @@ class Node:
     @property
     def kind(self) -> str:
         """Its identifier, such as UsdUVTexture; "" for none."""
-        return str(self.shader.GetIdAttr().Get() or "")
+        name = str(self.shader.GetIdAttr().Get() or "")
+        return SAME.get(name, name)
 
     @property
     def path(self) -> str:
@@ -164,8 +168,10 @@ def _texture(node: Node, output: str, uses: Uses, default: tuple[float, ...]) ->
 
 def _primvar(node: Node, uses: Uses, default: tuple[float, ...]) -> Texture:
     name = str(node.value("varname", ""))
-    fallback = node.value("fallback", default)
-    row = tuple(map(float, fallback)) if isinstance(fallback, Sequence) else (float(fallback),)
+    if node.kind.endswith(("2", "3", "4")):
+        row = node.numbers("fallback", (0.0,) * int(node.kind[-1]))
+    else:
+        row = (node.number("fallback", default[0]),)
     uses.fallbacks[name] = (row + default)[: len(default)]
     return MeshAttribute(name=f"vertex_{name}")
 

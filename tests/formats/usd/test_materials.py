@@ -219,3 +219,66 @@ def test_volumes_have_their_field(stage: Loader, tmp_path: Path) -> None:
     assert np.allclose(box.to_world @ [1, 1, 1, 1], [0.6, 0.1, 0.1, 1])
     assert np.allclose(box.interior.to_world @ [1, 1, 1, 1], [0.6, 0.1, 0.1, 1])
     assert scene.warnings == ["/V: field 'heat' is left out"]
+
+
+def test_fallbacks_of_primvars(stage: Loader) -> None:
+    """A mesh without the primvar has the fallback of its reader, of one number or of three."""
+    text = f"""
+    def Material "Look" {{
+        token outputs:surface.connect = </Look/S.outputs:surface>
+        def Shader "S" {{
+            uniform token info:id = "UsdPreviewSurface"
+            color3f inputs:diffuseColor.connect = </Look/C.outputs:result>
+            float inputs:roughness.connect = </Look/R.outputs:result>
+            token outputs:surface
+        }}
+        def Shader "C" {{
+            uniform token info:id = "UsdPrimvarReader_float3"
+            string inputs:varname = "paint"
+            float3 inputs:fallback = (0.5, 0.25, 0.125)
+            float3 outputs:result
+        }}
+        def Shader "R" {{
+            uniform token info:id = "UsdPrimvarReader_float"
+            string inputs:varname = "wear"
+            float inputs:fallback = 0.75
+            float outputs:result
+        }}
+    }}
+    def Mesh "M" (apiSchemas = ["MaterialBindingAPI"]) {{
+        {SQUARE}
+        rel material:binding = </Look>
+    }}
+    {SUN}"""
+    shape = stage(text).shapes[0]
+    assert np.allclose(shape.attributes["vertex_paint"], (0.5, 0.25, 0.125))
+    assert np.allclose(shape.attributes["vertex_wear"], 0.75)
+
+
+def test_surfaces_of_arnold_are_those_of_materialx(stage: Loader) -> None:
+    pytest.importorskip("MaterialX", reason="its library translates standard_surface")
+    text = f"""
+    def Material "Look" {{
+        token outputs:%s:surface.connect = </Look/S.outputs:surface>
+        def Shader "S" {{
+            uniform token info:id = "%s"
+            float inputs:base = 1
+            color3f inputs:base_color = (0.5, 0.25, 0.125)
+            float inputs:specular_roughness = 0.625
+            token outputs:surface
+        }}
+    }}
+    def Mesh "M" (apiSchemas = ["MaterialBindingAPI"]) {{
+        {SQUARE}
+        rel material:binding = </Look>
+    }}
+    {SUN}"""
+    scenes = [
+        stage(text % names)
+        for names in (
+            ("arnold", "arnold:standard_surface"),
+            ("mtlx", "ND_standard_surface_surfaceshader"),
+        )
+    ]
+    assert str(scenes[0].shapes[0].material) == str(scenes[1].shapes[0].material)
+    assert not scenes[0].warnings and "0.625" in str(scenes[0].shapes[0].material)

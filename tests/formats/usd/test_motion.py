@@ -10,6 +10,7 @@ from clpt.scene.shapes import Mesh
 from tests.formats.usd.conftest import SQUARE, SUN, Loader
 
 pytest.importorskip("pxr")
+scenes = pytest.importorskip("clpt.formats.usd.scenes")
 
 TIMES = "startTimeCode = 1\n endTimeCode = 5\n timeCodesPerSecond = 10"
 MOVING = f"""def Mesh "M" {{
@@ -43,6 +44,13 @@ def test_a_camera_opens_its_shutter(stage: Loader) -> None:
     assert (keys.transforms[0][0, 3], keys.transforms[-1][0, 3]) == pytest.approx((3.0, 5.0))
     assert (scene.camera.shutter.open, scene.camera.shutter.close) == pytest.approx((0.25, 0.35))
     assert only_mesh(stage(MOVING + SUN + view, TIMES, time=3, shutter=0)).motion is None
+
+
+def test_a_single_sample_is_no_motion(stage: Loader, monkeypatch: pytest.MonkeyPatch) -> None:
+    still = MOVING.replace(", 5: (8, 0, 0)", "")
+    monkeypatch.setattr(scenes.animation, "scene_over_shutter", None)  # the scene is read once
+    mesh = only_mesh(stage(still + SUN, TIMES, shutter=1))
+    assert mesh.motion is None and mesh.to_world[0, 3] == 0.0
 
 
 def test_vertices_move(stage: Loader) -> None:
@@ -103,6 +111,9 @@ def test_render_settings(stage: Loader) -> None:
     cropped = stage(mesh + text % 'uniform token aspectRatioConformPolicy = "cropAperture"')
     assert cropped.camera.fov == pytest.approx(90.0)
     assert stage(mesh + text % "", camera="A").camera.fov < 40.0
+    lost = stage((mesh + text % "").replace("rel camera = </B>", "rel camera = </Gone>"))
+    assert lost.camera.fov == stage(mesh + text % "", camera="A").camera.fov
+    assert lost.warnings == ["render settings: its camera /Gone is not there; /A replaces it"]
 
 
 def test_variables_become_layers(stage: Loader) -> None:
