@@ -121,6 +121,29 @@ inline vec4 graph_over(vec4 fg, vec4 bg, real amount)
     real s = 1.0f - fg.w;
     return graph_mixed(v4(fg.x + bg.x * s, fg.y + bg.y * s, fg.z + bg.z * s, fg.w + bg.w * s), bg, amount);
 }
+inline vec4 graph_times(vec4 a, real s) { return v4(a.x * s, a.y * s, a.z * s, a.w * s); }
+inline vec4 graph_disjointover(vec4 fg, vec4 bg, real amount)
+{
+    real whole = fg.w + bg.w;
+    vec4 below = graph_times(bg, sel(whole <= 1.0f, (real)(1.0f), graph_divide(1.0f - fg.w, bg.w)));
+    vec4 both = v4(fg.x + below.x, fg.y + below.y, fg.z + below.z, min_r(whole, (real)(1.0f)));
+    return graph_mixed(both, bg, amount);
+}
+inline vec4 graph_matte(vec4 fg, vec4 bg, real amount)
+{
+    vec4 both = graph_mixed(fg, bg, fg.w);
+    both.w = fg.w + bg.w * (1.0f - fg.w);
+    return graph_mixed(both, bg, amount);
+}
+inline vec4 graph_in(vec4 fg, vec4 bg, real amount) { return graph_mixed(graph_times(fg, bg.w), bg, amount); }
+inline vec4 graph_out(vec4 fg, vec4 bg, real amount) { return graph_mixed(graph_times(fg, 1.0f - bg.w), bg, amount); }
+inline vec4 graph_mask(vec4 fg, vec4 bg, real amount) { return graph_mixed(graph_times(bg, fg.w), bg, amount); }
+inline vec4 graph_premult(vec4 a) { return v4(a.x * a.w, a.y * a.w, a.z * a.w, a.w); }
+inline vec4 graph_unpremult(vec4 a)
+{
+    real s = 1.0f / sel(a.w == 0.0f, (real)(1.0f), a.w);
+    return v4(a.x * s, a.y * s, a.z * s, a.w);
+}
 inline real graph_dotproduct(vec4 a, vec4 b) { return a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w; }
 inline real graph_magnitude(vec4 a) { return sqrt(graph_dotproduct(a, a)); }
 inline vec4 graph_normalize(vec4 a)

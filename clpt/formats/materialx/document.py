@@ -101,6 +101,8 @@ class Element:
             found = self.node.getParent().getInput(inside) or found
         if found.getType() == "filename":
             return found.getResolvedValueString() or default
+        if found.getType().startswith("matrix"):
+            return tuple(map(float, found.getValueString().split(","))) or default
         value = found.getValue()
         if value is None:
             return default

@@ -5,8 +5,11 @@ READERS has an entry for each category that is read; the library has graphs for 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
+from clpt.arrays import Floats
 from clpt.formats.materialx.graph import (
     Graph,
     LeftOut,
@@ -20,6 +23,7 @@ from clpt.formats.materialx.graph import (
 )
 from clpt.scene.textures import Bitmap
 from clpt.scene.textures.nodes import NODES
+from clpt.spectra import Blackbody
 
 WRAPS = {"periodic": "repeat", "clamp": "clamp", "mirror": "mirror", "constant": "zero"}
 
@@ -125,6 +129,73 @@ def _image(graph: Graph, node: Node, output: str) -> Value:
     return graph.built.add("convert", {"in": value}, channels=count)
 
 
+def _logical(kind: str, **inputs: str) -> Read:
+    """Return the reader of a node of booleans, which are 0 and 1."""
+
+    def read(graph: Graph, node: Node, output: str) -> Value:
+        given = {name: graph.value(node, of, 0.0) for name, of in inputs.items()}
+        return graph.built.add(kind, given)
+
+    return read
+
+
+def _transformed(graph: Graph, node: Node, output: str) -> Value:
+    """A vector times a matrix (3, 3) that varies with nothing: a product with each column."""
+    matrix, vector = graph.value(node, "mat", IDENTITY), graph.value(node, "in", (0.0,) * 3)
+    if matrix.numbers is None or matrix.width != 9 or vector.width != 3:
+        raise LeftOut(f"{node.kind} is not read")
+    parts = [
+        graph.built.add("dotproduct", {"in1": vector, "in2": numbers_value(column)})
+        for column in matrix.numbers.reshape(3, 3).T
+    ]
+    return graph.built.add("combine3", dict(zip(("in1", "in2", "in3"), parts, strict=True)))
+
+
+def _of_numbers(function: Callable[..., object], **inputs: object) -> Read:
+    """Return the reader of a node whose inputs cannot vary.
+
+    function: of numbers (n,), with the output's name last.
+    """
+
+    def read(graph: Graph, node: Node, output: str) -> Value:
+        values = [graph.value(node, name, default) for name, default in inputs.items()]
+        if any(value.numbers is None for value in values):
+            raise LeftOut(f"{node.kind} of what varies is not read")
+        return numbers_value(function(*(value.numbers for value in values), output))
+
+    return read
+
+
+def _alphas(roughness: Floats, anisotropy: Floats, output: str) -> Floats:
+    """Two alphas, whose ratio an anisotropy gives."""
+    square = np.clip(roughness**2, 1e-8, 1.0)
+    ratio = np.sqrt(1.0 - np.clip(anisotropy, 0.0, 0.98))
+    return np.concatenate([np.minimum(square / ratio, 1.0), square * ratio])
+
+
+def _two_alphas(roughness: Floats, output: str) -> Floats:
+    """Two alphas; a second roughness of 0 is the first."""
+    second = roughness[1:] if roughness[1] > 0.0 else roughness[:1]
+    return np.clip(np.concatenate([roughness[:1], second]) ** 2, 1e-8, 1.0)
+
+
+def _artistic(reflectivity: Floats, edge: Floats, output: str) -> Floats:
+    """A metal's index and extinction by its colors (Gulbrandsen 2014)."""
+    r = np.clip(reflectivity, 0.0, 0.99)
+    least, most = (1.0 - r) / (1.0 + r), (1.0 + np.sqrt(r)) / (1.0 - np.sqrt(r))
+    index = most + (least - most) * edge
+    square = (r * (index + 1.0) ** 2 - (index - 1.0) ** 2) / (1.0 - r)
+    return index if output != "extinction" else np.sqrt(np.maximum(square, 0.0))
+
+
+def _black_body(temperature: Floats, output: str) -> object:
+    kelvin = min(max(float(temperature[0]), 800.0), 25_000.0)
+    return np.maximum(Blackbody(kelvin, normalised=True).to_rgb("emission"), 0.0)
+
+
+IDENTITY = tuple(np.eye(3).ravel().tolist())
+
+
 def _refused(graph: Graph, node: Node, output: str) -> Value:
     raise LeftOut(f"{node.kind} is not read")
 
@@ -138,6 +209,16 @@ READERS: dict[str, Read] = {
     "extract": _extracted,
     "separate2": _separated, "separate3": _separated, "separate4": _separated,
     "convert": _converted,
+    "logical_and": _logical("and", in1="in1", in2="in2"),
+    "logical_or": _logical("or", in1="in1", in2="in2"),
+    "logical_not": _logical("not", **{"in": "in"}),
+    "transformmatrix": _transformed,
+    "roughness_anisotropy": _of_numbers(_alphas, roughness=0.0, anisotropy=0.0),
+    "roughness_dual": _of_numbers(_two_alphas, roughness=(0.0, 0.0)),
+    "artistic_ior": _of_numbers(
+        _artistic, reflectivity=(0.944, 0.776, 0.373), edge_color=(0.998, 0.981, 0.751)
+    ),
+    "blackbody": _of_numbers(_black_body, temperature=5000.0),
     "image": _image,
     "position": _position,
     "texcoord": _texcoord,

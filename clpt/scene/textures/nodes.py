@@ -174,6 +174,27 @@ def _over(fg: Floats, bg: Floats, amount: Floats) -> Floats:
     return _mix(fg + bg * (1.0 - fg[..., 3:]), bg, amount)
 
 
+def _over_apart(fg: Floats, bg: Floats, amount: Floats) -> Floats:
+    """The composite of two layers that do not hide each other as long as there is room."""
+    f, b = fg[..., 3:], bg[..., 3:]
+    both = fg + bg * np.where(f + b <= 1.0, 1.0, safe(1.0 - f, b))
+    return _mix(joined(both[..., :3], np.minimum(f + b, 1.0)), bg, amount)
+
+
+def _matte(fg: Floats, bg: Floats, amount: Floats) -> Floats:
+    f = fg[..., 3:]
+    color = fg[..., :3] * f + bg[..., :3] * (1.0 - f)
+    return _mix(joined(color, f + bg[..., 3:] * (1.0 - f)), bg, amount)
+
+
+def _premultiplied(x: Floats) -> Floats:
+    return joined(x[..., :3] * x[..., 3:], x[..., 3:])
+
+
+def _unpremultiplied(x: Floats) -> Floats:
+    return joined(np.where(x[..., 3:] == 0.0, x[..., :3], safe(x[..., :3], x[..., 3:])), x[..., 3:])
+
+
 def _rotated(x: Floats, amount: Floats) -> Floats:
     turn = np.radians(amount[..., 0])
     s, c = np.sin(turn), np.cos(turn)
@@ -340,7 +361,17 @@ NODES: dict[str, NodeKind] = {
     "burn": _each(_burn, fg=0.0, bg=0.0, mix=1.0),
     "inside": _each(np.multiply, **IN, mask=1.0),
     "outside": _each(lambda x, mask: x * (1.0 - mask), **IN, mask=0.0),
-    "over": _vectors(_over, 4, fg=FOUR, bg=FOUR, mix=1.0),
+    **{
+        name: _vectors(function, 4, fg=FOUR, bg=FOUR, mix=1.0)
+        for name, function in {
+            "over": _over, "disjointover": _over_apart, "matte": _matte,
+            "in": lambda fg, bg, amount: _mix(fg * bg[..., 3:], bg, amount),
+            "out": lambda fg, bg, amount: _mix(fg * (1.0 - bg[..., 3:]), bg, amount),
+            "mask": lambda fg, bg, amount: _mix(bg * fg[..., 3:], bg, amount),
+        }.items()
+    },
+    "premult": _vectors(_premultiplied, 4, **{"in": FOUR}),
+    "unpremult": _vectors(_unpremultiplied, 4, **{"in": FOUR}),
     "dotproduct": _padded(_dot, 1, "in1", "in2"),
     "magnitude": _padded(_length, 1, "in"),
     "normalize": _padded(_normalized, 0, "in"),

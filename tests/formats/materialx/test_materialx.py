@@ -423,6 +423,13 @@ NODES: list[tuple[str, dict[str, Any], Any]] = [
     ("ND_extract_color3", {"in": (1, 2, 3), "index": 2}, 3),
     ("ND_convert_float_color3", {"in": 0.5}, (0.5, 0.5, 0.5)),
     ("ND_luminance_color3", {"in": (1, 0, 0)}, (0.2722287,) * 3),
+    ("ND_logical_and", {"in1": True, "in2": False}, 0),
+    ("ND_roughness_anisotropy", {"roughness": 0.5, "anisotropy": 0.75}, (0.5, 0.125)),
+    ("ND_roughness_dual", {"roughness": (0.5, 0.2)}, (0.25, 0.04)),
+    ("ND_artistic_ior", {"reflectivity": (0.25,) * 3, "edge_color": (1,) * 3}, (0.6,) * 3),
+    ("ND_blackbody", {"temperature": 6500}, (1.043216, 0.983593, 1.035224)),
+    ("ND_matte_color4", {"fg": (1, 0, 0, 0.5), "bg": (0, 1, 0, 0.5)}, (0.5, 0.5, 0, 0.75)),
+    ("ND_acescg_to_lin_rec709_color3", {"in": (1, 0, 0)}, (1.705051, -0.130256, -0.024003)),
     ("ND_contrast_float", {"in": 1, "amount": 2, "pivot": 0.5}, 1.5),  # a graph of the library
     ("ND_saturate_color3", {"in": (1, 0, 0), "amount": 0}, (0.2722287,) * 3),
 ]
