@@ -190,7 +190,7 @@ def _copies(shape: Shape, whole: Prototype) -> list[Placed]:
 def _placed(shape: Shape, to_world: Matrices) -> list[Shape]:
     """A shape under each of the transforms, which its own goes before."""
     placement = shapes.placement(shape)
-    return [dataclasses.replace(shape, to_world=matrix @ placement) for matrix in to_world]
+    return [shape.placed(matrix @ placement) for matrix in to_world]
 
 
 def _alone(shape: Shape, number: int) -> Prototype:

@@ -11,13 +11,14 @@ from typing import Any, ClassVar, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt.arrays import in_memory
 from clpt.errors import SceneError
 from clpt.scene import trimeshes
 from clpt.scene.lights import ON_SHAPES, PoweredLamp
 from clpt.scene.materials import Diffuse, Material
 from clpt.scene.media import Medium
 from clpt.scene.motion import Deformation, Keys
-from clpt.scene.params import Kind, choice, host
+from clpt.scene.params import Kind, choice, host, params
 from clpt.scene.textures import Bitmap
 from clpt.scene.values import Matrix4, OnDevice, Vector3
 
@@ -64,6 +65,17 @@ class Shape(Kind):
         points, _ = cast(Deformation, self.deformation).at(time)
         changes: dict[str, Any] = {self.deformed_field: points, "deformation": None}
         return dataclasses.replace(self, **changes)
+
+    def placed(self: ShapeKind, to_world: ArrayLike) -> ShapeKind:
+        """Return the shape with another `to_world`, (4, 4), and nothing else checked again.
+
+        Raises SceneError for a matrix that `to_world` cannot be.
+        """
+        param = params(type(self))["to_world"]
+        matrix = param.role.check(in_memory(to_world), param, f"{self.kind}.to_world")
+        other = object.__new__(type(self))
+        vars(other).update(vars(self), to_world=matrix)
+        return other
 
     material: Material = host(Diffuse(), "of the surface", form="material")
     emission: PoweredLamp | None = host(None, "an `area` light, or None", form="area_light")

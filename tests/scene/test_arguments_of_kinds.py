@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
+from clpt import transforms as tf
 from clpt.errors import SceneError, UnknownKindError, UnusedParameterError
 from clpt.scene import KINDS, Scene, cameras, lights, materials, shapes
 
@@ -145,3 +147,15 @@ def test_unknown_layer_of_a_film() -> None:
 
     with pytest.raises(UnknownKindError, match="depth"):
         Film(layers="dept")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("cls", [shapes.Sphere, shapes.Cube, shapes.Rectangle, shapes.Disk])
+def test_a_placed_shape_is_the_shape_elsewhere(cls: type[shapes.Shape]) -> None:
+    lit = cls(emission=lights.Area(radiance=2.0), name="lamp")
+    matrix = tf.translate([1.0, 2.0, 3.0]) @ tf.scale(2.0)
+    assert repr(lit.placed(matrix)) == repr(dataclasses.replace(lit, to_world=matrix))
+    assert lit.placed(matrix).emission is lit.emission
+    np.testing.assert_array_equal(lit.to_world, np.eye(4))
+    for wrong in (np.eye(3), np.full((4, 4), np.nan)):
+        with pytest.raises(SceneError, match="to_world"):
+            lit.placed(wrong)

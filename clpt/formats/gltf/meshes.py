@@ -345,7 +345,7 @@ def _transformed(part: Mesh, node: Element, to_world: Matrix) -> Mesh | None:
     if np.array_equal(to_world, np.eye(4)):
         return part
     if not transforms.is_singular(to_world):
-        return dataclasses.replace(part, to_world=to_world)
+        return part.placed(to_world)
     # A node may be flat, or scaled to zero to hide it.
     moved = transforms.transform_points(to_world, part.vertices).astype(np.float32)
     corners = moved[part.faces].astype(np.float64)

@@ -21,7 +21,9 @@ from clpt.files import budget, input_files
 
 PER_BYTE = 8  # bytes of memory for each of the file, while it is read
 PIECE = 1 << 19  # bytes that are parsed at a time: they and their arrays fit a processor's cache
-BLANK, NEWLINE, HASH, SLASH, POINT = 32, 10, 35, 47, 46
+BLANK, NEWLINE, HASH, SLASH, POINT, MINUS = 32, 10, 35, 47, 46, 45
+EXACT = 2**53  # whole numbers below it, and powers of ten up to 22, are exact in float64
+POWERS = 10.0 ** np.arange(23)
 BLANKS = bytes(32 if code < 32 and code not in (9, 10, 13) else code for code in range(256))
 OTHER, VERTEX, UV, NORMAL, FACE = range(5)  # kinds of lines
 NAMES = {VERTEX: "v", UV: "vt", NORMAL: "vn"}
@@ -209,7 +211,10 @@ class _Reader:
         if not len(rows):
             return
         words = lines.words[rows] - 1
-        values = _parsed(_cut(plain, lines, rows), NUMBERS, np.float32, int(words.sum()))
+        cut, count = _cut(plain, lines, rows), int(words.sum())
+        values = _decimals(cut, count)
+        if values is None:
+            values = _parsed(cut, NUMBERS, np.float32, count)
         if values is None or words.min() < LEAST[kind]:
             values = self.each_number(at, kind, plain, lines, rows)
         self.rows[kind].append(_columns(values, words, 0, 2 if kind == UV else 3))
@@ -387,6 +392,32 @@ def _parsed(cut: bytes, letters: bytes, dtype: DTypeLike, count: int) -> NDArray
     except ValueError:
         return None
     return values if len(values) == count else None
+
+
+def _decimals(cut: bytes, count: int) -> Floats32 | None:
+    """Return all numbers of a text without exponents; None of others, and of long numbers.
+
+    Each is a whole number over a power of ten. Both are exact in float64, so that the quotient is
+    rounded as that of `strtod`, which takes three times as long.
+    """
+    whole = _parsed(cut.replace(b".", b""), INDICES, np.int64, count)
+    if whole is None or not count or whole.max() >= EXACT or whole.min() <= -EXACT:
+        return None
+    letters = np.frombuffer(cut, np.uint8)
+    solid = letters > BLANK
+    ends = np.flatnonzero(solid[:-1] > solid[1:]) + 1
+    points, signs = np.flatnonzero(letters == POINT), np.flatnonzero(letters == MINUS)
+    number = np.searchsorted(ends, points, "right")
+    places = np.zeros(count, np.int64)
+    if len(ends) != count or not (number[1:] > number[:-1]).all():
+        return None
+    places[number] = ends[number] - points - 1
+    if places.max() >= len(POWERS):
+        return None
+    values = (whole / POWERS[places]).astype(np.float32)
+    negative = np.searchsorted(ends, signs, "right")
+    values[negative] = -np.abs(values[negative])  # also of -0
+    return values
 
 
 def _columns(values: Floats32, words: Integers, first: int, last: int) -> Floats32:

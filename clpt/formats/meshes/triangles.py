@@ -153,9 +153,11 @@ def parts(contents: Contents, *, whole: bool = False) -> Iterator[Part]:
     triangles, polygon = triangulate(contents.vertices, contents.counts, contents.corners[:, 0])
     if not len(triangles):
         return
-    material, groups = (contents.labels[name][polygon] for name in ("usemtl", "s"))
     if whole:
-        material, groups = np.full_like(material, -1), np.zeros_like(groups)
+        groups = np.zeros(len(triangles), np.int64)
+        yield _part(contents, -1, contents.corners[triangles], groups)
+        return
+    material, groups = (contents.labels[name][polygon] for name in ("usemtl", "s"))
     if material.min() == material.max():
         yield _part(contents, int(material[0]), contents.corners[triangles], groups)
         return

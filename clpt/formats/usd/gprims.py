@@ -403,7 +403,8 @@ def placed(document: Document, whole: Content) -> list[Shape]:
         ]
         group = Group(tuple(own), parts[0][0].GetName())
         solid = world[~transforms.are_singular(world)]
-        shapes += [Instance(group=group, to_world=matrix) for matrix in solid]
+        instance = Instance(group=group)
+        shapes += [instance.placed(matrix) for matrix in solid]
     return shapes
 
 
@@ -413,4 +414,4 @@ def at(document: Document, prim: Usd.Prim, shape: Shape, matrix: Matrix) -> list
         document.warn("left out, as its transform flattens space", prim.GetPath())
         return []
     whole = matrix @ np.asarray(shape.to_world)
-    return [dataclasses.replace(under(shape, whole), to_world=whole)]
+    return [under(shape, whole).placed(whole)]

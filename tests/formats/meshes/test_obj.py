@@ -41,6 +41,24 @@ def area(made):
     return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
 
 
+NUMBERS = (
+    "0 -0 -0.0 0.000 .5 5. -.25 +1.5 0.1 -0.3 1234567.875 0.0000001 16777217 -16777219.5 "
+    "0.30000001192092896 123456789012345 9007199254740991 0.1000000000000000055 1e-3 .1E+2 3.4e38"
+)
+
+
+@pytest.mark.parametrize("words", [NUMBERS.split()[:14], NUMBERS.split()])
+def test_numbers_are_rounded_as_float_rounds_them(tmp_path, words):
+    """To float64, then to float32: whether all are short and without exponents, or not."""
+    points = [f"v {word} {word} 1\n" for word in words]
+    faces = [f"f 1 2 {i + 1}\n" for i in range(2, len(words))]
+    path = tmp_path / "a.obj"
+    path.write_text("".join([*points, *faces]))
+    contents = obj.read(path)
+    expected = np.array([float(word) for word in words], np.float64).astype(np.float32)
+    np.testing.assert_array_equal(contents.vertices[:, 0].view("u4"), expected.view("u4"))
+
+
 SAME = {
     "plain": WHOLE,
     "no newline at the end": WHOLE[:-1],

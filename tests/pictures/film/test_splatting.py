@@ -82,8 +82,8 @@ def test_the_mean_is_that_of_importance_sampling(scenes: Path):
     """Welch's tests over all pixels at SIGNIFICANCE; and the noise is lower."""
     film = {"width": 12, "height": 9, "mode": "rgb", "filter": it.Gaussian()}
     scene = with_film(clpt.load(scenes / "cornell.xml"), **film)
-    ours = exposures(scene, 16, 32)
-    reference = exposures(with_film(scene, filtering="importance"), 16, 32)
+    ours = exposures(scene, 16, 128)
+    reference = exposures(with_film(scene, filtering="importance"), 16, 128)
     assert_agree(ours, reference)
     assert ours.var(axis=0).mean() < 0.6 * reference.var(axis=0).mean()
 
