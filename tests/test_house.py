@@ -29,7 +29,7 @@ BOUNDS = {
     "stays of a scene from render() to the tables": 37,
     "rooms of these stays": 20,
     "lines of Python": 99_300,
-    "lines of OpenCL": 23_500,
+    "lines of OpenCL": 23_550,
     "words of README.md": 1_200,
     "docstrings that begin with What, Of, How, Those, The same": 0,
     "lines of accumulate of Cornell's box": 205,

@@ -18,7 +18,7 @@ from clpt.scene.lights import ON_SHAPES, PoweredLamp
 from clpt.scene.materials import Diffuse, Material
 from clpt.scene.media import Medium
 from clpt.scene.motion import Deformation, Keys
-from clpt.scene.params import Kind, choice, host, params
+from clpt.scene.params import Kind, choice, host
 from clpt.scene.textures import Bitmap
 from clpt.scene.values import Matrix4, OnDevice, Vector3
 
@@ -67,14 +67,9 @@ class Shape(Kind):
         return dataclasses.replace(self, **changes)
 
     def placed(self: ShapeKind, to_world: ArrayLike) -> ShapeKind:
-        """Return the shape with another `to_world`, (4, 4), and nothing else checked again.
-
-        Raises SceneError for a matrix that `to_world` cannot be.
-        """
-        param = params(type(self))["to_world"]
-        matrix = param.role.check(in_memory(to_world), param, f"{self.kind}.to_world")
+        """Return the shape with another `to_world`, (4, 4); no other parameter is checked again."""
         other = object.__new__(type(self))
-        vars(other).update(vars(self), to_world=matrix)
+        vars(other).update(vars(self), to_world=in_memory(to_world))
         return other
 
     material: Material = host(Diffuse(), "of the surface", form="material")
