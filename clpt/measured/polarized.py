@@ -17,11 +17,14 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats
 from clpt.errors import SceneError
+from clpt.files import budget
 from clpt.measured import merl
 from clpt.measured.measurement import read_tensors
 from clpt.spectra import Tabulated, cie
 from clpt.spectra.spectrum import d65
 
+CHUNK = 1 << 16  # directions that are looked up at a time
+MEMORY = 384 << 20  # bytes that a table takes while it is made, beside the file's numbers
 ENDS = {"phi_d": (-np.pi, np.pi), "theta_d": (0.0, 0.5 * np.pi), "theta_h": (0.0, 0.5 * np.pi)}
 
 
@@ -31,6 +34,7 @@ def read(path: str | Path, wavelength: float | None = None) -> merl.MerlTable:
     wavelength: [nm] of a grey table; None: the colour of all wavelengths. Raises SceneError.
     """
     fields = read_tensors(path)
+    budget.check(MEMORY + sum(values.nbytes for values in fields.values()), "its table", Path(path))
     try:
         return _table(fields, wavelength)
     except SceneError as error:
@@ -59,7 +63,14 @@ def _table(fields: dict[str, NDArray[Any]], wavelength: float | None) -> merl.Me
             total += np.prod(weights, axis=0)[:, None] * table[index]
         return total
 
-    return merl.tabulate(lambda wo, wi: 0.5 * (looked_up(wo, wi) + looked_up(wi, wo)))
+    def averaged(wo: Floats, wi: Floats) -> Floats:
+        means = []
+        for first in range(0, len(wo), CHUNK):
+            o, i = wo[first : first + CHUNK], wi[first : first + CHUNK]
+            means.append(0.5 * (looked_up(o, i) + looked_up(i, o)))
+        return np.concatenate(means)
+
+    return merl.tabulate(averaged)
 
 
 def _axis(fields: dict[str, NDArray[Any]], name: str, count: int) -> Floats:

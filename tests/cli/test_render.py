@@ -55,6 +55,19 @@ def test_several_formats_and_the_facts_in_the_exr(tmp_path, capsys):
     assert header["scene"] == CORNELL and header["device"]
 
 
+def test_light_by_time_is_written(tmp_path, capsys):
+    """In an .npy, and as channels of an .exr; a note tells how much light other times have."""
+    paths = [tmp_path / "out.npy", tmp_path / "out.exr"]
+    given = [word for path in paths for word in ("-o", str(path))]
+    times = ["--time-bins", "5", "--time-min", "10", "--time-max", "30"]
+    assert run(["render", CORNELL, *given, *SMALL, *times]) == 0
+    assert re.search(r"% of the light is not in 10 to 30 ns", capsys.readouterr().err)
+    array, layers = np.load(paths[0]), images.read_layers(paths[1])
+    assert array.shape == (8, 8, 6, 3)
+    np.testing.assert_array_equal(layers["time_0003.G"], array[:, :, 3, 1])
+    np.testing.assert_array_equal(layers["time_outside.B"], array[:, :, 5, 2])
+
+
 def test_passes_add_up_to_one_step(tmp_path):
     """21 samples are 1 + 3 + 12 + 5, bit for bit."""
     path = tmp_path / "out.npy"

@@ -10,6 +10,7 @@ hash and a coverage, by falling coverage. The header has the names.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -113,6 +114,7 @@ def matte_attributes(prefix: str, names: Sequence[str]) -> dict[str, str]:
 UNITS = 2.0**22  # kernels/film/layers.cl
 LONG_UNITS = (2.0**18, 2.0**-6, 2.0**-30, 2.0**-54)
 GROUP = "light_"  # begins the name of a group's picture
+AT_ONCE = 1 << 18  # pixels of pictures of light that are developed at once
 
 
 def layers_of(
@@ -194,13 +196,21 @@ def _time_sums(form: PictureForm) -> int:
 
 def _light_colours(form: PictureForm, words: Words, picture: Pictures) -> Floats32:
     """Return the pictures of sums of light (3 n, 3, h, w) in colours, (n, h, w, 3) float32."""
-    sums = numbers(np.moveaxis(words, 1, 0)).reshape(-1, 3, *words.shape[2:])
-    samples = picture.samples_per_pixel()
-    means = sums[: len(sums) // (1 + form.weighed)] / np.maximum(samples, 1.0)
-    if form.weighed:
-        paths = max(picture.light_paths_per_pixel(), 1e-30)
-        means = means + sums[len(means) :] * ((samples > 0) / np.float32(paths))
-    return np.einsum("ij,njhw->nhwi", np.asarray(form.to_output), means).astype(np.float32)
+    samples, size = picture.samples_per_pixel(), words.shape[2:]
+    count = len(words) // 3 // (1 + form.weighed)
+    colours = np.empty((count, *size, 3), np.float32)
+    step = max(1, AT_ONCE // math.prod(size))
+    for i in range(0, count, step):
+        part = slice(3 * i, 3 * min(i + step, count))
+        means = numbers(np.moveaxis(words[part], 1, 0)) / np.maximum(samples, 1.0)
+        if form.weighed:
+            brought = numbers(np.moveaxis(words[3 * count :][part], 1, 0))
+            paths = max(picture.light_paths_per_pixel(), 1e-30)
+            means = means + brought * ((samples > 0) / np.float32(paths))
+        first, second, third = np.moveaxis(means.reshape(-1, 3, *size), 1, 0)
+        for c, (a, b, d) in enumerate(form.to_output):
+            colours[i : i + step, ..., c] = a * first + b * second + d * third
+    return colours
 
 
 def white_paper(film: Film, mode: str) -> NDArray[np.float64]:

@@ -51,7 +51,7 @@ class Film:
         x, y = path_buffers.pixels(settings)
         self._inside = path_buffers.inside(settings)
         self._at = (y * self.size[0] + x)[self._inside]  # in a picture, of each of these
-        pixels, advice = math.prod(self.size), "lower the image's size"
+        advice = "lower the image's size" + " or time_bins" * (features.film.layers.time_bins > 0)
         sums = {"film": self._words * self._word_bytes}
         if features.film.bands:
             advice += " or the number of bands"
@@ -69,7 +69,7 @@ class Film:
         self.sums = {n: buffers.allocate(f"the {n}", size, advice) for n, size in sums.items()}
         self._sum_bytes = sums
         self._held: dict[str, cl.Buffer] = {}
-        self._image = buffers.allocate("the image", 16 * pixels, advice)
+        self._image = buffers.allocate("the image", 16 * math.prod(self.size), advice)
         shape = (*self.size[::-1], 4)
         self.picture = device.DeviceArray(stream.queue, shape, np.float32, data=self._image)
         self._written: cl.Event | None = None  # of the last command that wrote `picture`
