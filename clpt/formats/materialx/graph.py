@@ -100,10 +100,14 @@ def numbers_value(values: object) -> Value:
 
 @dataclass
 class Nodes:
-    """The nodes and textures that a network has become."""
+    """The nodes and textures that a network has become.
+
+    parts: of nodes that combine values, for each channel the value and its channel.
+    """
 
     nodes: dict[str, dict[str, Any]] = field(default_factory=dict)
     textures: list[Texture] = field(default_factory=list)
+    parts: dict[str, list[tuple[Value, int]]] = field(default_factory=dict)
 
     def add(self, kind: str, inputs: Mapping[str, Value], **settings: int) -> Value:
         """Return what a kind of node gives: numbers of numbers, and no node without an effect.
@@ -118,11 +122,17 @@ class Nodes:
         plain = {name: v.numbers for name, v in inputs.items() if v.numbers is not None}
         if len(plain) == len(inputs):
             return numbers_value(np.nan_to_num(declared.evaluated(plain, settings, width)))
+        if kind == "extract" and (parts := self.parts.get(inputs["in"].name)):
+            value, index = parts[min(settings["index"], len(parts) - 1)]
+            return self.add("extract", {"in": value}, index=index)
         kept = _unchanged(kind, inputs, settings)
         if kept is not None and kept.width == width:
             return kept
         said = {name: value.said for name, value in inputs.items()}
-        return self._named({"type": kind, **said, **settings}, width)
+        added = self._named({"type": kind, **said, **settings}, width)
+        if kind.startswith("combine"):
+            self.parts[added.name] = [(v, i) for v in inputs.values() for i in range(v.width)]
+        return added
 
     def look_up(self, texture: Texture, channels: int, uv: Value | None = None) -> Value:
         """Return a texture; uv: where it lies, None for the surface's own."""

@@ -221,6 +221,27 @@ def test_a_channel_and_a_normal_map(tmp_path: Path) -> None:
     assert normals.scale == 0.5 and normals.map.raw
 
 
+def test_normals_that_are_changed_and_a_channel_of_channels(tmp_path: Path) -> None:
+    """As a map whose green runs the other way: the normal map is a graph of the image."""
+    _picture(tmp_path)
+    nodes = _image("I", "p.png", "vector3")
+    for index, name in enumerate("XYZ"):
+        nodes += f'<extract name="{name}" type="float">' + _input("in", "vector3", node="I")
+        nodes += _input("index", "integer", str(index)) + "</extract>"
+    nodes += '<invert name="V" type="float">' + _input("in", "float", node="Y") + "</invert>"
+    nodes += '<combine3 name="C" type="vector3">' + _input("in1", "float", node="X")
+    nodes += _input("in2", "float", node="V") + _input("in3", "float", node="Z") + "</combine3>"
+    nodes += '<normalmap name="N" type="vector3">' + _input("in", "vector3", node="C")
+    nodes += '</normalmap><extract name="R" type="float">' + _input("in", "vector3", node="C")
+    nodes += _input("index", "integer", "2") + "</extract>"
+    shader = _input("geometry_normal", "vector3", node="N")
+    shader += _input("specular_roughness", "float", node="R")
+    surface, warnings = _read(tmp_path, shader, nodes)
+    bent, rough = _leaf(surface, NormalMap).map, _leaf(surface).specular_roughness
+    assert not warnings and isinstance(bent, GraphTexture) and bent.width == 3
+    assert isinstance(rough, Bitmap) and rough.channel == "b"
+
+
 def test_patterns_cost_no_image(tmp_path: Path) -> None:
     nodes = '<ramptb name="R" type="color3">' + _input("valuet", "color3", "1, 0, 0") + "</ramptb>"
     graph = _leaf(_read(tmp_path, _input("base_color", "color3", node="R"), nodes)[0]).base_color
