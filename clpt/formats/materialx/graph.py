@@ -259,7 +259,12 @@ class Graph:
         value = self._or_default(node, name, default)
         if value.numbers is not None:
             return said(value.numbers, wide)
-        return self.built.texture(value, wide=wide)
+        try:
+            return self.built.texture(value, wide=wide)
+        except SceneError as error:
+            message = f"{error.message}; the default of {name} stands for it"
+            self.host.warn(message, node.path)
+            return said(numbers(default), wide)
 
     def value(self, node: Node, name: str, default: object) -> Value:
         """Return an input. default: numbers, or the name of a source. Raises LeftOut."""

@@ -10,14 +10,14 @@ from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
-from clpt.arrays import Floats, is_number
+from clpt.arrays import LARGEST, Floats, is_number
 from clpt.errors import SceneError
 from clpt.scene.params import choice, host
 from clpt.scene.textures.nodes import NODES, SOURCES, widened
 from clpt.scene.values import Attributes, Look, Texture
 
 TEXTURE = "texture"  # the kind of a node that looks up a texture of the graph
-MOST_NODES = 400
+MOST_NODES = 1000
 MOST_STOPS = 256
 SECOND_UV = ("vertex_u1", "vertex_v1")  # the attributes of a mesh that `texcoord1` is
 SIDE = 64  # places along u and v, for a mean
@@ -90,12 +90,12 @@ class Graph(Texture):
             message = "cannot be textures that combine others: nodes do that"
             raise SceneError(message, where="graph.textures")
         object.__setattr__(self, "textures", tuple(self.textures))
-        assert self.steps is not None  # it raises for nodes that contradict each other
+        _Resolver(self).resolve([*self.nodes])  # those that the value does not need, too
 
     @cached_property
     def _resolved(self) -> tuple[list[Step], Operand]:
         resolver = _Resolver(self)
-        return resolver.steps, resolver.result()
+        return resolver.steps, resolver.resolve([])
 
     @property
     def steps(self) -> list[Step]:
@@ -215,18 +215,18 @@ class _Resolver:
         self.steps: list[Step] = []
         self.found: dict[str, Operand] = {}
 
-    def result(self) -> Operand:
-        """Return what the output is; fill `steps`. Raises SceneError."""
-        for name in self._in_order():
+    def resolve(self, names: list[str]) -> Operand:
+        """Return what the output is; fill `steps`. names: of more nodes. Raises SceneError."""
+        for name in self._in_order(names):
             self.found[name] = self._node(name)
         return self._operand(self.output, "graph.output")
 
-    def _in_order(self) -> list[str]:
+    def _in_order(self, names: list[str]) -> list[str]:
         """Return the names of nodes, each after those that it reads. Raises SceneError."""
         if self.output not in {*self.nodes, *SOURCES}:
             raise SceneError(f"there is no node {self.output!r}", where="graph.output")
         ordered: dict[str, bool] = {}  # whether what a node reads comes before it already
-        waiting = [self.output] if self.output not in SOURCES else []
+        waiting = [*names, *([self.output] if self.output not in SOURCES else [])]
         while waiting:
             name = waiting[-1]
             if ordered.get(name):
@@ -257,9 +257,10 @@ class _Resolver:
             return value if value in SOURCES else self.found[value]
         numbers = value.tolist() if isinstance(value, np.ndarray) else value
         numbers = numbers if isinstance(numbers, (list, tuple)) else [numbers]
-        finite = [float(v) for v in numbers if is_number(v) and np.isfinite(v)]
+        finite = [float(v) for v in numbers if is_number(v) and abs(v) <= LARGEST]
         if not 1 <= len(finite) == len(numbers) <= 4:
-            raise SceneError("must be up to four numbers, or a node's name", where=where)
+            message = "must be up to four numbers within float32, or a node's name"
+            raise SceneError(message, where=where)
         return np.array(finite, np.float64)
 
     def _node(self, name: str) -> Operand:
@@ -287,7 +288,7 @@ class _Resolver:
         constants = {k: v for k, v in operands.items() if isinstance(v, np.ndarray)}
         step = Step(kind, operands, settings, width, stops)
         if len(constants) == len(operands):
-            return np.nan_to_num(step.computed(constants))
+            return np.clip(np.nan_to_num(step.computed(constants)), -LARGEST, LARGEST)
         return self._appended(step)
 
     def _appended(self, step: Step) -> int:
@@ -339,7 +340,7 @@ def _stops(node: Mapping[str, Any], where: str) -> Floats:
     if rows.ndim != 2 or not 2 <= len(rows) <= MOST_STOPS or rows.shape[1] not in (2, 4, 5):
         message = "must be rows of a position and 1, 3 or 4 numbers, two rows at least"
         raise SceneError(message, where=where)
-    if not np.isfinite(rows).all() or (np.diff(rows[:, 0]) < 0.0).any():
+    if not (np.abs(rows) <= LARGEST).all() or (np.diff(rows[:, 0]) < 0.0).any():
         raise SceneError("must be finite, and positions cannot fall", where=where)
     colors = rows[:, 1:]
     colors = np.repeat(colors, 3, axis=1) if colors.shape[1] == 1 else colors

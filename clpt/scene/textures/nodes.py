@@ -74,7 +74,8 @@ class NodeKind:
                 for name, default in self.inputs.items()
             ]
         inputs += [] if stops is None else [stops]
-        result = np.asarray(self.function(*inputs, *settings.values()), np.float64)
+        with np.errstate(all="ignore"):
+            result = np.asarray(self.function(*inputs, *settings.values()), np.float64)
         return result if self.form == "routes" else result[..., :width]
 
 
@@ -99,8 +100,7 @@ def safe(a: Floats, b: Floats) -> Floats:
 
 
 def _power(a: Floats, b: Floats) -> Floats:
-    with np.errstate(all="ignore"):
-        return np.nan_to_num(np.power(a, b), nan=0.0, posinf=0.0, neginf=0.0)
+    return np.nan_to_num(np.power(a, b), nan=0.0, posinf=0.0, neginf=0.0)
 
 
 def _mix(fg: Floats, bg: Floats, amount: Floats) -> Floats:

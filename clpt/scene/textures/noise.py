@@ -23,11 +23,6 @@ def _turned(x: Words, bits: int) -> Words:
 
 def _hash(*words: Words) -> Words:
     """Jenkins' hash lookup3 of up to four words."""
-    with np.errstate(over="ignore"):  # of single numbers
-        return _hashed(words)
-
-
-def _hashed(words: tuple[Words, ...]) -> Words:
     seed = np.uint32((0xDEADBEEF + (len(words) << 2) + 13) & 0xFFFFFFFF)
     state = [np.full_like(words[0], seed) for _ in range(3)]
     for i, word in enumerate(words[:3]):
