@@ -258,8 +258,14 @@ class Index(Spectral):
 class Emission(Spectral):
     """An emitted spectrum; a number and a colour are multiples of D65."""
 
+    def check(self, value: object, param: Param, where: str | None) -> Any:
+        spectrum = super().check(value, param, where)
+        if type(spectrum) is RGB:
+            return RGBIlluminant(spectrum.r, spectrum.g, spectrum.b)
+        return spectrum
+
     def _colour(self, rgb: list[float], param: Param, where: str | None) -> Spectrum:
-        return RGB(*rgb)
+        return RGBIlluminant(*rgb)
 
     def _constant(self, number: float) -> Spectrum:
         return RGBIlluminant(*[number] * 3)
