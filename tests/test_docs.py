@@ -217,6 +217,7 @@ def test_commands_run_as_typed(page: str, tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.chdir(tmp_path)
     for text in pages.blocks(DOCS / page, "json"):
         (tmp_path / "pawn.json").write_text(text, "utf-8")
+    (tmp_path / "old.xml").write_text('<scene version="0.6.0"><shape type="sphere"/></scene>')
     for line in pages.commands(DOCS / page):
         words = pages.smaller(line.split(" > ")[0], spp=2)
         done = CliRunner().invoke(cli, words)

@@ -27,6 +27,8 @@ LONG = (
 def test_it_writes_a_picture(
     example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ):
+    if example.stem == "turntable":
+        pytest.importorskip("imageio_ffmpeg", reason="a video needs the extra `video`")
     monkeypatch.setattr(sys, "argv", [str(example), str(tmp_path)])
     runpy.run_path(str(example), run_name="__main__")
     file = tmp_path / f"{example.stem}.png"

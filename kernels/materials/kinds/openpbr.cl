@@ -27,8 +27,8 @@ inline Microfacets openpbr_even(Microfacets d)
 typedef struct {
     Microfacets facets, coat, even, even_coat; /* even: as the albedos have them */
     real roughness;                            /* of the even facets */
-    Spectrum eta, metal;                       /* index; the metal's reflectance at normal incidence */
-    real index, f0;                            /* of the dielectric: mean index, reflectance at normal incidence */
+    Spectrum eta, f0, metal;                   /* index; reflectance at normal incidence, and the metal's */
+    real index;                                /* mean index, of probabilities alone: the same for every hero */
     FilmBase film, base_film;                  /* a film over all, over the dielectric alone */
     real passed, walk;                         /* shares under the facets: let through; sent into a body */
     Spectrum scattered, through;               /* colours of diffuse light that comes back, that passes a thin sheet */
@@ -66,7 +66,9 @@ inline OpenpbrParts openpbr_parts(Openpbr m)
     p.roughness = sqrt(p.even.alpha_u);
     p.eta = openpbr_index(m);
     p.index = spectrum_mean(p.eta);
-    p.f0 = sqr((p.index - 1.0f) / (p.index + 1.0f));
+#define C(c) p.f0.c = sqr((p.eta.c - 1.0f) / (p.eta.c + 1.0f));
+    SPECTRUM_EACH(C)
+#undef C
     p.metal = spectrum_scale(m.base_color, m.base_weight);
     p.passed = dielectric * m.transmission_weight;
     mask thin = m.thin_walled != 0;
@@ -77,10 +79,10 @@ inline OpenpbrParts openpbr_parts(Openpbr m)
     p.scattered = spectrum_scale(p.metal, opaque * (1.0f - m.subsurface_weight));
     p.scattered = spectrum_madd(m.subsurface_color, (below - p.walk) * (1.0f - forward), p.scattered);
     if (USES_OPENPBR_THIN_FILM_WEIGHT) {
-        Spectrum base = spectrum_of(p.f0), all = spectrum_scale(m.specular_color, p.f0 * dielectric);
+        Spectrum all = spectrum_scale(spectrum_mul(m.specular_color, p.f0), dielectric);
         all = spectrum_madd(p.metal, m.base_metalness * min_r(m.specular_weight, (real)(1.0f)), all);
         p.film = film_base(all, m.thin_film_ior);
-        p.base_film = film_base(base, m.thin_film_ior);
+        p.base_film = film_base(p.f0, m.thin_film_ior);
     }
     return p;
 }
@@ -114,14 +116,14 @@ inline real openpbr_bounced(real mean, real whole)
 }
 inline Spectrum openpbr_bounces(Openpbr m, OpenpbrParts p, real whole)
 {
-    real mean = sel(p.index < 1.0f, (real)(1.0f), p.f0 + (1.0f - p.f0) * (1.0f / 21.0f));
-    real dielectric = openpbr_bounced(mean, whole) * (1.0f - m.base_metalness);
     real metal = m.base_metalness * min_r(m.specular_weight, (real)(1.0f));
     Spectrum v;
-#define C(c)                                                                                  \
-    {                                                                                         \
-        real f = max_r(metal_edge_mean(p.metal.c, m.specular_color.c), (real)(0.0f));         \
-        v.c = dielectric * m.specular_color.c + metal * openpbr_bounced(f, whole);            \
+#define C(c)                                                                                      \
+    {                                                                                             \
+        real mean = sel(p.eta.c < 1.0f, (real)(1.0f), p.f0.c + (1.0f - p.f0.c) * (1.0f / 21.0f)); \
+        real dielectric = openpbr_bounced(mean, whole) * (1.0f - m.base_metalness);               \
+        real f = max_r(metal_edge_mean(p.metal.c, m.specular_color.c), (real)(0.0f));             \
+        v.c = dielectric * m.specular_color.c + metal * openpbr_bounced(f, whole);                \
     }
     SPECTRUM_EACH(C)
 #undef C
@@ -138,26 +140,32 @@ inline real openpbr_whole(OpenpbrParts p)
     return e.a + e.b;
 }
 
-/* The share of light under the dielectric's facets: 1 - E, with the directional albedo E, and of diffuse light. */
-inline real openpbr_left(OpenpbrParts p, real c, real several)
+/* What facets of this index leave to a base that scatters: (1 - E(o)) (1 - E(i)) / (1 - mean E), which loses nothing,
+ * with the directional albedo E. Into a body: 1 - E of the outside; out of it, that over its mean. */
+inline real openpbr_left(OpenpbrParts p, real c, real several, real index)
 {
-    return 1.0f - facet_reflectance(p.even, c, p.index) - several * openpbr_lost(p, c);
+    return 1.0f - facet_reflectance(p.even, c, index) - several * openpbr_lost(p, c);
 }
-inline real openpbr_left_mean(OpenpbrParts p, real several, real whole)
+inline real openpbr_share(OpenpbrParts p, vec3 wo, vec3 wi, mask into, real index)
 {
-    return 1.0f - facet_reflectance_mean(p.even, p.index) - several * (1.0f - whole);
+    real whole = openpbr_whole(p), f0 = sqr((index - 1.0f) / (index + 1.0f));
+    real several = openpbr_bounced(f0 + (1.0f - f0) * (1.0f / 21.0f), whole);
+    several = sel(index < 1.0f, (real)(0.0f), several);
+    real o = openpbr_left(p, fabs(wo.z), several, index), i = openpbr_left(p, fabs(wi.z), several, index);
+    real mean = max_r(1.0f - facet_reflectance_mean(p.even, index) - several * (1.0f - whole), (real)(1e-3f));
+    return sel(into, sel(wo.z > 0.0f, o, i / mean), o * i / mean);
 }
-/* What facets leave to a base that scatters: (1 - E(o)) (1 - E(i)) / (1 - mean E), which loses nothing; with a film
- * the lesser of both. Into a body: 1 - E of the outside; out of it, that over its mean. */
+/* The same at each index, with a film the lesser of both directions. */
 inline Spectrum openpbr_under(Openpbr m, OpenpbrParts p, vec3 wo, vec3 wi, mask into)
 {
-    real cos_o = fabs(wo.z), cos_i = fabs(wi.z), whole = openpbr_whole(p);
-    real several = openpbr_bounced(p.f0 + (1.0f - p.f0) * (1.0f / 21.0f), whole);
-    several = sel(p.index < 1.0f, (real)(0.0f), several);
-    real o = openpbr_left(p, cos_o, several), i = openpbr_left(p, cos_i, several);
-    real mean = max_r(openpbr_left_mean(p, several, whole), (real)(1e-3f));
+    real cos_o = fabs(wo.z), cos_i = fabs(wi.z);
     mask front = wo.z > 0.0f;
-    Spectrum v = spectrum_of(sel(into, sel(front, o, i / mean), o * i / mean));
+    Spectrum v = spectrum_of(openpbr_share(p, wo, wi, into, p.eta.x));
+    if (any(spectrum_varies(p.eta))) {
+#define C(c) v.c = openpbr_share(p, wo, wi, into, p.eta.c);
+        SPECTRUM_EACH(C)
+#undef C
+    }
     if (USES_OPENPBR_THIN_FILM_WEIGHT) {
         Spectrum nothing = spectrum_of(0.0f), one = spectrum_of(1.0f);
         real thickness = 1000.0f * m.thin_film_thickness;
@@ -196,14 +204,14 @@ inline OpenpbrCoat openpbr_coat(Openpbr m, OpenpbrParts p, vec3 wo, vec3 wi)
     real passes = sel(on_o, openpbr_passes(m, wo.z), (real)(0.0f)) + sel(on_i, openpbr_passes(m, wi.z), (real)(0.0f));
     passes *= sel(thin & crossed, (real)(0.5f), (real)(1.0f));
     real diffuse = 1.0f - (1.0f - facet_reflectance_mean(p.even_coat, m.coat_ior)) / sqr(m.coat_ior);
-    real f0 = p.f0, rough = 1.0f + (m.specular_roughness - 1.0f) * (f0 + (1.0f - f0) * m.base_metalness);
-    real smooth = 0.5f * (e_o + e_i), back = smooth + (diffuse - smooth) * rough;
-    real amount = sel(crossed, (real)(0.0f), m.coat_weight * m.coat_darkening);
+    real smooth = 0.5f * (e_o + e_i), amount = sel(crossed, (real)(0.0f), m.coat_weight * m.coat_darkening);
 #define C(c)                                                                                              \
     {                                                                                                     \
         real t = exp_r(passes * log_r(max_r(m.coat_color.c, (real)(1e-6f))));                             \
         k.absorbed.c = 1.0f + (t - 1.0f) * m.coat_weight;                                                 \
-        real dielectric = (1.0f - m.base_metalness) * f0 * m.specular_color.c;                            \
+        real f0 = p.f0.c, dielectric = (1.0f - m.base_metalness) * f0 * m.specular_color.c;               \
+        real rough = 1.0f + (m.specular_roughness - 1.0f) * (f0 + (1.0f - f0) * m.base_metalness);        \
+        real back = smooth + (diffuse - smooth) * rough;                                                  \
         real base = (1.0f - f0) * (p.scattered.c + p.walk * m.subsurface_color.c) + dielectric;           \
         base += m.base_metalness * min_r(m.specular_weight, (real)(1.0f)) * p.metal.c;                    \
         real dark = (1.0f - back) / max_r(1.0f - min_r(base, (real)(1.0f)) * back, (real)(1e-3f));        \
