@@ -376,6 +376,16 @@ def test_light_pdf_is_that_of_the_sample(name):
     np.testing.assert_allclose(scene(PDF, given, 1)[0], r[4] * pmf, rtol=2e-3)
 
 
+def test_a_lamp_beside_a_disk_has_no_density_of_it() -> None:
+    """Idle lanes ask for the density of row 0, whose parameters are in another table."""
+    scene = lit([Point(position=(0, 0, 2))], [glows(Disk, facing_down(1.5))])
+    given = np.tile([[0], [0], [0], [0], [0], [0], [1], [1.5], [0], [0], [-1]], 16).astype(float)
+    given[0, ::2] = 1
+    densities = scene(PDF, given, 1)[0]
+    assert (densities[::2] > 0.0).all()
+    np.testing.assert_array_equal(densities[1::2], 0.0)
+
+
 def test_the_sky_over_a_side_is_sampled_by_the_cosine():
     """Radiance times cosine over pdf is the same everywhere: its irradiance without any noise."""
     side, rng = directions(400, 8), np.random.default_rng(9)

@@ -167,15 +167,21 @@ def test_sampling_finds_all_the_light():
     np.testing.assert_allclose(scale, (normalise / even)[1], rtol=0.02 + SIGMAS * error[1])
 
 
-def scene(mode: str) -> Scene:
+def scene(mode: str, sun_scale: float = 1.0) -> Scene:
     film = Film(width=24, height=16, mode=mode)
-    return Scene(camera=Perspective(fov=100), lights=[Sky(sun_elevation=8.0)], film=film)
+    sky = Sky(sun_elevation=8.0, sun_scale=sun_scale)
+    return Scene(camera=Perspective(fov=100), lights=[sky], film=film)
 
 
 @pytest.mark.slow
 def test_colours_agree_in_both_modes_and_splits_give_the_same_bits():
-    rgb, spectral = (np.asarray(clpt.render(scene(m), 64))[..., :3] for m in ("rgb", "spectral"))
-    np.testing.assert_allclose(spectral.mean(axis=(0, 1)), rgb.mean(axis=(0, 1)), rtol=0.03)
+    """Colours without the sun's disc, which few samples meet, each at another place."""
+    means = [
+        np.asarray(clpt.render(scene(mode, 0.0), 64))[..., :3].mean(axis=(0, 1))
+        for mode in ("rgb", "spectral")
+    ]
+    np.testing.assert_allclose(means[1], means[0], rtol=0.01)
+    spectral = np.asarray(clpt.render(scene("spectral"), 64))[..., :3]
     with clpt.Renderer(scene("spectral")) as renderer:
         for count in (5, 11, 48):
             renderer.run(count)

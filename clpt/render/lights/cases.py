@@ -187,7 +187,10 @@ def _lamps_text(features: Features) -> str:
 
 
 def _areas_text(features: Features) -> list[str]:
-    """Return `area_point`, a point of a light on a shape, and `area_pdf`, its density [1/sr]."""
+    """Return `area_point`, a point of a light on a shape, and `area_pdf`, its density [1/sr].
+
+    Idle lanes have row 0 of `lights`, which may be a lamp: its parameters are not in `geometry`.
+    """
     kinds, surfaces = kinds_of(features), surfaces_of(features)
     points, densities = [], []
     for kind in surfaces:
@@ -197,7 +200,7 @@ def _areas_text(features: Features) -> list[str]:
             points.append(Case(test, "r", (f"ShapeSample r = {sampled};", *point)))
         else:
             points.append(Case(test, sampled))
-        row = row_text(features, kind, test := kind_test(kind, surfaces))
+        row = row_text(features, kind, test := kind_test(kind, kinds))
         densities.append(Case(test, f"{kind}_pdf({row}, view.p, view.wi, view.t, view.n)"))
     head = "Scene scene, integer row, LightRow l, LightView view, vec2 u, TexturePoint *point"
     points_of = Function(f"ShapeSample area_point({head})", "shape_sample_nothing()", points)
