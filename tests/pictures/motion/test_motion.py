@@ -108,6 +108,12 @@ def twisted(points: np.ndarray, turns: float, size: Any = 1.0) -> np.ndarray:
 
 
 BALL, FACES, UVS = ball(12, 0.7)
+TWIST = Deformation(
+    [0.0, 0.3, 1.0],
+    [BALL, twisted(BALL, 1.0, [1.2, 0.8, 1.0]), twisted(BALL, -0.5) + np.array([0.6, 0.2, 0.0])],
+)
+MANY = np.linspace(0.0, 1.0, 9)
+OFTEN = np.union1d(MANY, TWIST.times)  # smooth normals are those of keys, and linear in between
 BENT = shapes.Mesh(
     vertices=BALL,
     faces=FACES,
@@ -116,14 +122,7 @@ BENT = shapes.Mesh(
     material=materials.TwoSided(
         front=materials.RoughConductor(eta=1.5, k=3.0, alpha_u=0.1, alpha_v=0.4)
     ),
-    deformation=Deformation(
-        [0.0, 0.3, 1.0],
-        [
-            BALL,
-            twisted(BALL, 1.0, [1.2, 0.8, 1.0]),
-            twisted(BALL, -0.5) + np.array([0.6, 0.2, 0.0]),
-        ],
-    ),
+    deformation=Deformation(OFTEN, [TWIST.at(t)[0] for t in OFTEN]),
 )
 CHECKED = dataclasses.replace(
     BENT,
@@ -193,10 +192,9 @@ TURNS = dataclasses.replace(
     motion=SWELLS,
 )
 DULL = shapes.Sphere(center=(0, -0.8, -0.3), radius=0.4, material=GREY)
-MANY = np.linspace(0.0, 1.0, 9)  # keys, between which a tube gets hardly thinner
 STRIP = as_tubes(  # about as bright as the wall: else all variance is that of a few pixels
     dataclasses.replace(
-        STRANDS,
+        STRANDS,  # MANY keys, between which a tube gets hardly thinner
         material=materials.Diffuse(reflectance=0.0),
         emission=lights.Area(radiance=0.5),
         deformation=Deformation(MANY, [STRANDS.deformation.at(t)[0] for t in MANY]),
