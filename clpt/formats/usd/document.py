@@ -36,7 +36,8 @@ class Document(Once):
     def __init__(self, file: Path, stage: Usd.Stage, time: float, level: int | None = None):
         super().__init__()
         self.file, self.stage, self.level = file, stage, level
-        self.metres = float(UsdGeom.GetStageMetersPerUnit(stage))
+        # As a double or, in old files, as a float, which UsdGeom.GetStageMetersPerUnit refuses.
+        self.metres = float(stage.GetMetadata(UsdGeom.Tokens.metersPerUnit))
         self.up: Up = "z" if UsdGeom.GetStageUpAxis(stage) == "Z" else "y"
         self.to_metres = np.diag([self.metres] * 3 + [1.0])
         self.left_out: dict[str, list[str]] = {}
