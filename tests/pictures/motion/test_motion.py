@@ -447,7 +447,8 @@ def check_case(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(CASES))
 def test_a_picture_is_the_mean_of_still_ones(name: str) -> None:
-    check_case(name, stills=64, spp=512, runs=4)
+    # Up to half of the flame's variance is in one block, whose pooled error is too low
+    check_case(name, stills=64, spp=2048 if name == "flame" else 512, runs=4)
 
 
 @pytest.mark.slow
