@@ -142,7 +142,7 @@ SPECTRA = [
         spectra.Lines((436, 546.1), (1, 2), 3),
     ),
     ({"type": "led", "peak": 470, "width": 25}, spectra.LED(470, 25)),
-    ({"type": "rgb", "r": 1, "g": 0.5, "b": 0}, spectra.RGB(1, 0.5, 0)),
+    ({"type": "rgb", "r": 1, "g": 0.5, "b": 0}, spectra.RGBIlluminant(1, 0.5, 0)),
     ({"file": "t.spd"}, spectra.Tabulated((400, 700), (1, 2))),
     ({"values": [[400, 1], [700, 2]]}, spectra.Tabulated((400, 700), (1, 2))),
 ]
