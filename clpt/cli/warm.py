@@ -82,8 +82,11 @@ def _variants(scene: Scene, kinds: tuple[str, ...]) -> Iterator[Scene]:
     for name in kinds:
         if name not in known:
             raise UnknownKindError("material", name, known, where="--kinds")
-    plain = [i for i, shape in enumerate(scene.shapes) if shape.emission is None]
-    plain = [i for i in plain if not isinstance(scene.shapes[i], Instance)]
+    plain = [
+        i
+        for i, shape in enumerate(scene.shapes)
+        if shape.emission is None and not isinstance(shape, Instance)
+    ]
     if len(plain) < len(kinds):
         message = f"{len(kinds)} kinds need as many shapes without light, not {len(plain)}"
         raise SceneError(message, where="--kinds")

@@ -187,10 +187,7 @@ def _placed(shapes: list[Shape]) -> tuple[Floats, Floats]:
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = rotation(turn), shift
     back = np.linalg.inv(matrix)
-    boxes = [
-        shape_bounds(dataclasses.replace(shape, to_world=back @ np.asarray(shape.to_world)))
-        for shape in shapes
-    ]
+    boxes = [shape_bounds(shape.placed(back @ np.asarray(shape.to_world))) for shape in shapes]
     low, high = zip(*boxes, strict=True)
     return matrix, np.array([np.min(low, axis=0), np.max(high, axis=0)])
 

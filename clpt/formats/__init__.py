@@ -49,13 +49,8 @@ IN_FOLDERS = ("scene.json", "scene.xml", "scene.pbrt", "scene-v4.pbrt")
 SCENES = tuple(suffix for suffix, kind in FORMATS.items() if kind in (*WITH_VARIABLES, "pbrt"))
 MOST_COMPARED, CLOSE = 4096, 0.7  # names of a folder; least similarity of a suggested name
 MOST_NAMED = 8  # scenes of a folder that a message names
-ARGUMENTS = (
-    "kinds",
-    "progress",
-    "missing_textures",
-    "strict",
-    "budget",
-)  # of `load`, beside variables
+# Arguments of `load` that are no variables.
+ARGUMENTS = ("kinds", "progress", "missing_textures", "strict", "budget")
 
 __all__ = ["FORMATS", "load", "load_dict", "locate", "save"]
 

@@ -24,12 +24,13 @@ from clpt.errors import SceneError
 from clpt.images import exr, exr_files
 from clpt.images.checks import check_there, reading
 from clpt.spectra import Tabulated, cie
+from clpt.spectra.emission import LIGHT
 from clpt.spectra.spectrum import d65
 
 RADIANCE = "W.m^-2.sr^-1.nm^-1"
 VERSION = "1.0"
 HALF_MAX = 65504.0
-LIGHT_SPEED = 299792458.0  # [m/s]; wavelengths may be given as frequencies
+
 PREFIXES = {
     "Y": 1e24, "Z": 1e21, "E": 1e18, "P": 1e15, "T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "h": 1e2,
     "da": 1e1, "": 1.0, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12,
@@ -267,7 +268,7 @@ def _nanometres(path: Path, digits: str, exponent: str, prefix: str | None, unit
     size = value * PREFIXES[prefix or ""]
     if not 0.0 < size < float("inf"):
         _fail(path, f"a channel of wavelength {digits}{exponent} {prefix or ''}{unit}")
-    return LIGHT_SPEED / size * 1e9 if unit == "Hz" else size * 1e9
+    return LIGHT / size * 1e9 if unit == "Hz" else size * 1e9
 
 
 def _decimal(nm: float) -> str:

@@ -16,9 +16,9 @@ import numpy as np
 from clpt.arrays import Floats
 from clpt.instruments import color
 from clpt.scene.integrators import Film
-from clpt.spectra.emission import UNIT_LUMINANCE
+from clpt.spectra.emission import LIGHT, PLANCK, UNIT_LUMINANCE
 
-PLANCK, LIGHT, AVOGADRO = 6.62607015e-34, 299792458.0, 6.02214076e23  # of the SI of 2019, exact
+AVOGADRO = 6.02214076e23  # of the SI of 2019, exact
 PHOTOSYNTHESIS = 400.0, 700.0  # [nm], light that plants use (McCree 1972)
 BANDS = 60  # of a quantity that weighs wavelengths
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.files import input_files
-from clpt.instruments.quantities import LIGHT, PLANCK
+from clpt.spectra.emission import LIGHT, PLANCK
 
 PATTERNS = {"rggb": (0, 1, 1, 2), "bggr": (2, 1, 1, 0), "grbg": (1, 0, 2, 1), "gbrg": (1, 2, 0, 1)}
 

@@ -23,7 +23,7 @@ from ...choices import (
     Quality,
 )
 from ...files import budget
-from ...formats import load
+from ...formats import ARGUMENTS, load
 from .changes import SceneChanges, composition_options
 from .records import Command, Decorator, with_options
 from .values import Choice, LightPaths, Names, SensorName, Size, White
@@ -31,9 +31,6 @@ from .values import Choice, LightPaths, Names, SensorName, Size, White
 if TYPE_CHECKING:
     from ...formats.reading import Progress
     from ...scene import Scene
-
-
-RESERVED = ("kinds", "progress", "missing_textures", "strict", "budget")  # parameters of clpt.load
 
 
 class Bytes(click.ParamType):
@@ -66,7 +63,7 @@ def _parse(_: click.Context, __: click.Parameter, definitions: Iterable[str]) ->
     wrong = next((name for name, equals, _ in pairs if not (name and equals)), None)
     if wrong is not None:
         raise click.BadParameter(f"{wrong!r} does not look like NAME=VALUE", param_hint="-D")
-    for name in RESERVED:
+    for name in ARGUMENTS:
         if any(name == known for known, _, _ in pairs):
             raise click.BadParameter(f"no variable can be called {name}", param_hint="-D")
     return {name: value for name, _, value in pairs}

@@ -313,7 +313,7 @@ class _Reader:
         file = cursor.at("file")
         if cls is shapes.Instance:
             return [
-                dataclasses.replace(shape, to_world=np.asarray(shape.to_world) @ matrix)
+                shape.placed(np.asarray(shape.to_world) @ matrix)
                 for matrix in shape_files.read_transforms(file)
             ]
         path = find_file(file)

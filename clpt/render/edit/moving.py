@@ -6,7 +6,6 @@ device. Nothing is lowered or built, and the host waits for nothing.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, cast
@@ -207,7 +206,7 @@ class Moving:
         """Return the actions that move an analytic shape. Raises CannotMove if its kind changes."""
         shape = new if new.group is None else ranges.shape
         matrix = shapes.placement(new) @ ranges.in_group
-        in_world = dataclasses.replace(shape, to_world=matrix)
+        in_world = shape.placed(matrix)
         if not keeps_its_kind(in_world):
             raise CannotMove(f"the transform of {_name(new)} makes triangles of it")
         if isinstance(shape, Spheres):

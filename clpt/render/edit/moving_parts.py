@@ -6,7 +6,6 @@ the device, without a copy on the host.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
@@ -164,10 +163,10 @@ class MovingSpheres:
         centers = as_array(shape.centers, "centers", queue, where)
         if len(centers) != count:
             raise CannotMove(f"{where} has {len(centers)} spheres, and had {count}")
-        common = analytic.common(dataclasses.replace(shape, to_world=matrix))
+        common = analytic.common(shape.placed(matrix))
         balls = None
         if not on_device(centers) and not on_device(shape.radii):
-            balls = analytic.balls(dataclasses.replace(shape, to_world=np.eye(4)))
+            balls = analytic.balls(shape.placed(np.eye(4)))
         elif not (on_device(centers) and _readable_in_place(centers)):
             raise CannotMove(
                 f"the centres of {where} are no (n, 3) or (n, 4) float32 on the device"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 from clpt.errors import SceneError
 from clpt.geometry import analytic, refining, shapes, triangles
@@ -40,7 +39,7 @@ def check_instances(scene_shapes: Iterable[Shape]) -> None:
         for shape in instance.members:
             if shape is not instance and isinstance(shape, Spheres):
                 matrix = shapes.placement(instance) @ shapes.placement(shape)
-                analytic.check(replace(shape, to_world=matrix))
+                analytic.check(shape.placed(matrix))
 
 
 def _check_attributes(shape: Shape, user: str, names: set[str]) -> None:

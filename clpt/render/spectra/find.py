@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +30,7 @@ from clpt.scene.params import fields_of, params
 from clpt.scene.roles import EMISSION
 from clpt.scene.textures import Bitmap
 from clpt.scene.values import is_texture
-from clpt.spectra import RGB, RGBIlluminant, Spectrum
+from clpt.spectra import Spectrum
 from clpt.spectra.reradiation import Reradiation
 from clpt.spectra.spectrum import d65, gridded
 
@@ -188,7 +188,7 @@ def _emitted(value: Any) -> Spectrum:
     """Return an emission as a spectrum; a texture's mean."""
     if is_texture(value):
         return _mean(fields_of(value).get("image"), f"{value.kind}.image")
-    return RGBIlluminant(value.r, value.g, value.b) if isinstance(value, RGB) else value
+    return cast(Spectrum, value)
 
 
 def _mean(image: object, where: str) -> Spectrum:

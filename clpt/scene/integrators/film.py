@@ -17,13 +17,14 @@ from clpt.scene.layers import LAYERS
 from clpt.scene.params import Kind, Shorthand, choice, host, real
 from clpt.scene.roles import Param
 from clpt.spectra import Sensor, illuminants, spaces
+from clpt.spectra.emission import LIGHT
 from clpt.spectra.sensors import OBSERVERS
 from clpt.spectra.spaces import TEMPERATURES
 from clpt.spectra.spectrum import LONGEST, SHORTEST
 
 MOST_BANDS = 1024
 MOST_TIME_BINS = 1 << 16
-LIGHT_SPEED = 0.299792458  # [m/ns]
+LIGHT_SPEED = LIGHT / 1e9  # [m/ns]
 GAUSSIAN_CUT = 4.0  # radius of a Gaussian without `radius` [standard deviations]
 NARROWEST = 0.01  # [nm], a range of wavelengths
 
