@@ -35,7 +35,7 @@ STAGE(splat)(SLAB_ARGS, SCENE_ARGS, JOIN_ARGS STAGE_AT_ARG)
             real f;
             mask there = accepted & spread_pixel(settings, spread, i, &pixel_index, &f);
             light_layers_sum(scene, there, pixel_index, surfaces, row, (real)(0.0f), LIGHT_LAYERS, scale3(colour, f),
-                                 light_layers);
+                             light_layers);
         }
 #endif
         integer full = spread_add(scene, SPREAD_PASSED, accepted, accepted, part, spread, light);

@@ -148,8 +148,7 @@ inline real graph_dotproduct(vec4 a, vec4 b) { return a.x * b.x + a.y * b.y + a.
 inline real graph_magnitude(vec4 a) { return sqrt(graph_dotproduct(a, a)); }
 inline vec4 graph_normalize(vec4 a)
 {
-    real s = graph_divide((real)(1.0f), graph_magnitude(a));
-    return v4(a.x * s, a.y * s, a.z * s, a.w * s);
+    return graph_times(a, graph_divide((real)(1.0f), graph_magnitude(a)));
 }
 inline real graph_distance(vec4 a, vec4 b)
 {

@@ -7,7 +7,8 @@ LightSample directional_sample(Directional l, Scene scene, vec3 p, vec2 u, Wavel
     real one_minus_cos = a * (0.5f - a * (0.0416666667f - a * high));
     Spectrum irradiance = emission_load(scene, l.irradiance, texture_point_nowhere(), lambdas);
     LightSample s;
-    s.wi = to_world(frame_of(neg3(l.direction)), uniform_cone(u, one_minus_cos));
+    s.wi = neg3(l.direction);
+    if (any(l.angle > 0.0f)) s.wi = to_world(frame_of(s.wi), uniform_cone(u, one_minus_cos));
     s.t = FAR;
     s.radiance = spectrum_scale(irradiance, 1.0f / (1.0f - 0.5f * one_minus_cos)); /* over the mean cosine */
     s.pdf = -1.0f;

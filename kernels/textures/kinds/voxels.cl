@@ -24,7 +24,8 @@ inline integer voxels_corner(Voxels t, VoxelsCell c, int corner, real *weight)
     return max_i((c.at[2][z] * t.ny + c.at[1][y]) * t.nx + c.at[0][x], (integer)(0));
 }
 
-Spectrum voxels_reflectance(Voxels t, Scene scene, TexturePoint point, Wavelengths lambdas)
+/* The value as a reflectance, or as light. */
+inline Spectrum voxels_spectrum(Voxels t, Scene scene, TexturePoint point, Wavelengths lambdas, int light)
 {
     VoxelsCell c = voxels_cell(t, scene, point);
     Spectrum sum = spectrum_of(0.0f);
@@ -32,22 +33,21 @@ Spectrum voxels_reflectance(Voxels t, Scene scene, TexturePoint point, Wavelengt
         real weight;
         integer at = t.first + SPECTRUM_SIZE * voxels_corner(t, c, corner, &weight);
         if (!any(weight > 0.0f)) continue;
-        sum = spectrum_madd(spectrum_texel_at(scene.images, at, lambdas), weight, sum);
+        Spectrum value = light ? spectrum_light_texel_at(scene, scene.images, at, lambdas)
+                               : spectrum_texel_at(scene.images, at, lambdas);
+        sum = spectrum_madd(value, weight, sum);
     }
     return sum;
 }
 
+Spectrum voxels_reflectance(Voxels t, Scene scene, TexturePoint point, Wavelengths lambdas)
+{
+    return voxels_spectrum(t, scene, point, lambdas, 0);
+}
+
 Spectrum voxels_emission(Voxels t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    VoxelsCell c = voxels_cell(t, scene, point);
-    Spectrum sum = spectrum_of(0.0f);
-    for (int corner = 0; corner < 8; corner++) {
-        real weight;
-        integer at = t.first + SPECTRUM_SIZE * voxels_corner(t, c, corner, &weight);
-        if (!any(weight > 0.0f)) continue;
-        sum = spectrum_madd(spectrum_light_texel_at(scene, scene.images, at, lambdas), weight, sum);
-    }
-    return sum;
+    return voxels_spectrum(t, scene, point, lambdas, 1);
 }
 
 real voxels_real(Voxels t, Scene scene, TexturePoint point)
