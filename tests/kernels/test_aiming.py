@@ -39,7 +39,7 @@ from clpt.scene.lights import (
 from clpt.scene.shapes import Curves, Disk, Rectangle, Shape, Sphere
 from clpt.scene.textures import Bitmap
 from tests.kernels.scene_harness import SceneProbe
-from tests.pictures.support import assert_agree
+from tests.pictures.support import assert_agree, quick
 
 UP = [0.0, 1.0, 0.0]
 GLASS = ((0.0, 0.5, 0.0, 0.3), (2.5, 0.5, 1.0, 0.45), (-1.0, 2.0, 0.0, 0.2))  # centres and radii
@@ -166,9 +166,7 @@ def batches(lowered: Lowered, aimed: bool) -> Iterator[NDArray[np.float64]]:
         yield made
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in LIGHTS]
-)
+@pytest.mark.parametrize("name", quick(LIGHTS, *QUICK))
 def test_paths_go_and_carry_light_where_they_did(name: str) -> None:
     lowered = lower(scene_of(LIGHTS[name]))
     assert lowered.features.transport.aimed

@@ -33,7 +33,7 @@ def with_path(scene: Scene, **changes: Any) -> Scene:
     return dataclasses.replace(scene, integrator=dataclasses.replace(own, **changes))
 
 
-def quick(names: Any, *chosen: str) -> list[Any]:
+def quick(names: Any, *chosen: Any) -> list[Any]:
     """Return all names as parameters of a test; those that are not `chosen` are slow."""
     return [pytest.param(n, marks=() if n in chosen else pytest.mark.slow) for n in names]
 

@@ -53,6 +53,11 @@ def Mesh "M" (apiSchemas = ["MaterialBindingAPI"]) {{
 }}
 {}
 """
+BOUND = f"""def Mesh "M" (apiSchemas = ["MaterialBindingAPI"]) {{
+    {SQUARE}
+    rel material:binding = </Look>
+}}
+"""
 RGBA = [[(255, 0, 0, 255), (0, 255, 0, 0)], [(0, 0, 255, 102), (128, 128, 128, 204)]]
 
 
@@ -245,11 +250,7 @@ def test_fallbacks_of_primvars(stage: Loader) -> None:
             float outputs:result
         }}
     }}
-    def Mesh "M" (apiSchemas = ["MaterialBindingAPI"]) {{
-        {SQUARE}
-        rel material:binding = </Look>
-    }}
-    {SUN}"""
+    {BOUND} {SUN}"""
     shape = stage(text).shapes[0]
     assert np.allclose(shape.attributes["vertex_paint"], (0.5, 0.25, 0.125))
     assert np.allclose(shape.attributes["vertex_wear"], 0.75)
@@ -268,11 +269,7 @@ def test_surfaces_of_arnold_are_those_of_materialx(stage: Loader) -> None:
             token outputs:surface
         }}
     }}
-    def Mesh "M" (apiSchemas = ["MaterialBindingAPI"]) {{
-        {SQUARE}
-        rel material:binding = </Look>
-    }}
-    {SUN}"""
+    {BOUND} {SUN}"""
     scenes = [
         stage(text % names)
         for names in (

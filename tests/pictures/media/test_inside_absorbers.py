@@ -15,6 +15,7 @@ import clpt
 from clpt import transforms as tf
 from clpt.scene import Film, Scene, cameras, integrators, lights, media, shapes
 from clpt.scene import materials as m
+from tests.pictures.support import quick
 
 A, FOG_A = np.array([0.9, 0.4, 0.1]), np.array([0.2, 0.5, 0.3])  # [1/m]
 FOG = media.Homogeneous(sigma_a=tuple(FOG_A))
@@ -42,11 +43,7 @@ QUICK = ("path", "light paths", "particle_tracer")  # others are as good in slow
 
 def _ways(without: str = "") -> list[Any]:
     """Return the names of integrators as parameters."""
-    return [
-        pytest.param(way, marks=() if way in QUICK else pytest.mark.slow)
-        for way in WAYS
-        if way != without
-    ]
+    return quick([way for way in WAYS if way != without], *QUICK)
 
 
 def _body(material: m.Material, **sides: Any) -> shapes.Shape:

@@ -17,7 +17,7 @@ from clpt.scene.roles import INDEX
 from clpt.scene.shapes import Rectangle, Sphere
 from clpt.spectra import Spectrum, Tabulated
 from tests.pictures.builders import BLACK, UP
-from tests.pictures.support import assert_agree, blocks, exposures
+from tests.pictures.support import assert_agree, blocks, exposures, quick
 
 SHORT, LONG = (1.35, 1.8)  # the index below and above EDGE
 EDGE, GAP = 550.0, 2.0  # [nm]; there is no light nearer to the edge than GAP
@@ -76,11 +76,7 @@ KINDS = [kind for kind in materials.LEAVES if bending(kind)]
 QUICK = (materials.Dielectric,)
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [pytest.param(kind, marks=() if kind in QUICK else pytest.mark.slow) for kind in KINDS],
-    ids=lambda kind: kind.kind,
-)
+@pytest.mark.parametrize("kind", quick(KINDS, *QUICK), ids=lambda kind: kind.kind)
 def test_a_step_in_the_index_is_two_indices(kind: type[materials.Material]) -> None:
     """The picture is the sum of those of two bands of light, each with its constant index.
 

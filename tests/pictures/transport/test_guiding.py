@@ -23,7 +23,7 @@ from clpt.scene.integrators import Gaussian, Path
 from clpt.scene.lights import Constant, Point
 from clpt.scene.shapes import Cube, Rectangle, Shape, Sphere
 from tests.pictures.media.test_fog_light import CHROMATIC, FOGS, GLASS, LAMP, SPOT, room
-from tests.pictures.support import assert_agree, assert_mean, blocks, exposures, with_film
+from tests.pictures.support import assert_agree, assert_mean, blocks, exposures, quick, with_film
 from tests.pictures.transport.test_hybrid import caustic, corner, lamp, narrow
 from tests.pictures.transport.test_light_tracing import LIGHTS, UP
 
@@ -65,9 +65,7 @@ def both(scene: Scene, spp: int, what: str, **integrator: Any) -> None:
     assert_agree(blocks(made), reference, what)
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in LIGHTS]
-)
+@pytest.mark.parametrize("kind", quick(LIGHTS, *QUICK))
 def test_every_light(kind: str) -> None:
     both(corner({kind: LIGHTS[kind]}), 256, kind, max_depth=6)
 

@@ -33,6 +33,7 @@ from tests.pictures.support import (
     assert_mean,
     blocks,
     exposures,
+    quick,
     with_film,
 )
 from tests.pictures.transport.test_light_tracing import (
@@ -95,9 +96,7 @@ def lamp(radius: float = 0.5, radiance: float = 10.0) -> Disk:
     return Disk(to_world=place, material=BLACK, emission=Area(radiance=radiance))
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in LIGHTS]
-)
+@pytest.mark.parametrize("kind", quick(LIGHTS, *QUICK))
 def test_every_light(kind: str) -> None:
     both(corner({kind: LIGHTS[kind]}), 256, kind, max_depth=4)
 
