@@ -110,9 +110,10 @@ class Nodes:
     parts: dict[str, list[tuple[Value, int]]] = field(default_factory=dict)
 
     def add(self, kind: str, inputs: Mapping[str, Value], **settings: int) -> Value:
-        """Return what a kind of node gives: numbers of numbers, and no node without an effect.
+        """Return the result of a node: numbers if all inputs are numbers; else add the node.
 
-        Raises LeftOut for inputs that do not fit to each other.
+        A node that changes nothing is not added: its input is the result. Raises LeftOut for inputs
+        that do not fit to each other.
         """
         declared = NODES[kind]
         try:
@@ -220,7 +221,7 @@ NEUTRAL = {"add": 0.0, "subtract": 0.0, "multiply": 1.0, "divide": 1.0, "power":
 
 @dataclass(frozen=True)
 class Probing:
-    """Random places at which a graph is evaluated; a texture is its mean there."""
+    """A graph is evaluated at these random places; a texture counts as its mean."""
 
     graph: GraphTexture
 

@@ -388,7 +388,7 @@ def _absorb(
 
 
 def _color_at_depth(shader: UsdShade.Shader, extinction: Floats) -> float:
-    """Write the color of what is left at a depth [m]; return the depth. extinction: (3,) [1/m]."""
+    """Write the light's color at a depth; return the depth [m]. extinction: (3,) [1/m]."""
     depth = 1.0 / float(extinction.max())
     _color(shader, "transmission_color", np.exp(-extinction * depth))
     shader.CreateInput("transmission_depth", TYPES.Float).Set(depth)

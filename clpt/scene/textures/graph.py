@@ -51,7 +51,7 @@ class Step:
     stops: Floats | None = None
 
     def computed(self, inputs: dict[str, Floats]) -> Floats:
-        """Return what the node computes (..., width); inputs: arrays (..., channels) by name."""
+        """Return the node's value (..., width); inputs: arrays (..., channels) by name."""
         return NODES[self.kind].evaluated(inputs, self.settings, self.width, self.stops)
 
 
@@ -216,7 +216,7 @@ class _Resolver:
         self.found: dict[str, Operand] = {}
 
     def resolve(self, names: list[str]) -> Operand:
-        """Return what the output is; fill `steps`. names: of more nodes. Raises SceneError."""
+        """Return the output's operand; fill `steps`. names: of more nodes. Raises SceneError."""
         for name in self._in_order(names):
             self.found[name] = self._node(name)
         return self._operand(self.output, "graph.output")
@@ -252,7 +252,7 @@ class _Resolver:
                 yield f"graph.nodes.{name}.{key}", value
 
     def _operand(self, value: object, where: str) -> Operand:
-        """Return what an input or the output is. Raises SceneError."""
+        """Return the operand of an input or of the output. Raises SceneError."""
         if isinstance(value, str):
             return value if value in SOURCES else self.found[value]
         numbers = value.tolist() if isinstance(value, np.ndarray) else value
