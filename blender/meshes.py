@@ -36,7 +36,7 @@ def write(mesh: bpy.types.Mesh, folder: Path, name: str) -> dict[int, str]:
 
 
 def _triangles(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Return the corners of all triangles (n, 3), in Blender's own memory: `foreach_get` is slow."""
+    """Return the corners of all triangles (n, 3), in Blender's memory; `foreach_get` is slow."""
     memory = (ctypes.c_int32 * (3 * len(mesh.loop_triangles))).from_address(
         mesh.loop_triangles[0].as_pointer()
     )
