@@ -1,4 +1,4 @@
-"""Meshes of Blender as files, by its own buffers: each corner of each triangle (`pip install bpy`)."""
+"""Meshes of Blender as files, by its own buffers: each corner of each triangle (needs bpy)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The viewport, by a stand-in for its window: Blender's own depsgraph drives it (`pip install bpy`)."""
+"""The viewport, by a stand-in for its window: Blender's own depsgraph drives it (needs bpy)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
