@@ -14,7 +14,8 @@ import numpy as np
 from mathutils import Matrix
 
 from . import meshes
-from .nodes import Json, Tree, _source
+from .graphs import Json, Site, origin
+from .nodes import Tree
 
 SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 TO_CLPT = Matrix.Diagonal((-1.0, 1.0, -1.0, 1.0))  # cameras and lamps look along +z there
