@@ -31,7 +31,8 @@ FOLDED: dict[str, Callable[..., Any]] = {
     "add": operator.add, "subtract": operator.sub, "multiply": operator.mul, "min": np.minimum,
     "divide": lambda a, b: np.where(b == 0.0, 0.0, a / np.where(b == 0.0, 1.0, b)),
     "max": np.maximum, "mix": lambda fg, bg, t: bg + (fg - bg) * t, "absval": np.abs,
-    "clamp": lambda x, a, b: np.minimum(np.maximum(x, a), b), "sqrt": lambda x: np.sqrt(np.maximum(x, 0.0)), "floor": np.floor,
+    "clamp": lambda x, a, b: np.minimum(np.maximum(x, a), b), "floor": np.floor,
+    "sqrt": lambda x: np.sqrt(np.maximum(x, 0.0)),
     "power": lambda a, b: np.nan_to_num(np.power(a, b)), "dotproduct": lambda a, b: (a * b).sum(),
     "combine3": lambda *parts: np.concatenate(parts),
 }  # fmt: skip
@@ -188,18 +189,23 @@ class Graph:
         }  # fmt: skip
 
 
-def hashed(*numbers: float) -> float:
-    """Return a number in [0, 1] of up to three, by the bits of float32 (Jenkins' lookup3)."""
-    def turned(x: int, bits: int) -> int:
+def jenkins(*words: int) -> float:
+    """Return a number in [0, 1] of up to three words: Jenkins' hash lookup3."""
+
+    def rotated(x: int, bits: int) -> int:
         return ((x << bits) | (x >> (32 - bits))) & 0xFFFFFFFF
 
-    words = [int(np.float32(x).view(np.uint32)) for x in numbers]
     s = [0xDEADBEEF + (len(words) << 2) + 13] * 3
     s = [(a + b) & 0xFFFFFFFF for a, b in zip(s, [*words, 0, 0][:3], strict=True)]
     for i, bits in enumerate((14, 11, 25, 16, 4, 14, 24)):
         c, b = (2, 0, 1)[i % 3], (1, 2, 0)[i % 3]
-        s[c] = ((s[c] ^ s[b]) - turned(s[b], bits)) & 0xFFFFFFFF
+        s[c] = ((s[c] ^ s[b]) - rotated(s[b], bits)) & 0xFFFFFFFF
     return s[2] / 0xFFFFFFFF
+
+
+def hashed(*numbers: float) -> float:
+    """Return a number in [0, 1] of up to three, by the bits of float32."""
+    return jenkins(*(int(np.float32(x).view(np.uint32)) for x in numbers))
 
 
 def turned(g: Graph, v: Value, angles: Value, *, back: bool = False) -> Value:

@@ -83,6 +83,7 @@ class Expression:
         if kind == "uv" and not name:
             return self.g("convert", Value(self.g, "texcoord", 2), channels=3)
         number = self.tree.attributes.setdefault((kind, name), len(self.tree.attributes))
+        self.tree.used.add(number)
         return self.g.look({"type": "mesh_attribute", "name": f"vertex_b{number}"}, 3)
 
     def of_object(self, source: bpy.types.Object) -> Value:
@@ -105,11 +106,11 @@ class Tree:
     object, random: what Object Info knows; surface: False while a world is read.
     """
 
-    def __init__(
-        self, image: Callable[[bpy.types.Node], Json | None], tell: Callable[[str], None]
-    ):
+    def __init__(self, image: Callable[[bpy.types.Node], Json | None], tell: Callable[[str], None]):
         self.image, self.tell = image, tell
         self.attributes: dict[tuple[str, str], int] = {}
+        self.used: set[int] = set()  # attributes that the material reads
+        self.personal = False  # whether it reads what only its object knows
         self.object: bpy.types.Object | None = None
         self.random, self.surface = 0.0, True
 
@@ -122,10 +123,11 @@ class Tree:
         if not material.use_nodes or material.node_tree is None:
             return {"type": "diffuse", "reflectance": list(material.diffuse_color)[:3]}, None
         output = material.node_tree.get_output_node("CYCLES")
-        if output is not None and origin((), output.inputs["Volume"])[0] is not None:
-            self.tell(f"material {material.name!r}: its volume is left out")
         shader = None if output is None else self.linked(Site(output, (), ""), "Surface")
-        return ({"type": "diffuse", "reflectance": 0.0}, None) if shader is None else shader
+        if shader is None:
+            filled = output is not None and output.inputs["Volume"].is_linked
+            return {"type": "null"} if filled else {"type": "diffuse", "reflectance": 0.0}, None
+        return shader
 
     def linked(self, at: Site, key: str | int) -> tuple[Json, Any] | None:
         """Return the material and the light of a linked shader, None without one."""

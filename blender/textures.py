@@ -505,7 +505,7 @@ def _cells(tree: Any, at: Site, octave: Callable[[Any], Value], settings: Any) -
     rough, lacunarity = tree.input(at, "Roughness").clamped(), tree.input(at, "Lacunarity")
     edge, single = settings["feature"] == 3, detail == 0.0 or rough.constant() == [0.0]
     reach = settings["randomness"] * 0.5 + 0.5
-    most = g.value(0.0 if not edge else 0.0)
+    most = g.value(0.0)
     value, amplitude, scale = g.value(8.0 if edge else 0.0), g.value(1.0), g.value(1.0)
     for i in range(1 if single else math.ceil(detail) + 1):
         share = 1.0 if i <= detail else detail - int(detail)
@@ -513,7 +513,9 @@ def _cells(tree: Any, at: Site, octave: Callable[[Any], Value], settings: Any) -
         if single:
             value, most = found, reach if edge else g.value(1.0)
         elif edge:
-            value = g("mix", g("mix", g("min", value, found / scale), value, amplitude), value, share)
+            value = g(
+                "mix", g("mix", g("min", value, found / scale), value, amplitude), value, share
+            )
             most = g("mix", g("mix", reach / scale, most, amplitude), most, share)
         elif output == 2:
             value = g("mix", found / scale, value, amplitude * share)
@@ -698,7 +700,7 @@ def _fresnel(tree: Any, at: Site) -> Value:
 
 
 def _object_info(tree: Any, at: Site) -> Value:
-    source = tree.object
+    source, tree.tree.personal = tree.object, True
     if source is None:
         return tree.g.value(0.0)
     return tree.g.value({
@@ -724,6 +726,7 @@ def _planck(kelvin: float) -> list[float]:
 
 def _rgb(nm: np.ndarray, power: np.ndarray) -> list[float]:
     """Return linear Rec. 709 of a spectrum; the observer by Wyman, Sloan and Shirley 2013."""
+
     def lobe(size: float, peak: float, low: float, high: float) -> np.ndarray:
         return size * np.exp(-0.5 * ((nm - peak) / np.where(nm < peak, low, high)) ** 2)
 
@@ -757,6 +760,7 @@ def _wavelength(tree: Any, at: Site) -> Value:
 
 def _passed(key: int, text: str) -> Read:
     """Return a function that hands on an input, and tells why."""
+
     def read(tree: Any, at: Site) -> Value:
         tree.tell(text)
         return tree.input(at, key)

@@ -1,8 +1,7 @@
-"""Nodes that are no shaders: each of them over a plane, in Cycles and in clpt's graphs (float64)."""
+"""Nodes that are no shaders: each of them over a plane, in Cycles and in clpt's graphs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -81,8 +80,19 @@ def cases() -> list[tuple[str, str, dict[str, Any], str]]:
     add("ValToRGB", "Alpha", "value", ramp="LINEAR")
     for dimensions in ENUMS("ShaderNodeTexNoise", "noise_dimensions"):
         for kind in ENUMS("ShaderNodeTexNoise", "noise_type"):
-            add("TexNoise", "Fac", "vector", noise_dimensions=dimensions, noise_type=kind,
-                Detail=2.4, Roughness=0.6, Lacunarity=2.1, Offset=0.6, Gain=1.2, **NOISE)
+            add(
+                "TexNoise",
+                "Fac",
+                "vector",
+                noise_dimensions=dimensions,
+                noise_type=kind,
+                Detail=2.4,
+                Roughness=0.6,
+                Lacunarity=2.1,
+                Offset=0.6,
+                Gain=1.2,
+                **NOISE,
+            )
         add("TexNoise", "Color", "vector", noise_dimensions=dimensions, Distortion=0.5, **NOISE)
         add("TexWhiteNoise", "Color", "cells", noise_dimensions=dimensions)
     add("TexNoise", "Fac", "vector", normalize=False, Detail=0.0, **NOISE)
@@ -96,11 +106,29 @@ def cases() -> list[tuple[str, str, dict[str, Any], str]]:
                     add("TexVoronoi", output, "vector", voronoi_dimensions=dimensions,
                         feature=feature, **NOISE)  # fmt: skip
                 for metric in ENUMS("ShaderNodeTexVoronoi", "distance"):
-                    add("TexVoronoi", "Distance", "vector", voronoi_dimensions=dimensions,
-                        feature=feature, distance=metric, Exponent=0.8, normalize=True, **NOISE)
+                    add(
+                        "TexVoronoi",
+                        "Distance",
+                        "vector",
+                        voronoi_dimensions=dimensions,
+                        feature=feature,
+                        distance=metric,
+                        Exponent=0.8,
+                        normalize=True,
+                        **NOISE,
+                    )
             if feature != "N_SPHERE_RADIUS":
-                add("TexVoronoi", "Distance", "vector", voronoi_dimensions=dimensions,
-                    feature=feature, Detail=1.6, Roughness=0.4, normalize=True, **NOISE)
+                add(
+                    "TexVoronoi",
+                    "Distance",
+                    "vector",
+                    voronoi_dimensions=dimensions,
+                    feature=feature,
+                    Detail=1.6,
+                    Roughness=0.4,
+                    normalize=True,
+                    **NOISE,
+                )
     for kind in ENUMS("ShaderNodeTexWave", "wave_profile"):
         for way in ENUMS("ShaderNodeTexWave", "bands_direction"):
             add("TexWave", "Fac", "vector", wave_profile=kind, bands_direction=way)
