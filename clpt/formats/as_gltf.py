@@ -19,8 +19,7 @@ def surface(material: m.Material, warn: Warn) -> tuple[m.GltfSurface, Surface, b
 
     warn: is told what is approximated, or left out.
     """
-    leaf: Any = material
-    culled = False
+    leaf, culled = material, False
     while isinstance(leaf, (m.TwoSided, m.Mask, m.NormalMap, m.BumpMap)):
         if isinstance(leaf, m.TwoSided):
             culled = culled or isinstance(leaf.back, m.Null)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +60,7 @@ def save(scene: Scene, path: Path) -> list[str]:
     return list(writer.materials.lost)
 
 
-def is_lit(document: Any) -> bool:
+def is_lit(document: dict[str, object]) -> bool:
     """Return whether a file that `save` wrote has its lights: its surfaces need no studio."""
     asset = document.get("asset")
     return isinstance(asset, dict) and asset.get("extras") == {"lit": True}
@@ -143,7 +144,7 @@ class _Writer:
         if scene.camera.medium is not None:
             self.warn("the medium around the camera")
 
-    def node(self, matrix: NDArray[Any], motion: Keys | None = None, **values: Any) -> int:
+    def node(self, matrix: NDArray[Any], motion: Keys | None = None, **values: object) -> int:
         """Add a node at a place, which a motion moves as its parent; return the outer one."""
         if not np.array_equal(matrix, np.eye(4)):
             values["matrix"] = np.asarray(matrix, float).T.reshape(-1).tolist()
@@ -163,7 +164,7 @@ class _Writer:
         self.animate(outer, "scale", motion.times, scales)
         return outer
 
-    def animate(self, node: int, path: str, times: Any, values: Floats) -> None:
+    def animate(self, node: int, path: str, times: Sequence[float], values: Floats) -> None:
         """Add keys of a node at times [s]."""
         seconds = np.asarray(times)[:, None] - self.start
         sampler = {"input": self.accessor(seconds), "output": self.accessor(values)}
