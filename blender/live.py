@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 DIVIDERS = (1, 2, 4, 8)  # of pictures while something moves
 SLOW, FAST = 0.08, 0.02  # [s] of such a picture: the next ones are coarser, or finer
 CANCEL_SECONDS = 0.05  # a pass ends within them when something moves
+REST = 0.1  # [s] without a change until the whole picture begins
 WAIT = 0.01  # [s] between looks whether a picture was taken
 SHARE = 0.1  # of the time, for sending pictures that get better
 PLACE = "to_world"
@@ -211,6 +212,15 @@ def _edits(former: Scene, scene: Scene) -> dict[str, Any] | None:
     )
 
 
+def _linear(renderer: clpt.Renderer) -> np.ndarray:
+    """Return the picture so far as Blender has it: (h, w, 4) float32, the bottom row first."""
+    if renderer.scene.film.alpha:
+        return rendering.pixels(renderer.image())
+    picture = np.ascontiguousarray(renderer.film.get()[::-1])
+    picture[..., 3] = 1.0
+    return picture
+
+
 def _same(some: list[Any], others: list[Any]) -> bool:
     return len(some) == len(others) and all(a is b for a, b in zip(some, others, strict=True))
 
@@ -310,7 +320,9 @@ class Live:
         if self.scene is None:
             return
         follower = self.moving if self.moves and self.moving.divider > 1 else self.whole
-        if self.moves or self.whole.renderer is None or self.whole.scene is not self.scene:
+        if not self.moves and self.whole.scene is not self.scene and self._hears(REST):
+            return
+        if self.moves or self.whole.scene is not self.scene:
             began, was = time.perf_counter(), follower.renderer
             other = self.whole if follower is self.moving else self.moving
             renderer = follower.follow(self.scene, other.renderer)
@@ -329,6 +341,13 @@ class Live:
         if time.perf_counter() - self.sent > self.cost / SHARE or left <= 0:
             self._send(renderer, 1)
 
+    def _hears(self, seconds: float) -> bool:
+        """Return whether a message comes within some time."""
+        end = time.perf_counter() + seconds
+        while self.link.inbox.empty() and time.perf_counter() < end:
+            time.sleep(0.1 * seconds)
+        return not self.link.inbox.empty()
+
     def _adapt(self, took: float) -> None:
         """Let the next pictures of movement be coarser or finer."""
         place = DIVIDERS.index(self.moving.divider)
@@ -346,7 +365,7 @@ class Live:
             return
         self.link.is_seen = False
         began = time.perf_counter()
-        picture = rendering.pixels(renderer.image())
+        picture = _linear(renderer)
         message = {
             "samples": renderer.samples if divider == 1 else 0, "divider": divider,
             "size": [picture.shape[1], picture.shape[0]], "serial": self.serial,

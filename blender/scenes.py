@@ -64,7 +64,7 @@ class Writer:
         shapes: list[Json] = []
         lights: list[Json] = []
         parts: dict[int, list[Json]] = {}
-        places: dict[int, list[tuple[Key, Matrix]]] = {}
+        places: dict[int, list[tuple[str, tuple[Key, Matrix]]]] = {}
         for instance in self.depsgraph.object_instances:
             if not instance.show_self:
                 continue
@@ -74,7 +74,7 @@ class Writer:
                 if key not in parts:
                     parts[key] = self._parts(len(parts), source)
                 placed = _key(instance), instance.matrix_world.copy()
-                places.setdefault(key, []).append(placed)
+                places.setdefault(key, []).append((source.name, placed))
             elif source.type == "LIGHT":
                 self._lamp(source, instance.matrix_world.copy(), lights, shapes)
             elif source.type not in SILENT:
@@ -83,7 +83,8 @@ class Writer:
         camera = self._camera()
         poses = self._poses()
         for key, placed in places.items():
-            shapes += self._placed(parts[key], [_moved(row, poses) for row in placed])
+            moved = [{"name": name, **_moved(row, poses)} for name, row in placed]
+            shapes += self._placed(parts[key], moved)
         if poses and self.depsgraph.scene.camera is not None:
             camera |= {"shutter": {"open": 0.0, "close": poses[-1][0]}, **self._moved_camera(poses)}
         return {
@@ -164,7 +165,7 @@ class Writer:
 
     def _part(self, file: str, slots: list[Any], slot: int, name: str) -> Json:
         material = slots[slot] if slot < len(slots) else None
-        key = "none" if material is None else material.name_full
+        key = "default_surface" if material is None else material.name_full
         if key not in self.materials:
             described, radiance = self.tree.material(material)
             self.named[key] = described
