@@ -43,6 +43,7 @@ class Parts:
         needed: dict[tuple[str, ...], Any] = {}
         self._read(described, needed)
         dressed: dict[tuple[str, ...], Any] = {}
+        media = described["media"]
 
         def once(key: tuple[str, ...], make: Any) -> Any:
             if key not in dressed:
@@ -52,7 +53,7 @@ class Parts:
         def dress(entry: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
             """Return the shape with its material and light, in its own space, and its key."""
             bare, name, glow = _bare(entry), entry.get("material"), entry.get("emission")
-            keys = [_key("shape", bare)]
+            keys = [_key("shape", [bare, media.get(bare.get("interior"))])]
             changes: dict[str, Any] = {}
             if name is not None:
                 keys.append(_key("material", [name, described["materials"][name]]))
@@ -99,9 +100,10 @@ class Parts:
         """Bring the materials, shapes and lights of a description, which are known or read."""
         entries = [*described["shapes"], *(e for g in described["groups"].values() for e in g)]
         entries = [entry for entry in entries if entry["type"] != "instance"]
+        media = described["media"]
         wanted: dict[str, dict[tuple[str, ...], Any]] = {
             "material": {_key("material", [n, m]): n for n, m in described["materials"].items()},
-            "shape": {_key("shape", _bare(entry)): _bare(entry) for entry in entries},
+            "shape": {_key("shape", [e, media.get(e.get("interior"))]): e for e in map(_bare, entries)},
             "light": {_key("light", glow): glow for e in entries if (glow := e.get("emission"))},
             "lamp": {_key("lamp", entry): entry for entry in described["lights"]},
         }  # fmt: skip
@@ -115,6 +117,7 @@ class Parts:
             {
                 "version": 2, "camera": {"type": "perspective"},
                 "materials": described["materials"] if fresh["material"] else {},
+                "media": described["media"],
                 "shapes": [*fresh["shape"].values(), *carriers],
                 "lights": list(fresh["lamp"].values()),
             },
