@@ -103,7 +103,9 @@ class Parts:
         media = described["media"]
         wanted: dict[str, dict[tuple[str, ...], Any]] = {
             "material": {_key("material", [n, m]): n for n, m in described["materials"].items()},
-            "shape": {_key("shape", [e, media.get(e.get("interior"))]): e for e in map(_bare, entries)},
+            "shape": {
+                _key("shape", [e, media.get(e.get("interior"))]): e for e in map(_bare, entries)
+            },
             "light": {_key("light", glow): glow for e in entries if (glow := e.get("emission"))},
             "lamp": {_key("lamp", entry): entry for entry in described["lights"]},
         }  # fmt: skip
