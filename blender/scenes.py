@@ -14,9 +14,9 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from . import meshes, volumes
+from . import measured, meshes, preferences, process, volumes
 from .graphs import Json, Site, jenkins, origin
-from .nodes import Tree
+from .nodes import Tree, told
 
 SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 TO_CLPT = Matrix.Diagonal((-1.0, 1.0, -1.0, 1.0))  # cameras and lamps look along +z there
@@ -55,6 +55,7 @@ class Writer:
         self.depsgraph, self.folder, self.set_frame = depsgraph, folder, set_frame
         self.width, self.height = width, height
         self.told: dict[str, None] = {}
+        self.owner = ""  # the data that is read now
         self.tree = Tree(self.image, self.tell)
         self.images: dict[str, Json | None] = {}
         self.numbers = itertools.count()  # of files
@@ -67,6 +68,9 @@ class Writer:
 
     def tell(self, text: str) -> None:
         self.told.setdefault(text)
+        lines = told.setdefault(self.owner, [])
+        if text not in lines:
+            lines.append(text)
 
     def write(self) -> Path:
         """Write all; return the scene file."""
@@ -116,6 +120,7 @@ class Writer:
                 "width": self.width,
                 "height": self.height,
                 "alpha": self.depsgraph.scene.render.film_transparent,
+                **measured.film(self.depsgraph.scene.clpt),
             },
             "materials": self.named,
             "media": self.media,
@@ -266,18 +271,32 @@ class Writer:
             return found
         tree = self.tree
         tree.used, tree.object, tree.personal = set(), source, False
+        self.owner = "" if material is None else material.name_full
+        told[self.owner] = []
         described, radiance = tree.material(material)
         if tree.personal:
             self.personal.add(key)
         key, interior = own if tree.personal else key, ""
         nodes = None if material is None else material.node_tree
         output = None if nodes is None else nodes.get_output_node("CYCLES")
-        medium = None if output is None else volumes.medium(tree, output)
+        if material is not None and material.clpt.use_drops:
+            medium = self._drops(material.clpt)
+        else:
+            medium = None if output is None else volumes.medium(tree, output)
+        self.owner = ""
         if medium is not None:
             self.media[key], interior = medium, key
         self.named[key] = described
         self.materials[key] = made = Made(key, radiance, frozenset(tree.used), interior)
         return made
+
+    def _drops(self, settings: Any) -> Json | None:
+        try:
+            python = preferences.python() or process.interpreter()
+            return measured.drops(settings, python)
+        except (ValueError, OSError, process.ProcessError) as error:
+            self.tell(str(error))
+            return None
 
     def _part(self, file: str, slots: list[Any], slot: int, source: Any) -> Json:
         made = self._material(slots[min(slot, len(slots) - 1)] if slots else None, source)
@@ -373,7 +392,11 @@ class Writer:
         if not lamp.clpt.spectrum:
             return [c * factor for c in color]
         luminance = 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2]
-        return {"type": "illuminant", "name": lamp.clpt.spectrum, "scale": luminance * factor}
+        try:
+            return measured.lamp(lamp.clpt.spectrum, luminance * factor)
+        except ValueError as error:
+            self.tell(str(error))
+            return [c * factor for c in color]
 
     def _surface(self, lamp: Any, color: list[float], area: float) -> Json:
         """Return the emission of a lamp's surface [m^2]; it is even, and of its front."""
@@ -424,8 +447,8 @@ class Writer:
         return {
             "type": "sky", "sun_elevation": math.degrees(sky.elevation),
             "sun_azimuth": math.degrees(sky.azimuth), "aerosol": sky.haze,
-            "altitude": sky.altitude, "ground": list(sky.ground), "sky_scale": sky.strength,
-            "sun_scale": sky.strength, "to_world": DOME,
+            "altitude": sky.altitude, "ozone": sky.ozone, "ground": list(sky.ground),
+            "sky_scale": sky.strength, "sun_scale": sky.strength, "to_world": DOME,
         }  # fmt: skip
 
     def _dome(self, texture: Site, strength: float) -> Json:
@@ -469,6 +492,9 @@ class Writer:
                 "offset_x": 0.5 * window[0][2], "offset_y": -0.5 * window[1][2],
             }  # fmt: skip
             described |= lens(camera, matrix)
+            if camera.clpt.lens:
+                focus = described.get("focus_distance", camera.dof.focus_distance or 10.0)
+                described = measured.lens(camera.clpt, camera, focus)
         return {**described, "to_world": [list(row) for row in place]}
 
 

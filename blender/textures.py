@@ -724,8 +724,8 @@ def _planck(kelvin: float) -> list[float]:
     return _rgb(nm, 1.0 / (nm**5 * np.expm1(1.4387769e7 / (nm * max(kelvin, 200.0)))))
 
 
-def _rgb(nm: np.ndarray, power: np.ndarray) -> list[float]:
-    """Return linear Rec. 709 of a spectrum; the observer by Wyman, Sloan and Shirley 2013."""
+def observer(nm: np.ndarray) -> np.ndarray:
+    """Return how the eye sees wavelengths (3, n): Wyman, Sloan and Shirley 2013."""
 
     def lobe(size: float, peak: float, low: float, high: float) -> np.ndarray:
         return size * np.exp(-0.5 * ((nm - peak) / np.where(nm < peak, low, high)) ** 2)
@@ -734,7 +734,12 @@ def _rgb(nm: np.ndarray, power: np.ndarray) -> list[float]:
     x += lobe(-0.065, 501.1, 20.4, 26.2)
     y = lobe(0.821, 568.8, 46.9, 40.5) + lobe(0.286, 530.9, 16.3, 31.1)
     z = lobe(1.217, 437.0, 11.8, 36.0) + lobe(0.681, 459.0, 26.0, 13.8)
-    xyz = np.array([x, y, z]) @ power
+    return np.array([x, y, z])
+
+
+def _rgb(nm: np.ndarray, power: np.ndarray) -> list[float]:
+    """Return the linear Rec. 709 of a spectrum, of luminance 1."""
+    xyz = observer(nm) @ power
     to_rgb = [[3.2404542, -1.5371385, -0.4985314], [-0.969266, 1.8760108, 0.041556],
               [0.0556434, -0.2040259, 1.0572252]]  # fmt: skip
     return (np.array(to_rgb) @ (xyz / xyz[1])).tolist()
