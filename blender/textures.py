@@ -646,6 +646,19 @@ def _image(tree: Any, at: Site) -> Value:
     return tree.g.look({**bitmap, **placed}, width)
 
 
+def _environment(tree: Any, at: Site) -> Value:
+    g, node = tree.g, at.node
+    bitmap = None if node.image is None else tree.image(node)
+    if bitmap is None:
+        return g.value([1.0, 0.0, 1.0])
+    v = tree.vector(at, "generated")
+    if node.projection != "EQUIRECTANGULAR":
+        tree.tell("Mirror Ball of an image is read as equirectangular")
+    flat = g("magnitude", g("combine2", v[0], v[1]))
+    along, up = 0.5 - g("atan2", v[1], v[0]) / TURN, g("atan2", v[2], flat) / math.pi + 0.5
+    return g.look({**bitmap, "wrap": "repeat"}, 3, g("combine2", along, up))
+
+
 def _affine(at: Site) -> np.ndarray | None:
     """Return how Mapping nodes of numbers place the first uv; None for other coordinates."""
     matrix, groups, socket = np.eye(3), at.groups, at.node.inputs["Vector"]
@@ -678,8 +691,9 @@ def _constant(tree: Any, at: Site) -> Value:
 
 
 def _light_path(tree: Any, at: Site) -> Value:
-    shown = 1.0 if at.output in ("Is Camera Ray", "Is Singular Ray") else 0.0
-    return tree.told(at, "Light Path is that of a ray from the camera", shown)
+    of_camera = tree.tree.surface and at.output in ("Is Camera Ray", "Is Singular Ray")
+    kind = "a ray from the camera" if tree.tree.surface else "light, also for the camera"
+    return tree.told(at, f"Light Path is that of {kind}", float(of_camera))
 
 
 def _fresnel(tree: Any, at: Site) -> Value:
@@ -785,7 +799,8 @@ TEXTURES: dict[str, Read] = {
     "MIX_RGB": _mix, "NEW_GEOMETRY": _geometry, "NORMAL": _normal, "OBJECT_INFO": _object_info,
     "RGB": _constant, "RGBTOBW": lambda tree, at: tree.g.gray(tree.input(at, 0)),
     "SEPARATE_COLOR": _separate, "SEPXYZ": _separate, "TEX_BRICK": _bricks,
-    "TEX_CHECKER": _checker, "TEX_COORD": _coordinates, "TEX_GRADIENT": _gradient,
+    "TEX_CHECKER": _checker, "TEX_COORD": _coordinates, "TEX_ENVIRONMENT": _environment,
+    "TEX_GRADIENT": _gradient,
     "TEX_IMAGE": _image, "TEX_MAGIC": _magic, "TEX_NOISE": _noise, "TEX_VORONOI": _voronoi,
     "TEX_WAVE": _waves, "TEX_WHITE_NOISE": _white, "UVMAP": _uv_map, "VALTORGB": _ramp,
     "VALUE": _constant, "VECTOR_ROTATE": _rotate, "VECT_MATH": _vector_math,
@@ -802,5 +817,7 @@ TEXTURES: dict[str, Read] = {
     "LIGHT_FALLOFF": _passed(0, "Light Falloff is quadratic"),
     "SHADERTORGB": _zero("Shader to RGB is of EEVEE alone", 0.5),
     "SCRIPT": _zero("Open Shading Language is not read", 0.5),
+    "TEX_IES": _zero("IES Texture counts as 1", 1.0),
+    "TEX_SKY": _zero("Sky Texture beside others is grey", 0.3),
     "TEX_GABOR": _zero("Gabor Texture is grey", 0.5),
 }  # fmt: skip
