@@ -11,6 +11,7 @@ from pathlib import Path
 from queue import Empty
 from typing import TYPE_CHECKING, Any
 
+import bake
 import numpy as np
 import rendering
 
@@ -292,6 +293,8 @@ class Live:
         if "scene" in changes:
             self.described = {**changes["scene"], "camera": self.described.get("camera")}
             self.settings = changes["scene"]["settings"]
+            lights = bake.lights(self.described["lights"], self.parts.folder)
+            self.described["lights"] = lights
         if "camera" in changes:
             self.described["camera"] = changes["camera"]
         self.size = changes.get("size", self.size)
