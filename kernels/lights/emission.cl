@@ -121,7 +121,7 @@ inline real area_sides_pdf(LightRow l) { return sel(light_mode(l, EMISSION_BOTH)
 inline SurfacePoint surface_point_turned(SurfacePoint q, LightRow l, vec2 *v) { return q; }
 #define area_sides_pdf(l) ((real)(1.0f))
 
-/* Step unseen: the camera does not see the origin of a light path on a light that no ray sees, nor on a directed one. */
+/* Step unseen: the camera does not see where a light path begins on a light that no ray sees, nor on a directed one. */
 inline LightRay area_ray_unseen(LightRay r, LightRow l)
 {
     r.seen = spectrum_sel(light_mode(l, EMISSION_UNSEEN | EMISSION_DIRECTED), spectrum_of(0.0f), r.seen);
