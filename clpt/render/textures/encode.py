@@ -333,10 +333,9 @@ class _EncodedGraph:
     def _operand(self, operand: graph.Operand) -> Operand:
         if isinstance(operand, int):
             return "step", operand
-        if operand == SECOND:
-            return SECOND, self._append(_second_uv(self._table))
         if isinstance(operand, str):
-            return (operand,)
+            second = [self._append(_second_uv(self._table))] if operand == SECOND else []
+            return (operand, *second)
         words = operand.astype(np.float32).view(np.uint32)
         return "words", self._append(*words.tolist()), len(words)
 
