@@ -11,7 +11,8 @@ inline integer mesh_attribute_at(MeshAttribute t, Scene scene, TexturePoint poin
 }
 
 /* light: whether the values are emission. */
-inline Spectrum mesh_attribute_spectrum(MeshAttribute t, Scene scene, TexturePoint point, int light, Wavelengths lambdas)
+inline Spectrum mesh_attribute_spectrum(MeshAttribute t, Scene scene, TexturePoint point, int light,
+                                        Wavelengths lambdas)
 {
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 3; corner++) {
