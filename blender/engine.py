@@ -175,14 +175,25 @@ def _border(render: bpy.types.RenderSettings, width: int, height: int) -> tuple[
     return left, height - above, max(right - left, 1), max(above - below, 1)
 
 
+# Panels of Eevee that show what any engine reads of lamps, materials and cameras.
+SHARED = (
+    "DATA_PT_EEVEE_light", "DATA_PT_camera_dof", "DATA_PT_camera_dof_aperture",
+    "EEVEE_MATERIAL_PT_context_material", "EEVEE_MATERIAL_PT_surface", "EEVEE_MATERIAL_PT_volume",
+    "MATERIAL_PT_preview",
+)  # fmt: skip
+
+
 def _shared_panels() -> list[type]:
     """Return Blender's own panels that mean the same for this engine."""
     left_out = ("VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes")
     return [
         panel
         for panel in bpy.types.Panel.__subclasses__()
-        if "BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ())
-        and panel.__name__ not in left_out
+        if panel.__name__ in SHARED
+        or (
+            "BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ())
+            and panel.__name__ not in left_out
+        )
     ]
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from clpt.images import exr_files
 bpy: Any = pytest.importorskip("bpy")
 blender: Any = pytest.importorskip("blender")
 engine: Any = pytest.importorskip("blender.engine")
+panels: Any = pytest.importorskip("blender.panels")
 
 pytestmark = pytest.mark.slow
 SIZE = 47, 35
@@ -171,28 +174,72 @@ def test_screens_get_the_view_transform_of_blender(tmp_path: Path) -> None:
         bpy.data.images.remove(again)
 
 
-def test_previews_of_materials(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Blender asks for a picture of its ball; it is of the material's color."""
-    rendered_once, shown = threading.Event(), []
-    show, render = engine.ClptEngine._show, engine.ClptEngine.render
+PREVIEW = """
+import os, sys, threading
+import bpy, numpy as np
+import blender
+from blender import engine
 
-    def note(self: Any, layers: dict[str, bytes], size: tuple[int, int], *more: Any) -> None:
-        shown.append(np.frombuffer(layers[""], np.float32).reshape(size[1], size[0], 4))
-        show(self, layers, size, *more)
+rendered, shown = threading.Event(), []
+show, render = engine.ClptEngine._show, engine.ClptEngine.render
 
-    def until_the_end(self: Any, depsgraph: Any) -> None:
-        render(self, depsgraph)
-        rendered_once.set()
+def note(self, layers, size, *more):
+    shown.append(np.frombuffer(layers[""], np.float32).reshape(size[1], size[0], 4))
+    show(self, layers, size, *more)
 
-    monkeypatch.setattr(engine.ClptEngine, "_show", note)
-    monkeypatch.setattr(engine.ClptEngine, "render", until_the_end)
-    bpy.context.scene.render.engine = "CLPT"
-    material = bpy.data.materials["Material"]
-    color = material.node_tree.nodes["Principled BSDF"].inputs["Base Color"]
-    color.default_value = (0.8, 0.02, 0.02, 1.0)
-    with bpy.context.temp_override(id=material):
-        bpy.ops.ed.lib_id_generate_preview()
-    assert rendered_once.wait(120.0)
-    ball = shown[-1]
+def whole(self, depsgraph):
+    render(self, depsgraph)
+    rendered.set()
+
+engine.ClptEngine._show, engine.ClptEngine.render = note, whole
+blender.register()
+bpy.ops.wm.read_factory_settings()
+bpy.context.scene.render.engine = "CLPT"
+material = bpy.data.materials["Material"]
+color = material.node_tree.nodes["Principled BSDF"].inputs["Base Color"]
+color.default_value = (0.8, 0.02, 0.02, 1.0)
+with bpy.context.temp_override(id=material):
+    bpy.ops.ed.lib_id_generate_preview()
+rendered.wait(300.0)
+height, width, _ = shown[-1].shape
+np.save(sys.argv[1], shown[-1])
+os._exit(0)
+"""
+
+
+def test_previews_of_materials(tmp_path: Path) -> None:
+    """Blender asks for a picture of its ball in a thread; it is of the material's color.
+
+    In a process of its own: a script that renders while a preview is being made hangs, because
+    Blender's main thread waits for the preview's and keeps Python's lock.
+    """
+    file = tmp_path / "ball.npy"
+    environment = {**os.environ, "PYTHONPATH": str(Path(blender.__file__).parents[1])}
+    subprocess.run([sys.executable, "-c", PREVIEW, str(file)], check=True, env=environment)
+    ball = np.load(file)
     middle = ball[ball.shape[0] // 2, ball.shape[1] // 2]
     assert middle[0] > 3.0 * middle[2] > 0.0
+
+
+def test_panels_show_what_the_engine_reads() -> None:
+    """Blender's own ones for lamps, materials, worlds and cameras, and the engine's."""
+    scene = bpy.context.scene
+    scene.render.engine = "CLPT"
+    shown = {
+        panel.__name__
+        for panel in bpy.types.Panel.__subclasses__()
+        if "CLPT" in getattr(panel, "COMPAT_ENGINES", ())
+    }
+    wanted = {"DATA_PT_lens", "DATA_PT_camera_dof", "DATA_PT_EEVEE_light", "MATERIAL_PT_preview"}
+    wanted |= {"EEVEE_MATERIAL_PT_surface", "RENDER_PT_format", "RENDER_PT_color_management"}
+    assert wanted <= shown
+    assert any("WORLD_PT" in name for name in shown)
+    context = SimpleNamespace(
+        engine="CLPT", scene=scene, light=bpy.data.lights[0], material=bpy.data.materials[0],
+        world=bpy.data.worlds[0], camera=bpy.data.cameras[0],
+    )  # fmt: skip
+    for panel in panels.PANELS:
+        assert panel.poll(context)
+        settings = panel.settings(panel.owner(context))
+        names = panel.shown(settings)
+        assert names and all(name in settings.bl_rna.properties for name in names), panel
