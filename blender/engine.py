@@ -67,10 +67,18 @@ class ClptEngine(bpy.types.RenderEngine):
             try:
                 self._write_and_run(depsgraph, Path(folder))
             except ProcessError as error:
-                self.report({"ERROR"}, f"clpt: {error}")
+                self.tell(str(error), "ERROR")
             except Exception as error:  # a fault of the add-on is a line, and Blender goes on
                 traceback.print_exc()
-                self.report({"ERROR"}, f"clpt: {type(error).__name__}: {error}")
+                self.tell(f"{type(error).__name__}: {error}", "ERROR")
+
+    def is_cancelled(self) -> bool:
+        """Return whether somebody wants no more of this picture."""
+        return self.test_break()
+
+    def tell(self, line: str, kind: str = "WARNING") -> None:
+        """Tell people a line."""
+        self.report({kind}, f"clpt: {line}")
 
     def _write_and_run(self, depsgraph: bpy.types.Depsgraph, folder: Path) -> None:
         scene, shown = depsgraph.scene, depsgraph.view_layer
@@ -81,7 +89,7 @@ class ClptEngine(bpy.types.RenderEngine):
         writer = scenes.Writer(depsgraph, folder, width, height, self.frame_set)
         order = {"file": str(writer.write()), "width": width, "height": height}
         for line in writer.told:
-            self.report({"WARNING"}, f"clpt: {line}")
+            self.tell(line)
         passes = [] if self.is_preview else _passes(shown)
         for name, _, channels, _ in passes:
             self.add_pass(name, len(channels), channels, layer=shown.name)
@@ -105,7 +113,7 @@ class ClptEngine(bpy.types.RenderEngine):
             process.send(order)
             asked = False
             while not done:
-                if self.test_break() and not asked:
+                if not asked and self.is_cancelled():
                     process.send({"stop": True})
                     asked = True
                 received = process.receive(WAIT)
@@ -116,7 +124,7 @@ class ClptEngine(bpy.types.RenderEngine):
                 self.update_progress(samples / order["samples"])
                 self.update_stats("", f"clpt: sample {samples} of {order['samples']}")
                 for line in message.get("warnings", ()):
-                    self.report({"WARNING"}, f"clpt: {line}")
+                    self.tell(line)
                 if pictures:
                     layers = dict(zip(("", *order["layers"]), pictures, strict=False))
                     self._show(layers, size, passes if len(pictures) > 1 else [], layer)
@@ -150,7 +158,7 @@ def _passes(layer: bpy.types.ViewLayer) -> list[Pass]:
     levels = (min(layer.pass_cryptomatte_depth, 2 * LEVELS) + 1) // 2
     for source, (option, name) in MATTES.items():
         if getattr(layer, option):
-            passes += [(f"{name}{i:02d}", source, "RGBA", "COLOR") for i in range(levels)]
+            passes += [(f"{name}{i:02d}", source, "rgba", "COLOR") for i in range(levels)]
     return passes
 
 
@@ -167,14 +175,25 @@ def _border(render: bpy.types.RenderSettings, width: int, height: int) -> tuple[
     return left, height - above, max(right - left, 1), max(above - below, 1)
 
 
+# Panels of Eevee that show what any engine reads of lamps, materials and cameras.
+SHARED = (
+    "DATA_PT_EEVEE_light", "DATA_PT_camera_dof", "DATA_PT_camera_dof_aperture",
+    "EEVEE_MATERIAL_PT_context_material", "EEVEE_MATERIAL_PT_surface", "EEVEE_MATERIAL_PT_volume",
+    "MATERIAL_PT_preview",
+)  # fmt: skip
+
+
 def _shared_panels() -> list[type]:
     """Return Blender's own panels that mean the same for this engine."""
     left_out = ("VIEWLAYER_PT_filter", "VIEWLAYER_PT_layer_passes")
     return [
         panel
         for panel in bpy.types.Panel.__subclasses__()
-        if "BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ())
-        and panel.__name__ not in left_out
+        if panel.__name__ in SHARED
+        or (
+            "BLENDER_RENDER" in getattr(panel, "COMPAT_ENGINES", ())
+            and panel.__name__ not in left_out
+        )
     ]
 
 

@@ -203,11 +203,16 @@ class Panel(bpy.types.Panel):
     def shown(cls, settings: Any) -> tuple[str, ...]:
         return cls.names
 
+    @classmethod
+    def settings(cls, owner: Any) -> Any:
+        return owner.clpt
+
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
         owner = self.owner(context)
-        for name in self.shown(owner.clpt):
-            self.layout.prop(owner.clpt, name)
+        settings = self.settings(owner)
+        for name in self.shown(settings):
+            self.layout.prop(settings, name)
         for line in told.get(owner.name_full, ()):
             self.layout.label(text=line, icon="INFO")
 
@@ -227,6 +232,36 @@ class CLPT_PT_film(Panel):
     bl_context = "render"
     bl_options: ClassVar = {"DEFAULT_CLOSED"}
     names = ("sensor", "sensor_file", "white_balance")
+
+
+class CLPT_PT_motion(Panel):
+    """Alpha of what is not covered, and blur of what moves: Blender's own settings."""
+
+    bl_label = "Alpha and Motion"
+    bl_context = "render"
+    names = (
+        "film_transparent", "use_motion_blur", "motion_blur_position", "motion_blur_shutter",
+    )  # fmt: skip
+
+    @classmethod
+    def settings(cls, owner: Any) -> Any:
+        return owner.render
+
+
+class CLPT_PT_passes(Panel):
+    """Passes for the compositor: Blender's own settings."""
+
+    bl_label = "Passes"
+    bl_context = "view_layer"
+    names = (
+        "use_pass_z", "use_pass_position", "use_pass_normal", "use_pass_uv",
+        "use_pass_diffuse_color", "use_pass_cryptomatte_object", "use_pass_cryptomatte_material",
+        "pass_cryptomatte_depth",
+    )  # fmt: skip
+
+    @classmethod
+    def settings(cls, owner: Any) -> Any:
+        return bpy.context.view_layer
 
 
 class CLPT_PT_material(Panel):
@@ -289,7 +324,8 @@ GROUPS = {
     "Camera": ClptCamera,
 }  # fmt: skip
 PANELS = (
-    CLPT_PT_sampling, CLPT_PT_film, CLPT_PT_material, CLPT_PT_lamp, CLPT_PT_camera, CLPT_PT_world,
+    CLPT_PT_sampling, CLPT_PT_motion, CLPT_PT_film, CLPT_PT_passes, CLPT_PT_material, CLPT_PT_lamp,
+    CLPT_PT_camera, CLPT_PT_world,
 )  # fmt: skip
 
 

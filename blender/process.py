@@ -34,7 +34,9 @@ class Process:
             listener._listener._socket.settimeout(0.5)  # accept() has no limit of its own
             command = [self.python, str(WORKER), str(listener.address[1])]
             try:
-                self.child = subprocess.Popen(command, stdin=subprocess.PIPE)
+                self.child = subprocess.Popen(
+                    command, stdin=subprocess.PIPE, env=environment(self.python)
+                )
             except OSError as error:
                 raise ProcessError(f"{command[0]} does not start: {error.strerror}") from None
             assert self.child.stdin is not None
@@ -116,6 +118,14 @@ def end_all() -> None:
     """End processes that wait for work."""
     while _idle:
         _idle.pop().stop()
+
+
+def environment(python: str) -> dict[str, str]:
+    """Return the environment of a process: Blender's Python finds clpt where Blender has it."""
+    variables, found = dict(os.environ), importlib.util.find_spec("clpt")
+    if python == sys.executable and found is not None and found.origin is not None:
+        variables["PYTHONPATH"] = str(Path(found.origin).parents[1])
+    return variables
 
 
 def interpreter() -> str:

@@ -91,6 +91,7 @@ class Writer:
         lights: list[Json] = []
         parts: dict[Any, list[Json]] = {}
         places: dict[Any, list[tuple[Key, Matrix]]] = {}
+        names: dict[Key, str] = {}
         for instance in self.depsgraph.object_instances:
             source, matrix = instance.object, instance.matrix_world.copy()  # gone after its turn
             if instance.show_particles and not instance.is_instance:
@@ -103,6 +104,7 @@ class Writer:
                 key = (source.data.as_pointer(), *(m.name for m in made))
                 if key not in parts:
                     parts[key] = self._parts(len(parts), source)
+                names[_key(instance)] = source.name
                 places.setdefault(key, []).append((_key(instance), matrix))
             elif source.type == "LIGHT":
                 self._lamp(source, matrix, lights, shapes)
@@ -117,7 +119,8 @@ class Writer:
         }  # fmt: skip
         poses = self._poses(deforming)
         for key, placed in places.items():
-            shapes += self._placed(parts[key], [_moved(row, poses) for row in placed])
+            moved = [{"name": names[row[0]], **_moved(row, poses)} for row in placed]
+            shapes += self._placed(parts[key], moved)
         if poses and self.depsgraph.scene.camera is not None:
             camera |= {"shutter": {"open": 0.0, "close": poses[-1][0]}, **self._moved_camera(poses)}
         return {
@@ -271,7 +274,7 @@ class Writer:
 
     def _material(self, material: Any, source: Any) -> Made:
         """Return a material as an object has it."""
-        key = "none" if material is None else material.name_full
+        key = "default_surface" if material is None else material.name_full
         own = f"{key} of {source.name_full}"
         found = self.materials.get(own if key in self.personal else key)
         if found is not None:
