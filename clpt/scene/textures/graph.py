@@ -90,7 +90,7 @@ class Graph(Texture):
             message = "cannot be textures that combine others: nodes do that"
             raise SceneError(message, where="graph.textures")
         object.__setattr__(self, "textures", tuple(self.textures))
-        _Resolver(self).resolve([*self.nodes])  # those that the value does not need, too
+        _Resolver(self).resolve([*self.nodes])  # also the nodes that the value does not need
 
     @cached_property
     def _resolved(self) -> tuple[list[Step], Operand]:
