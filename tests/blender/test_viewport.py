@@ -205,6 +205,28 @@ def test_through_the_camera_it_is_the_final_picture(
     assert np.median(np.abs(shown - wanted)) < 0.02 * wanted.mean()
 
 
+def test_the_film_is_that_of_the_scene(window: Window) -> None:
+    """Alpha, another size, and another mode are other films, while the view stays."""
+    window.open()
+    first = window.picture(64)
+    scene = bpy.context.scene
+    scene.render.film_transparent = True
+    window.open()
+    clear = window.picture(64)
+    assert clear[2, 2, 3] == 0.0 and clear[24, 32, 3] == 1.0
+    scene.render.film_transparent = False
+    scene.clpt.white_balance = "A"
+    window.open()
+    balanced = window.picture(64)[..., :3].mean(axis=(0, 1)) / first[..., :3].mean(axis=(0, 1))
+    assert balanced[2] > 1.3 * balanced[0]
+    scene.clpt.white_balance, scene.clpt.mode = "none", "spectral"
+    window.width, window.height = 32, 24
+    window.open()
+    small = window.picture(64)
+    assert small.shape == (24, 32, 4)
+    assert small[..., :3].mean() == pytest.approx(first[..., :3].mean(), rel=0.05)
+
+
 def test_places_and_colors_are_no_loads(window: Window) -> None:
     """Files of geometry are written once, and again only for what changes."""
     written = []
