@@ -162,7 +162,7 @@ GPRIMS = frozenset(
 )  # fmt: skip
 UNREAD = frozenset(
     ("NurbsPatch", "NurbsCurves", "HermiteCurves", "TetMesh", "LightFilter", "PluginLightFilter",
-     "ParticleField3DGaussianSplat", "ParticleField")
+     "ParticleField3DGaussianSplat", "ParticleField", "Skeleton")
 )  # fmt: skip
 HIDDEN = ("proxy", "guide")  # purposes that no picture shows
 
