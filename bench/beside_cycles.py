@@ -47,7 +47,8 @@ from bench.hard_light.scenes import (
     sides,
 )  # fmt: skip
 from bench.meshes import write_ply
-from bench.peers import APART, WAYS, relative_mse, watched, way_option
+from bench.peer_figures import relative_mse
+from bench.peers import APART, WAYS, watched, way_option
 from clpt import transforms
 from clpt.geometry.winding import triangles_of
 from clpt.scene import materials

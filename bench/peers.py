@@ -23,7 +23,6 @@ Mitsuba accepts no others for numbers.
 from __future__ import annotations
 
 import json
-import math
 import os
 import subprocess
 import sys
@@ -36,11 +35,11 @@ from typing import Any
 
 import click
 import numpy as np
-from numpy.typing import NDArray
 from rich.table import Table
 
 import clpt
 from bench import machine
+from bench.peer_figures import Picture, errors, gain, rate
 from bench.peer_films import with_film
 from bench.starting import WATCH
 from bench.workers import find_llvm
@@ -63,7 +62,6 @@ while done < spp:
     total, done = total + numpy.array(image)[..., :3] * some, done + some
 numpy.save(out, total / spp)
 """
-TRIM = 0.001
 APART = 0.03  # of two renderers' means: beyond, they have no common reference
 FIRST_SEED = 1000  # Mitsuba adds the samples to it
 SAMPLERS = {"mitsuba": None, "mitsuba best": "multijitter"}
@@ -81,7 +79,6 @@ WAYS: dict[str, tuple[str, ...]] = {  # of clpt, and their options
 }
 
 Row = dict[str, Any]
-Picture = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -154,14 +151,6 @@ def watched(
     return processor, clock, memory
 
 
-def relative_mse(image: NDArray[np.floating], reference: NDArray[np.floating]) -> float:
-    """Return the mean of squared error over squared picture plus a hundredth of the mean's square,
-    without the worst pixels."""
-    error = (image - reference) ** 2 / (reference**2 + 1e-2 * reference.mean() ** 2)
-    error = np.sort(error.mean(-1).ravel())
-    return float(error[: int(error.size * (1 - TRIM))].mean())
-
-
 @dataclass
 class Record:
     """The pictures of a contender and what each took; start: seconds of a picture of single
@@ -179,40 +168,6 @@ class Record:
     def mean(self) -> float:
         """The mean of all pictures."""
         return float(np.mean([taken.image.mean() for taken in self.taken]))
-
-
-def errors(records: Mapping[str, Record]) -> dict[str, list[float]]:
-    """Return the error of each picture of each contender, see above; at least two seeds."""
-    pictures = {name: [taken.image for taken in record.taken] for name, record in records.items()}
-    even = _errors(pictures, dict.fromkeys(records, 1.0))
-    return _errors(pictures, {n: 1.0 / max(float(np.mean(e)), 1e-12) for n, e in even.items()})
-
-
-def _errors(
-    pictures: Mapping[str, Sequence[Picture]], weights: Mapping[str, float]
-) -> dict[str, list[float]]:
-    """Return errors beside the weighted mean of the pictures of all other seeds.
-
-    Contenders may make equal pictures with a seed, so the error of a seed's weighted mean is
-    measured, too: it is that of independent pictures, and a reference has one less than all.
-    """
-    seeds = range(len(next(iter(pictures.values()))))
-    share = sum(weights.values())
-    of_seed = [
-        sum(w * pictures[n][seed].astype(np.float64) for n, w in weights.items()) / share
-        for seed in seeds
-    ]
-    total = np.sum(of_seed, axis=0)
-    references = [(total - mean) / (len(seeds) - 1) for mean in of_seed]
-    pairs = zip(of_seed, references, strict=True)
-    noise = float(np.mean([relative_mse(mean, reference) for mean, reference in pairs]))
-    return {
-        name: [
-            relative_mse(image, reference) - noise / len(seeds)
-            for image, reference in zip(images, references, strict=True)
-        ]
-        for name, images in pictures.items()
-    }
 
 
 def compare(
@@ -240,7 +195,8 @@ def compare(
 def rows_of(records: Mapping[str, Record], spp: int) -> list[Row]:
     """Return a row for each contender: its time, error and cost of each seed."""
     rows = []
-    for name, values in errors(records).items():
+    pictures = {name: [t.image for t in record.taken] for name, record in records.items()}
+    for name, values in errors(pictures).items():
         record = records[name]
         height, width, _ = record.taken[0].image.shape
         rows.append({
@@ -254,26 +210,6 @@ def rows_of(records: Mapping[str, Record], spp: int) -> list[Row]:
             "peak_mib": round(max(taken.peak for taken in record.taken) / 2**20),
         })  # fmt: skip
     return rows
-
-
-def seconds(row: Row) -> float:
-    """Return the least processor time of a row's pictures."""
-    return float(min(row["seconds"]))
-
-
-def gain(row: Row, over: Row) -> tuple[float, float]:
-    """Return the efficiency of a row over that of another row, and its standard error."""
-    own, other = (np.array(r["relmse"]) for r in (row, over))
-    ratio = float(other.mean() / own.mean())
-    apart = other / other.mean() - own / own.mean()  # seed by seed, as pictures may be equal
-    ratio *= seconds(over) / seconds(row)
-    return ratio, ratio * float(apart.std(ddof=1)) / math.sqrt(own.size)
-
-
-def rate(row: Row) -> float:
-    """Return a million samples a second."""
-    width, height = row["size"]
-    return float(width * height * (row["spp"] - 1) / seconds(row) / 1e6)
 
 
 HEADINGS = ("scene", "film", "mode", "", "Msamples/s", "relMSE", "first [s]", "efficiency over")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 from collections.abc import Iterable, Mapping
-from typing import Any, TypedDict, get_args
+from typing import Any, Literal, TypedDict, get_args
 
 import pyopencl as cl
 
@@ -16,6 +16,8 @@ from clpt.errors import SceneError, UnknownKindError, nearest
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.params import Kind, params
+
+Programs = Literal["own", "shared"]
 
 
 class RenderOptions(TypedDict, total=False):
@@ -42,6 +44,9 @@ class RenderOptions(TypedDict, total=False):
     cancel_seconds: [s] from `cancel` to the end of a `run`, for interactive pictures: launches are
     shorter, and the device is a little slower.
 
+    programs: "own", compiled for the scene, or "shared" with all scenes of the usual kinds: the first
+    such scene compiles for longer, the others hardly. Pictures of both have other noise.
+
     An option that is absent or None has a default for the device and the scene.
     """
 
@@ -58,6 +63,7 @@ class RenderOptions(TypedDict, total=False):
     halves: bool
     denoise: str | None
     cancel_seconds: float | None
+    programs: Programs
 
 
 def check_scene(scene: object) -> None:
@@ -87,6 +93,9 @@ def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
     quality = options.get("tree_quality", "high")
     if quality not in get_args(bvh.Quality):
         raise UnknownKindError("quality", str(quality), get_args(bvh.Quality), where="tree_quality")
+    programs = options.get("programs", "own")
+    if programs not in get_args(Programs):
+        raise UnknownKindError("programs", str(programs), get_args(Programs), where="programs")
     for name in ("queued", "looped", "halves", "profiling"):
         if options.get(name) is not None:
             flag(options[name], name)

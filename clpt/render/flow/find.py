@@ -68,18 +68,19 @@ def analyse(
     former: Integrator | None = None,
     *,
     lit_before: bool | None = None,
+    shared: bool = False,
 ) -> Analysis:
     """Return the facts about a scene; cache: with results of the analysis before.
 
     former: the integrator before an edit, which stays: its film has sums for light paths, or none;
-    lit_before: whether light paths were ghosts of a lens then.
+    lit_before: whether light paths were ghosts of a lens then; shared: see `SceneIndex`.
 
     Raises SceneError for an invalid scene; it names the shape, light or material.
     """
     scene = at_rest(scene)
     check_at_rest(scene, cache)
     scene = plainly_lit(scene)
-    index = replace(SceneIndex.of(scene), lit_before=lit_before)
+    index = replace(SceneIndex.of(scene, shared), lit_before=lit_before)
     geometry = assembled(index, cache)
     sphere = geometry.bounding_sphere()
     look = Look.of(scene.film, cache)
