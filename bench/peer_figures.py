@@ -60,21 +60,16 @@ def _errors(
     }
 
 
-def seconds(row: Row) -> float:
-    """Return the least processor time of a row's pictures."""
-    return float(min(row["seconds"]))
-
-
 def gain(row: Row, over: Row) -> tuple[float, float]:
     """Return the efficiency of a row over that of another row, and its standard error."""
     own, other = (np.array(r["relmse"]) for r in (row, over))
     ratio = float(other.mean() / own.mean())
     apart = other / other.mean() - own / own.mean()  # seed by seed, as pictures may be equal
-    ratio *= seconds(over) / seconds(row)
+    ratio *= over["seconds"] / row["seconds"]
     return ratio, ratio * float(apart.std(ddof=1)) / math.sqrt(own.size)
 
 
 def rate(row: Row) -> float:
     """Return a million samples a second."""
     width, height = row["size"]
-    return float(width * height * (row["spp"] - 1) / seconds(row) / 1e6)
+    return float(width * height * (row["spp"] - 1) / row["seconds"] / 1e6)

@@ -5,15 +5,15 @@
 with its best sampler (multijitter; clpt reads either as Sobol). Renderers are whole processes that
 take turns with each seed. `--film preview` is 200 pixels wide and has 32 samples, `final` 640 and
 96. Time is processor time of all threads, which neighbours on the machine disturb less than the
-clock; the time of a picture of single samples is subtracted, and reported apart (of guiding that of
-`path`, since a guide is learnt before the first sample).
+clock: the least of all seeds, and of previews an eighth of eight times the samples. The time of a
+picture of single samples is subtracted, and reported apart (of guiding that of `path`, since a
+guide is learnt before the first sample).
 
 The error of a picture is the mean over its pixels of (p - r)^2 / (r^2 + m^2 / 100), for the
 reference's pixel r and mean m, averaged over three channels, without the worst thousandth of the
 pixels. The reference of a picture is the mean of all contenders' pictures of the other seeds, each
-with the weight of its contender's inverse error; the reference's own error is subtracted. Seconds
-are the least of all seeds. A ratio of costs, error times seconds, has the standard error of the
-errors over the seeds.
+with the weight of its contender's inverse error; the reference's own error is subtracted. A ratio
+of costs, error times seconds, has the standard error of the errors over the seeds.
 
 In spectral mode a metal's `eta` and `k` by RGB are taken as values at 610, 550 and 460 nm: Mitsuba
 would cut them at 1, as if they were reflectances. Images of numbers are `raw` there, because
@@ -23,6 +23,7 @@ Mitsuba accepts no others for numbers.
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -65,7 +66,9 @@ numpy.save(out, total / spp)
 APART = 0.03  # of two renderers' means: beyond, they have no common reference
 FIRST_SEED = 1000  # Mitsuba adds the samples to it
 SAMPLERS = {"mitsuba": None, "mitsuba best": "multijitter"}
-FILMS = {"preview": (200, 32), "final": (640, 96)}  # width and samples a pixel
+FILMS = {"preview": (200, 32, 8), "final": (640, 96, 1)}
+"""Width, samples a pixel, and how many times as many are timed."""
+TIMED = 2  # renders
 PLAIN = ("--integrator", "path", "--light-paths", "0")
 WAYS: dict[str, tuple[str, ...]] = {  # of clpt, and their options
     "file": (),
@@ -153,25 +156,20 @@ def watched(
 
 @dataclass
 class Record:
-    """The pictures of a contender and what each took; start: seconds of a picture of single
-    samples."""
+    """What a contender took, and its pictures: a picture for each seed.
 
-    start: float = 0.0
-    taken: list[Taken] = field(default_factory=list)
+    start: seconds of a picture of single samples; seconds: of a picture, without its start; peak:
+    the largest resident set [bytes].
+    """
 
-    @property
-    def seconds(self) -> list[float]:
-        """The processor time of each picture, without the start."""
-        return [taken.cpu - self.start for taken in self.taken]
-
-    @property
-    def mean(self) -> float:
-        """The mean of all pictures."""
-        return float(np.mean([taken.image.mean() for taken in self.taken]))
+    start: float
+    seconds: float = math.inf
+    peak: int = 0
+    images: list[Picture] = field(default_factory=list)
 
 
 def compare(
-    scene: Path, contenders: Mapping[str, Contender], spp: int, seeds: int
+    scene: Path, contenders: Mapping[str, Contender], spp: int, times: int, seeds: int
 ) -> tuple[dict[str, Record], list[str]]:
     """Return what each contender took and made with each seed, and what failed, as sentences."""
     records: dict[str, Record] = {}
@@ -188,26 +186,31 @@ def compare(
         records["guiding"].start = records["path"].start
     for seed in range(seeds):
         for name, record in records.items():
-            record.taken.append(contenders[name].render(spp, FIRST_SEED * (seed + 1)))
+            taken = contenders[name].render(spp, FIRST_SEED * (seed + 1))
+            record.images.append(taken.image)
+            record.peak = max(record.peak, taken.peak)
+            if times > 1 and seed < TIMED:
+                taken = contenders[name].render(spp * times, FIRST_SEED * (seed + 1))
+            if times == 1 or seed < TIMED:
+                record.seconds = min(record.seconds, (taken.cpu - record.start) / times)
     return records, failures
 
 
 def rows_of(records: Mapping[str, Record], spp: int) -> list[Row]:
     """Return a row for each contender: its time, error and cost of each seed."""
     rows = []
-    pictures = {name: [t.image for t in record.taken] for name, record in records.items()}
-    for name, values in errors(pictures).items():
+    for name, values in errors({name: record.images for name, record in records.items()}).items():
         record = records[name]
-        height, width, _ = record.taken[0].image.shape
+        height, width, _ = record.images[0].shape
         rows.append({
             "contender": name,
             "size": [width, height],
             "spp": spp,
             "start": round(record.start, 3),
-            "seconds": [round(seconds, 4) for seconds in record.seconds],
+            "seconds": round(record.seconds, 4),
             "relmse": [round(value, 7) for value in values],
-            "mean": round(record.mean, 6),
-            "peak_mib": round(max(taken.peak for taken in record.taken) / 2**20),
+            "mean": round(float(np.mean(record.images)), 6),
+            "peak_mib": round(record.peak / 2**20),
         })  # fmt: skip
     return rows
 
@@ -285,10 +288,10 @@ class Settings:
 
     def rows(self, scene: Path, mode: str, film: str, seeds: int) -> list[Row]:
         """Return a row for each contender. Raises OSError, ET.ParseError, RuntimeError."""
-        width, spp = FILMS[film]
+        width, spp, times = FILMS[film]
         with tempfile.TemporaryDirectory() as temporary:
             contenders = self.contenders(scene, width, mode, Path(temporary))
-            records, failures = compare(scene, contenders, spp, seeds)
+            records, failures = compare(scene, contenders, spp, times, seeds)
         print(*failures, sep="\n", end="\n" * bool(failures), file=sys.stderr)
         about = {
             "scene": machine.scene_name(scene),

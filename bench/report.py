@@ -272,6 +272,7 @@ TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     **dict.fromkeys(("bandwidth", "rays", "stages", "shading", "build", "start"), figures),
     "renders": renders,
     "peers": peers,
+    "sharing": plain,
     "efficiency": plain,
     "hard_light": hard_light,
     "media": media,

@@ -5,19 +5,18 @@ from __future__ import annotations
 import dataclasses
 import difflib
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal, TypedDict, get_args
+from typing import Any, TypedDict, get_args
 
 import pyopencl as cl
 
 from clpt import bvh
 from clpt.arrays import check_unmasked, flag, is_number, whole
+from clpt.choices import Programs
 from clpt.denoise import needs, oidn
 from clpt.errors import SceneError, UnknownKindError, nearest
 from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.params import Kind, params
-
-Programs = Literal["own", "shared"]
 
 
 class RenderOptions(TypedDict, total=False):
@@ -44,8 +43,8 @@ class RenderOptions(TypedDict, total=False):
     cancel_seconds: [s] from `cancel` to the end of a `run`, for interactive pictures: launches are
     shorter, and the device is a little slower.
 
-    programs: "own", compiled for the scene, or "shared" with all scenes of the usual kinds: the first
-    such scene compiles for longer, the others hardly. Pictures of both have other noise.
+    programs: "own", compiled for the scene, or "shared" with all scenes of the usual kinds. The
+    first of these compiles for longer, the others hardly. Pictures of both have other noise.
 
     An option that is absent or None has a default for the device and the scene.
     """

@@ -87,8 +87,8 @@ def decided(
 ) -> Lowered:
     """Return a scene lowered for the cheapest of its candidates, with the costs in its reason.
 
-    lowered: for the first candidate; texture_budget, shared: as of `lower`. A candidate that must be
-    compiled is tried if the best so far has many rays to trace, and a guide only if that leaves
+    lowered: for the first candidate; texture_budget, shared: as of `lower`. A candidate that must
+    be compiled is tried if the best so far has many rays to trace, and a guide only if that leaves
     noise.
 
     Raises as `Wavefront.create` does.

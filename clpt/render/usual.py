@@ -32,12 +32,13 @@ SEEN_THROUGH: tuple[type[mt.Material], ...] = (mt.ThinDielectric, mt.Null)
 LIGHTS = ("constant", "disk", "envmap", "rectangle", "sphere", "triangle")
 TEXTURES = (
     ("bitmap", "real"),
+    ("bitmap", "reflectance"),
     ("checkerboard", "reflectance"),
     ("packed_bitmap", "real"),
     ("packed_bitmap", "reflectance"),
 )
 MIXTURES = 2  # masks in blends, or blends in masks
-LOBES = ("metallic", "clearcoat", "spec_tint")  # of those that a parameter of 0 leaves out
+LOBES = ("absorption", "clearcoat", "metallic", "spec_tint")  # of those that a parameter of 0 leaves out
 INNER: Sources = frozenset({
     ("emission", "value", "constant"),
     ("emission", "value", "table"),
@@ -59,6 +60,7 @@ def widened(own: Features) -> Features:
     """Return the features of a shared program for the features of a scene."""
     lights, textures, materials = own.lights, own.textures, own.materials
     usual = [cls for cls in (*LEAVES, *SEEN_THROUGH) if cls in materials.leaves]
+    transmitting = (cls.kind for cls in usual if cls().transmits)
     return replace(
         own,
         transport=replace(own.transport, aimed=own.transport.aimed or own.transport.balanced),
@@ -74,7 +76,7 @@ def widened(own: Features) -> Features:
         textures=replace(textures, roles=tuple(sorted({*textures.roles, *TEXTURES}))),
         materials=replace(
             materials,
-            transmitting=tuple(sorted({*materials.transmitting, *(cls.kind for cls in usual if cls().transmits)})),
+            transmitting=tuple(sorted({*materials.transmitting, *transmitting})),
             shining=tuple(cls.kind for cls in materials.leaves if cls in usual),
             mixtures=max(materials.mixtures, MIXTURES),
             sources=materials.sources | _sources(usual) | INNER,
