@@ -76,9 +76,9 @@ lint: $(VENV)/.dev
 	$(BIN)/mypy
 	$(BIN)/mypy --config-file= --strict --follow-imports=silent tests/typed_program.py
 
-# the extension: Blender installs it from disk
-blender: $(BIN)/python
-	cd blender && ../$(BIN)/python -m zipfile -c ../clpt_blender.zip *.py *.toml LICENSE
+# the extension, with all wheels: Blender installs it from disk
+blender: $(VENV)/.run
+	$(BIN)/python packaging/blender_zip.py
 
 docs: $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build

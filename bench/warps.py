@@ -37,8 +37,8 @@ from clpt.bench import opened
 from clpt.bench.launches import Flight
 from clpt.bench.rays import world
 from clpt.bench.stages import members_moved, words_of_members
-from clpt.layout import Record
 from clpt.records import PATH, SHADOW, SLABS
+from clpt.records.layout import Record
 from clpt.render.flow import programs
 
 SCENES = (

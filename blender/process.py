@@ -28,12 +28,15 @@ class Process:
     """A process of clpt and the connection to it."""
 
     def __init__(self, python: str = ""):
+        self.python = python or interpreter()
         key = secrets.token_bytes(32)
         with Listener(("127.0.0.1", 0), authkey=key) as listener:
             listener._listener._socket.settimeout(0.5)  # accept() has no limit of its own
-            command = [python or interpreter(), str(WORKER), str(listener.address[1])]
+            command = [self.python, str(WORKER), str(listener.address[1])]
             try:
-                self.child = subprocess.Popen(command, stdin=subprocess.PIPE)
+                self.child = subprocess.Popen(
+                    command, stdin=subprocess.PIPE, env=environment(self.python)
+                )
             except OSError as error:
                 raise ProcessError(f"{command[0]} does not start: {error.strerror}") from None
             assert self.child.stdin is not None
@@ -85,6 +88,44 @@ class Process:
         except subprocess.TimeoutExpired:
             self.child.kill()
             self.child.wait()
+
+
+_idle: list[Process] = []  # one at most, for the next picture: it need not start again
+
+
+def take(python: str = "") -> Process:
+    """Return a process that waits for work. Raises ProcessError."""
+    python = python or interpreter()
+    while _idle:
+        process = _idle.pop()
+        if process.python == python and process.child.poll() is None:
+            with suppress(ProcessError):
+                if process.receive(0.0) is None:
+                    return process
+        process.stop()
+    return Process(python)
+
+
+def give_back(process: Process) -> None:
+    """Keep a process whose work is done, or end it."""
+    if _idle:
+        process.stop()
+    else:
+        _idle.append(process)
+
+
+def end_all() -> None:
+    """End processes that wait for work."""
+    while _idle:
+        _idle.pop().stop()
+
+
+def environment(python: str) -> dict[str, str]:
+    """Return the environment of a process: Blender's Python finds clpt where Blender has it."""
+    variables, found = dict(os.environ), importlib.util.find_spec("clpt")
+    if python == sys.executable and found is not None and found.origin is not None:
+        variables["PYTHONPATH"] = str(Path(found.origin).parents[1])
+    return variables
 
 
 def interpreter() -> str:

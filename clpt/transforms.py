@@ -116,6 +116,21 @@ def transform_normals(matrix: ArrayLike, normals: ArrayLike) -> Matrix:
     return turned / np.where(length > 0.0, length, 1.0)
 
 
+def unit_vectors(vectors: NDArray[Any]) -> NDArray[Any]:
+    """Return vectors (..., n) of length 1; those of length 0 stay."""
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.where(lengths > 0.0, lengths, 1.0))
+
+
+def edge_crosses(vertices: ArrayLike, faces: ArrayLike) -> Matrix:
+    """Return cross products (m, 3) of triangles' edges: normals whose lengths are twice the areas.
+
+    vertices: (n, 3); faces: (m, 3) whole numbers.
+    """
+    a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[np.asarray(faces)], 1, 0)
+    return np.asarray(np.cross(b - a, c - a))
+
+
 def inverse(matrix: ArrayLike) -> Matrix:
     """Inverse of a transform. Raises SceneError for a singular or non-finite matrix."""
     if is_singular(matrix):
@@ -158,9 +173,8 @@ def is_singular(matrix: ArrayLike) -> bool:
 def are_singular(matrices: ArrayLike) -> NDArray[np.bool_]:
     """Return which affine matrices (n, 4, 4) flatten space, (n,), as `is_singular` says."""
     linear = np.asarray(matrices, np.float64)[:, :3, :3]
-    lengths = np.linalg.norm(linear, axis=1, keepdims=True)
-    unit = linear / np.where(lengths > 0.0, lengths, 1.0)
-    return np.abs(np.linalg.det(unit)) < SINGULAR_BELOW
+    columns = unit_vectors(linear.swapaxes(1, 2))
+    return np.abs(np.linalg.det(columns)) < SINGULAR_BELOW
 
 
 def rigid(matrix: ArrayLike) -> Matrix:

@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, KERNELS = ROOT / "clpt", ROOT / "kernels"
 
 BASE = {
-    "arrays", "choices", "errors", "files", "images", "layout", "measured", "records",
+    "arrays", "choices", "errors", "files", "images", "measured", "records",
     "spectra", "transforms", "version",
 }  # fmt: skip
 RENDERS = BASE | {"scene", "device", "denoise", "render", "formats"}

@@ -13,7 +13,7 @@ from bench import house, imports, kernel_files, python_files, walks
 BOUNDS = {
     "functions over 60 lines": 0,
     "functions over 40 lines": 12,
-    "lines of the longest function": 56,
+    "lines of the longest function": 54,
     "functions with 8 or more parameters": 5,
     "parameters of a function, most": 10,
     "#if, #ifdef, #ifndef and #elif in kernels": 170,
@@ -26,14 +26,14 @@ BOUNDS = {
     ": Any": 250,
     "aliases of array types outside clpt/arrays.py": 0,
     "rooms in circles of imports": 0,
-    "stays of a scene from render() to the tables": 37,
-    "rooms of these stays": 20,
-    "lines of Python": 99_400,
-    "lines of OpenCL": 23_560,
+    "stays of a scene from render() to the tables": 32,
+    "rooms of these stays": 18,
+    "lines of Python": 100_800,
+    "lines of OpenCL": 23_800,
     "words of README.md": 1_200,
     "docstrings that begin with What, Of, How, Those, The same": 0,
-    "lines of accumulate of Cornell's box": 205,
-    "lines of shade_diffuse of Cornell's box": 1_760,
+    "lines of accumulate of Cornell's box": 196,
+    "lines of shade_diffuse of Cornell's box": 1_740,
 }
 SHOWN = 12  # places of a figure that has risen
 

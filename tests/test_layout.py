@@ -10,8 +10,8 @@ import pytest
 
 from clpt import device
 from clpt.device import kernels_folder
-from clpt.layout import SLAB_BLOCK, TYPES, Constants, Record, bits
 from clpt.records import CONSTANTS, LIGHT, PATH, SETTINGS, SHAPE, SLABS
+from clpt.records.layout import SLAB_BLOCK, TYPES, Constants, Record, bits
 from clpt.render.flow.flags import scene_text
 from clpt.render.records import camera as camera_records
 
@@ -196,7 +196,7 @@ def test_constants_are_the_same_on_both_sides() -> None:
 
 
 def test_no_kernel_defines_a_constant_anew() -> None:
-    """One that both sides know stands in clpt/records.py alone."""
+    """One that both sides know stands in clpt/records alone."""
     shared = {row.split()[1] for own in CONSTANTS.values() for row in own.text().splitlines()[1:]}
     for path in kernels_folder().rglob("*.cl"):
         defined = re.findall(r"#\s*define (\w+)", path.read_text("utf-8"))

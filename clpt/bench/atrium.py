@@ -188,9 +188,9 @@ def vases() -> list[Mesh]:
     return meshes
 
 
-def foliage(rng: np.random.Generator, leaves: int = 260) -> list[Mesh]:
+def foliage(rng: np.random.Generator) -> list[Mesh]:
     """Diamond-shaped leaves, two triangles each, in a cloud above every vase."""
-    meshes = []
+    meshes, leaves = [], 260
     for x, z in _pots():
         centre = np.array([x, 1.5, z]) + rng.normal(0, 1, (leaves, 3)) * (0.45, 0.35, 0.45)
         long = rng.normal(0, 1, (leaves, 3))

@@ -26,8 +26,8 @@ from clpt.bench.figures import Taken, timed
 from clpt.device.building import OPTIONS
 from clpt.errors import SceneError
 from clpt.files import output_files
-from clpt.layout import SLAB_BLOCK, Record
 from clpt.records import HIT, PATH, PATH_BITS, SHADOW, SLABS
+from clpt.records.layout import SLAB_BLOCK, Record
 from clpt.render.flow import programs
 from clpt.render.flow.scene_to_tables import lower
 from clpt.render.wavefront.bounce_loop import Step, beginning

@@ -129,8 +129,8 @@ def _floor() -> Shape:
     return Rectangle(material=Diffuse(reflectance=checks), to_world=flat)
 
 
-def _ball(x: float, z: float, material: Material, radius: float = 0.8) -> Shape:
-    return Sphere(center=(x, radius, z), radius=radius, material=material)
+def _ball(x: float, z: float, material: Material) -> Shape:
+    return Sphere(center=(x, 0.8, z), radius=0.8, material=material)
 
 
 def _lamp() -> Shape:

@@ -1,7 +1,7 @@
 """Speed of each stage of a render: items a second, and bytes a second beside a copy's.
 
 Each stage runs on the state that former stages have left; its items are the slots with work for it.
-`traffic` counts the bytes: loads and stores of slabs (clpt/records.py) in the program's text. Reads
+`traffic` counts the bytes: loads and stores of slabs (clpt/records) in the program's text. Reads
 of the scene's tables, trees and textures depend on rays and are not counted: a figure is a lower
 bound.
 """

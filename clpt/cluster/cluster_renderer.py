@@ -94,7 +94,7 @@ class ClusterMaker(HostMaker):
         folder = Path(self._folder.name)
         bundle = pack(scene, folder)
         options = {name: self._options[name] for name in self._options if name != "denoise"}
-        if needs.halves(scene, denoise):
+        if needs.halves(denoise, scene.noise):
             options["halves"] = True
         self.job = Job(tasks.describe_job(bundle, options), bundle, folder)
 

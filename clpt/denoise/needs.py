@@ -46,9 +46,12 @@ def prepared(scene: Scene, method: str | None) -> Scene:
     return dataclasses.replace(scene, film=film, integrator=scene.integrator.for_denoiser())
 
 
-def halves(scene: Scene, method: str | None) -> bool:
-    """Whether even and odd samples are kept apart: they tell the error of a denoised picture."""
-    return method == "statistical" or (method is not None and scene.noise is not None)
+def halves(method: str | None, noise: float | None) -> bool:
+    """Whether even and odd samples are kept apart: they tell the error of a denoised picture.
+
+    noise: the scene's limit of noise.
+    """
+    return method == "statistical" or (method is not None and noise is not None)
 
 
 def remarks(

@@ -9,10 +9,10 @@ import numpy as np
 
 from clpt.arrays import Image
 from clpt.errors import DeviceError, SceneError
+from clpt.images.colour import LUMINANCE
 
 GREY = 0.18  # what the mean of logarithms of luminance becomes, as Open Image Denoise has it
 DARKEST = 1e-8  # that counts in this mean
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of Rec. 709
 
 
 class Oidn:

@@ -232,15 +232,13 @@ def _key(device: Device, entry: str) -> tuple[int, str]:
     return device.info.cl_device.int_ptr, entry
 
 
-def build_all(
-    device: Device, sources: Mapping[str, Source], options: Sequence[str] = ()
-) -> dict[str, Program]:
+def build_all(device: Device, sources: Mapping[str, Source]) -> dict[str, Program]:
     """Build programs in parallel threads. Raises like `build`."""
     start, before = time.perf_counter(), device.builds.programs
     # Oclgrind's compiler is not thread-safe.
     threads = 1 if _is_oclgrind(device) else os.cpu_count() or 1
     with ThreadPoolExecutor(max_workers=max(1, min(len(sources), threads))) as pool:
-        futures = {name: pool.submit(build, device, s, options) for name, s in sources.items()}
+        futures = {name: pool.submit(build, device, s) for name, s in sources.items()}
         programs = {name: future.result() for name, future in futures.items()}
     seconds, built = time.perf_counter() - start, device.builds.programs - before
     log.info("programs: %d in %.2f s, %d of them by the driver", len(programs), seconds, built)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import transforms
 from clpt.arrays import Floats, Integers, on_host
 from clpt.errors import SceneError
 from clpt.files import budget
@@ -56,8 +57,7 @@ def surface(shape: SdfGrid, name: str) -> tuple[Any, Any, Any, Any]:
     scale = 1.0 / (np.array(values.shape) - 1.0)
     normals = _normals(values, points) / scale if shape.smooth else None
     if normals is not None:
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
-        normals = (normals / np.where(length > 0.0, length, 1.0)).astype(np.float32)
+        normals = transforms.unit_vectors(normals).astype(np.float32)
     uvs = np.zeros((len(points), 2), np.float32)
     return (points * scale).astype(np.float32), faces.astype(np.uint32), normals, uvs
 
@@ -213,13 +213,12 @@ def _outward(
     pieces: int,
 ) -> Integers:
     """The faces, turned to the corners of their tetrahedra that are outside."""
-    a, b, c = (points[faces[:, i]] for i in range(3))
     weights = np.where(inside[owner], -1.0, 0.0)
     weights /= -weights.sum(axis=1, keepdims=True)
     outside = np.where(inside[owner], 0.0, 1.0)
     outside /= outside.sum(axis=1, keepdims=True)
     toward = np.einsum("nk,nkj->nj", outside + weights, corners[owner] / pieces)
-    turned = np.einsum("ij,ij->i", np.cross(b - a, c - a), toward) < 0.0
+    turned = (transforms.edge_crosses(points, faces) * toward).sum(axis=1) < 0.0
     return np.where(turned[:, None], faces[:, ::-1], faces)
 
 
@@ -233,6 +232,5 @@ def _normals(values: Floats, points: Floats) -> Floats:
         cells = np.clip(base + corner, 0, last)
         weight = np.where(corner, share, 1.0 - share).prod(axis=1)[:, None]
         gradient = _gradient(values, cells, np.clip(points - cells, 0.0, 1.0))
-        length = np.linalg.norm(gradient, axis=1, keepdims=True)
-        total += weight * gradient / np.where(length > 0.0, length, 1.0)
+        total += weight * transforms.unit_vectors(gradient)
     return total

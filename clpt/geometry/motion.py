@@ -224,14 +224,14 @@ def _moves(keys: Keys, shutter: Shutter) -> bool:
     return any(not np.array_equal(matrix, matrices[0]) for matrix in matrices)
 
 
-def check(scene: Scene, motions: Motions) -> None:
-    """Raise SceneError for lights that move as they cannot."""
+def check(placed: Sequence[Shape], motions: Motions) -> None:
+    """Raise SceneError for lights that move as they cannot; placed: the scene's shapes."""
     for i, keys in motions.lamps.items():
         if not is_rigid(keys):
             message = "a light may be moved and turned, not scaled or mirrored"
             raise SceneError(message, where=f"lights[{i}].motion")
     for i, keys in motions.shapes.items():
-        shape = scene.shapes[i]
+        shape = placed[i]
         if any(member.emission is not None for member in shape.members) and not is_even(keys):
             message = "a shape that emits light may be scaled evenly, not stretched"
             raise SceneError(message, where=f"{shapes.where(shape)}.motion")

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.files import budget
+from clpt.transforms import edge_crosses, unit_vectors
 
 MOST_CORNERS = 24_000  # of a polygon whose ears are clipped: time may grow with their square
 CHUNK = 1 << 18  # corners that are tested at a time: in float64 they take 200 bytes each
@@ -216,21 +217,16 @@ def smooth_normals(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[np.fl
     total = np.zeros((len(vertices), 3))
     for first in range(0, len(faces), SUMMED):
         _add_normals(total, vertices, faces[first : first + SUMMED])
-    return _unit(total).astype(np.float32)
+    return unit_vectors(total).astype(np.float32)
 
 
 def _add_normals(total: NDArray[Any], vertices: NDArray[Any], faces: NDArray[Any]) -> None:
     corners = vertices[faces].astype(np.float64)
-    normals = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    normals = unit_vectors(edge_crosses(vertices, faces))
     for i in range(3):
-        a = _unit(corners[:, (i + 1) % 3] - corners[:, i])
-        b = _unit(corners[:, (i + 2) % 3] - corners[:, i])
+        a = unit_vectors(corners[:, (i + 1) % 3] - corners[:, i])
+        b = unit_vectors(corners[:, (i + 2) % 3] - corners[:, i])
         angles = np.arccos(np.clip((a * b).sum(axis=1), -1.0, 1.0))
         for axis in range(3):
             weights = angles * normals[:, axis]
             total[:, axis] += np.bincount(faces[:, i], weights, len(vertices))
-
-
-def _unit(vectors: NDArray[Any]) -> NDArray[Any]:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.where(length > 0.0, length, 1.0)

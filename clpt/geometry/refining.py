@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import transforms
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.files import budget
@@ -154,8 +155,7 @@ def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
         budget.check_time()
         edges, faces = _halved(faces, len(points))
         points, normals, uvs = (_grown(values, edges) for values in (points, normals, uvs))
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = normals / np.where(length > 0.0, length, 1.0)
+    normals = transforms.unit_vectors(normals)
     image = mesh.displacement
     assert image is not None
     moved = points + mesh.displacement_scale * heights(image, uvs)[:, None] * normals
@@ -167,14 +167,7 @@ def _displaced(mesh: Mesh, parts: Parts, name: str) -> Parts:
 
 def _smooth(points: Floats, faces: Integers) -> Floats:
     """Unit normals of vertices: of the triangles around them, by their areas."""
-    a, b, c = (points[faces[:, i]] for i in range(3))
-    crosses = np.cross(b - a, c - a)
-    total = np.zeros_like(points)
-    for corner in faces.T:
-        for axis in range(3):
-            total[:, axis] += np.bincount(corner, crosses[:, axis], len(points))
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return total / np.where(length > 0.0, length, 1.0)
+    return transforms.unit_vectors(subdivision.vertex_normals(points, faces))
 
 
 def heights(image: Bitmap, uvs: Floats) -> Floats:

@@ -14,7 +14,7 @@ from clpt import transforms
 from clpt.arrays import fits_single, on_host
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.layout import Record
+from clpt.records.layout import Record
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Shape
 

@@ -171,9 +171,8 @@ def _directions(control: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDAr
         for later in (2, 3):
             still = np.linalg.norm(tangent, axis=1) <= 1e-6 * size
             tangent[still] = p[still, later] - p[still, 0]
-        length = np.linalg.norm(tangent, axis=1, keepdims=True)
-        tangent = np.where(length > 0.0, tangent / np.where(length > 0.0, length, 1.0), [0, 0, 1])
-        axes.append(tangent)
+        tangent = transforms.unit_vectors(tangent)
+        axes.append(np.where(tangent.any(axis=1, keepdims=True), tangent, [0, 0, 1]))
     return axes[0], np.where(
         (control[:, :, :3] == control[:, :1, :3]).all((1, 2))[:, None], axes[1], -axes[1]
     )

@@ -17,7 +17,7 @@ from clpt.files import budget
 from clpt.geometry import distance_grids, refining
 from clpt.geometry.shapes import ONE_OF, placement, where
 from clpt.geometry.tubes import tubes
-from clpt.scene import shapes
+from clpt.scene import shapes, subdivision
 from clpt.scene.motion import Deformation
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Mesh, Shape
@@ -168,8 +168,7 @@ def tangents(shape: shapes.Mesh) -> Points:
     matrix = placement(shape)
     rotated = np.empty_like(declared)
     rotated[:, :3] = declared[:, :3] @ matrix[:3, :3].T
-    length = np.linalg.norm(rotated[:, :3], axis=1, keepdims=True)
-    rotated[:, :3] /= np.where(length > 0.0, length, 1.0)
+    rotated[:, :3] = transforms.unit_vectors(rotated[:, :3])
     turned = transforms.flips_handedness(matrix) != shape.flip_normals
     rotated[:, 3] = np.where(declared[:, 3] < 0.0, -1.0, 1.0) * (-1.0 if turned else 1.0)
     return rotated
@@ -331,13 +330,8 @@ def _normals(shape: shapes.Mesh, vertices: Points, faces: NDArray[Any]) -> Point
     sums = np.zeros((len(vertices), 3))
     points = vertices.astype(np.float64)
     for first in range(0, len(faces), SUMMED):
-        some = faces[first : first + SUMMED]
-        crosses = _crosses(points, some)
-        for axis in range(3):
-            for corner in some.T:
-                sums[:, axis] += np.bincount(corner, crosses[:, axis], len(vertices))
-    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
-    return (sums / np.where(lengths > 0.0, lengths, 1.0)).astype(np.float32)
+        sums += subdivision.vertex_normals(points, faces[first : first + SUMMED])
+    return transforms.unit_vectors(sums).astype(np.float32)
 
 
 def points(shape: Shape) -> Points:

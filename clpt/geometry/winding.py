@@ -66,8 +66,7 @@ def areas(
     points = np.asarray(vertices, np.float64)
     if to_world is not None:
         points = transforms.transform_points(to_world, points)
-    a, b, c = np.moveaxis(points[faces], 1, 0)
-    n = np.cross(b - a, c - a) / 2.0
+    n = transforms.edge_crosses(points, faces) / 2.0
     return np.array([*n.sum(axis=0), np.linalg.norm(n, axis=1).sum()])
 
 
@@ -152,8 +151,8 @@ def largest_hole(vertices: NDArray[Any], faces: NDArray[Any]) -> float:
     edges, balance = _unbalanced(_first_of_place(points)[corners])  # as files repeat vertices
     if not len(edges):
         return 0.0
-    a, b, c = np.moveaxis(points[corners], 1, 0)
-    whole = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    crosses = transforms.edge_crosses(points, corners)
+    whole = 0.5 * float(np.linalg.norm(crosses, axis=1).sum())
     rims = _joined(edges)
     start, end = np.moveaxis(points[edges] - points.mean(axis=0), 1, 0)
     swept = 0.5 * balance[:, None] * np.cross(start, end)

@@ -219,9 +219,9 @@ def _scaled(surface: Surface, factor: float) -> Surface:
     )
 
 
-def quarter_wave(index: float, waves: float = 0.25, at: float = DESIGN) -> Coat:
-    """Return a film of an index, its thickness in `waves` of the wavelength `at` [nm] inside it."""
-    return Coat(Constant(index), waves * at / index)
+def quarter_wave(index: float, waves: float = 0.25) -> Coat:
+    """Return a film of an index, its thickness in `waves` of the wavelength DESIGN inside it."""
+    return Coat(Constant(index), waves * DESIGN / index)
 
 
 # From the air to the glass. "single" is magnesium fluoride; "multi" has zirconia and alumina below

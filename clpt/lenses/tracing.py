@@ -102,13 +102,13 @@ def _ratio(a: float, b: float) -> float:
     return math.copysign(math.inf, a) if abs(b) < 1e-12 else float(a / b)
 
 
-def film_distance(lens: Prescription, focus: float, wavelength: float = LINE_D) -> float:
+def film_distance(lens: Prescription, focus: float) -> float:
     """Return the distance of the film behind the last surface [mm] that focuses at `focus` [mm].
 
     `focus` counts from the film. The whole lens moves; a lens without power, such as a pinhole,
     stays at its last thickness. Raises SceneError for a distance that is too near.
     """
-    (a, b), (c, d) = matrix(lens, wavelength)
+    (a, b), (c, d) = matrix(lens, LINE_D)
     if abs(c) < NO_POWER and lens.surfaces[-1].thickness > 0.0:
         return lens.surfaces[-1].thickness
     if not c < -NO_POWER:
@@ -367,23 +367,20 @@ class Spot:
         return float(np.sqrt(np.mean(np.sum((self.points - self.points.mean(axis=0)) ** 2, 1))))
 
 
-def pupil_points(rings: int = RINGS) -> Floats:
+def pupil_points() -> Floats:
     """Return points (n, 2) evenly over the unit disk: 6 i + 3 on the ring i."""
     circles = []
-    for i in range(rings):
+    for i in range(RINGS):
         turns = 2.0 * math.pi * (np.arange(6 * i + 3) + 0.5) / (6 * i + 3)
-        circles.append((i + 0.5) / rings * np.stack([np.cos(turns), np.sin(turns)], 1))
+        circles.append((i + 0.5) / RINGS * np.stack([np.cos(turns), np.sin(turns)], 1))
     return np.concatenate(circles)
 
 
-def bundle(lens: Prescription, angle: float, wide: float = 1.0, rings: int = RINGS) -> Rays:
-    """Return parallel rays to the entrance pupil, from a point at an angle [degrees] in y.
-
-    wide: the bundle's radius in the pupil's paraxial radii: wide lenses' pupils grow off the axis.
-    """
+def bundle(lens: Prescription, angle: float) -> Rays:
+    """Return parallel rays to the entrance pupil, from a point at an angle [degrees] in y."""
     optics = cardinal(lens)
     slope = math.tan(math.radians(angle))
-    disk = wide * optics.entrance_radius * pupil_points(rings)
+    disk = optics.entrance_radius * pupil_points()
     o = np.column_stack([disk, np.full(len(disk), optics.entrance)])
     d = np.array([[0.0, slope, 1.0]])
     # From a plane perpendicular to the rays, in front of all glass.
@@ -393,16 +390,13 @@ def bundle(lens: Prescription, angle: float, wide: float = 1.0, rings: int = RIN
     return rays
 
 
-def spot(
-    lens: Prescription, angle: float, wavelength: float = LINE_D, distance: float | None = None
-) -> Spot:
+def spot(lens: Prescription, angle: float, wavelength: float = LINE_D) -> Spot:
     """Return the spot of a far point at an angle [degrees] and a wavelength [nm].
 
-    distance: from the last surface to the film [mm]; None: the paraxial focus at the line d.
+    The film is at the paraxial focus of the line d.
     """
-    away = cardinal(lens).back_focus if distance is None else distance
     rays = trace(lens, bundle(lens, angle), wavelength)
-    at = (lens.length + away - rays.o[:, 2]) / rays.d[:, 2]
+    at = (lens.length + cardinal(lens).back_focus - rays.o[:, 2]) / rays.d[:, 2]
     points = (rays.o + at[:, None] * rays.d)[rays.alive, :2]
     return Spot(points, float(rays.alive.mean()))
 

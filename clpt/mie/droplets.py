@@ -205,13 +205,11 @@ def sizes(law: str, radius: float, spread: float = 0.0, count: int = 200) -> Siz
     return Sizes(radius * np.exp(at), shares / shares.sum())
 
 
-def water_index(
-    lambdas: ArrayLike, celsius: float = 15.0, density: float = 0.0
-) -> NDArray[np.float64]:
+def water_index(lambdas: ArrayLike, celsius: float = 15.0) -> NDArray[np.float64]:
     """Return the index of liquid water at wavelengths [nm] in vacuum, float64.
 
-    celsius: its temperature; density: [kg/m^3], 0 for water at 1 atm (Kell 1975). Raises
-    SceneError for a wavelength outside 200 to 1900 nm or water that is not liquid.
+    celsius: its temperature, at 1 atm. Raises SceneError for a wavelength outside 200 to 1900 nm or
+    water that is not liquid.
     """
     wavelengths = np.asarray(lambdas, np.float64)
     if wavelengths.size and not (RANGE[0] <= wavelengths.min() and wavelengths.max() <= RANGE[1]):
@@ -222,7 +220,7 @@ def water_index(
         )
     if not -12.0 <= celsius <= 100.0:
         raise SceneError(f"water of {celsius:g} C; it must be -12 to 100 C", where="celsius")
-    rho, t = (density or _density(celsius)) / 1000.0, (celsius + 273.15) / 273.15
+    rho, t = _density(celsius) / 1000.0, (celsius + 273.15) / 273.15
     square = (wavelengths / 589.0) ** 2
     right = (
         A[0] + A[1] * rho + A[2] * t + A[3] * square * t + A[4] / square

@@ -83,7 +83,7 @@ def render(
     scene = dataclasses.replace(
         scene,
         camera=scene.camera if camera is None else _camera(scene, camera),
-        film=_film(scene, size, mode),
+        film=_film(scene.film, size, mode),
         spp=spp,
         noise=scene.noise if noise is None else noise,
     )
@@ -125,9 +125,9 @@ def small_picture(scene: Scene) -> bytes:
         return renderer._repr_png_()
 
 
-def _film(scene: Scene, size: tuple[int, int] | None, mode: str | None) -> Film:
-    """Return the film of a scene with another size or mode; a crop may not fit another size."""
-    film = scene.film if mode is None else dataclasses.replace(scene.film, mode=mode)
+def _film(film: Film, size: tuple[int, int] | None, mode: str | None) -> Film:
+    """Return a film with another size or mode; a crop may not fit another size."""
+    film = film if mode is None else dataclasses.replace(film, mode=mode)
     if size is None:
         return film
     asked = Film(size=size)

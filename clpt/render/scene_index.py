@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -92,7 +92,7 @@ class SceneIndex:
             prototypes=tuple(prototypes),
             leaves=(
                 *(usual.leaves(kinds) if shared else kinds),
-                *_phase_kinds(scene, distinct),
+                *_phase_kinds(_media(scene.camera, distinct), scene.film.mode),
             ),
             normal_mapped=bends or shared,
             warnings=tuple(warnings),
@@ -311,11 +311,10 @@ def _media(camera: Camera, shapes_: tuple[Shape, ...]) -> list[Medium]:
     return list(dict.fromkeys(m for m in (camera.medium, *media) if m is not None))
 
 
-def _phase_kinds(scene: Scene, shapes_: tuple[Shape, ...]) -> tuple[type[Scatterer], ...]:
-    """The kinds of phase functions of a scene, in the order of their table."""
-    scattering = (medium for medium in _media(scene.camera, shapes_) if medium.scatters)
-    spectral = scene.film.mode == "spectral"
-    phases = (phase for medium in scattering for phase in medium.collisions(spectral))
+def _phase_kinds(media: Iterable[Medium], mode: str) -> tuple[type[Scatterer], ...]:
+    """The kinds of phase functions of media, in the order of their table."""
+    scattering = (medium for medium in media if medium.scatters)
+    phases = (phase for medium in scattering for phase in medium.collisions(mode == "spectral"))
     kinds = {type(leaf) for phase in phases for leaf in phase.leaves}
     return tuple(cls for cls in LEAVES if cls in kinds)
 

@@ -142,11 +142,9 @@ def real(
     return _field(default, Param(roles.REAL, doc, unit, low, high, textured=textured, lobe=lobe))
 
 
-def member(
-    default: object, doc: str, unit: str = "", low: float = -math.inf, high: float = math.inf
-) -> Any:
+def member(default: object, doc: str, unit: str = "", low: float = -math.inf) -> Any:
     """Declare a number of a camera that kernels read: a member of its record."""
-    return _field(default, Param(roles.REAL, doc, unit, low, high, member=True))
+    return _field(default, Param(roles.REAL, doc, unit, low, member=True))
 
 
 def flag(default: bool, doc: str) -> Any:

@@ -28,7 +28,6 @@ SPOT, DIRECTIONAL = 0, 1  # mjtLightType
 UNSAID = (0.5, 0.5, 0.5, 1.0)  # rgba of a geom without a color
 WIDE = 1000.0  # half a side of an infinite plane [m]
 PHYSICAL = 3  # of VTK's kinds of shading
-VISIBLE = 3  # groups of geoms from 0 on that MuJoCo shows by default
 
 
 def _linear(rgb: ArrayLike) -> tuple[float, float, float]:

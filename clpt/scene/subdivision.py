@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt import transforms
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.files import budget
@@ -110,12 +111,11 @@ def _normals(points: Floats, faces: Integers, edges: _Edges) -> Floats:
         [edges.valence == 2, edges.valence == 3, edges.valence == 4], [-2.0, -1.0, -2.0]
     )
     s += np.where(edges.on_border, weight, 0.0)[:, None] * points
-    normals, flat = np.cross(s, t), _flat_normals(points, faces)
+    normals, flat = np.cross(s, t), vertex_normals(points, faces)
     weak = np.linalg.norm(normals, axis=1) < 1e-12
     normals[weak] = flat[weak]
     normals[np.einsum("ij,ij->i", normals, flat) < 0.0] *= -1.0
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals / np.where(length > 0.0, length, 1.0)
+    return transforms.unit_vectors(normals)
 
 
 def _rings(faces: Integers, edges: _Edges) -> tuple[NDArray[np.int64], Any]:
@@ -156,12 +156,11 @@ def _tangent_weights(edges: _Edges, position: int) -> tuple[Floats, Floats]:
     )
 
 
-def _flat_normals(points: Floats, faces: Integers) -> Floats:
-    """The sum of the normals of the triangles around each vertex, weighted by area."""
-    a, b, c = (points[faces[:, i]] for i in range(3))
-    flat = np.cross(b - a, c - a)
+def vertex_normals(points: Floats, faces: NDArray[Any]) -> Floats:
+    """Return the sum (n, 3) of the normals of the triangles around each vertex, by their areas."""
+    crosses = transforms.edge_crosses(points, faces)
     total = np.zeros_like(points)
-    for corner in range(3):
+    for corner in faces.T:
         for axis in range(3):
-            total[:, axis] += np.bincount(faces[:, corner], flat[:, axis], len(points))
+            total[:, axis] += np.bincount(corner, crosses[:, axis], len(points))
     return total

@@ -9,7 +9,7 @@
 inline float3 placed_dot(const float3 *m, float3 v) { return (float3)(dot(m[0], v), dot(m[1], v), dot(m[2], v)); }
 
 /* matrix: 16 floats, row by row, to the world; middle: the origin of the group's triangles in the matrix's source
- * space; low, high: their box around it; row: see clpt/records.py. */
+ * space; low, high: their box around it; row: see clpt/records. */
 inline void placed_write(global const float *matrix, float3 middle, float3 low, float3 high, global uint *row,
                          global float *box)
 {

@@ -1,4 +1,4 @@
-/* The base of stages and kinds, in order. generated/scene.cl comes from clpt/records.py. */
+/* The base of stages and kinds, in order. generated/scene.cl comes from clpt/records. */
 #include "core/lanes.cl"
 #include "core/rows.cl"
 #include "core/math.cl"

@@ -16,3 +16,10 @@ inline vec3 to_world(Frame f, vec3 w) { return madd3(f.s, w.x, madd3(f.t, w.y, s
 inline real cos_theta(vec3 w) { return w.z; }
 inline vec3 reflect_z(vec3 w) { return v3(-w.x, -w.y, w.z); } /* mirror at the local normal */
 inline vec3 reflect_at(vec3 w, vec3 h) { return sub3(scale3(h, 2.0f * dot3(w, h)), w); } /* at h */
+inline vec3 turned_about_z(vec3 w, real degrees, real sign) /* w in axes that are turned; sign -1: back */
+{
+    real s, c, turns = degrees * (1.0f / 360.0f);
+    sincos_2pi(turns - floor(turns), &s, &c);
+    s *= sign;
+    return v3(c * w.x + s * w.y, c * w.y - s * w.x, w.z);
+}

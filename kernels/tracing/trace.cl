@@ -4,12 +4,12 @@
 /* A ray's hit. */
 typedef struct {
     real t, u, v;  /* FAR and beyond: nothing */
-    vec3 n;        /* see Hit.n in clpt/records.py */
+    vec3 n;        /* see Hit.n in clpt/records */
     real plane, side; /* see Hit there; 0 off triangles */
     integer prim;  /* -1: nothing */
     integer shape; /* row in `shapes` */
 #if USES_INSTANCES
-    integer instance; /* see Hit.instance in clpt/records.py */
+    integer instance; /* see Hit.instance in clpt/records */
 #endif
 } TraceHit;
 

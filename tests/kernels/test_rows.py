@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clpt.layout import Record
+from clpt.records.layout import Record
 from tests.kernels import harness
 
 ROW = Record("Row", "Words.", a=("natural", ""), b=("vec3", ""), c=("vec2", ""))

@@ -240,39 +240,39 @@ class Document(Once):
         """Return the bytes of buffers[index], of its declared length."""
         return self.once(("buffer", index), lambda: self._buffer(index))
 
-    def resource(self, element: Element, key: str = "uri") -> bytes:
-        """Return the bytes that a URI under `key` names: data in itself or a file beside."""
-        uri = element.text(key)
+    def resource(self, element: Element) -> bytes:
+        """Return the bytes that `uri` names: data in itself or a file beside."""
+        uri = element.text("uri")
         if uri[:5].lower() == "data:":
-            return _data(element, key, uri)
+            return _data(element, "uri", uri)
         try:
-            return input_files.read_bytes(self.beside(element, key))
+            return input_files.read_bytes(self.beside(element))
         except SceneError as error:
-            raise error if error.where else element.error(error.message, key) from None
+            raise error if error.where else element.error(error.message, "uri") from None
 
-    def beside(self, element: Element, key: str = "uri") -> Path:
+    def beside(self, element: Element) -> Path:
         """Return the file that a relative URI names, and that is there. Raises SceneError."""
-        path = self.path_of(element, key)
+        path = self.path_of(element)
         try:
             exists = path.is_file()
         except (OSError, ValueError):  # too long, or with a zero in it
             exists = False
         if not exists:
-            raise element.error(f"there is no file {_shown(unquote(element.text(key)))}", key)
+            raise element.error(f"there is no file {_shown(unquote(element.text('uri')))}", "uri")
         try:
             return input_files.named("gltf", self.file.parent, path)
         except SceneError as error:
-            raise element.error(error.message, key) from None
+            raise element.error(error.message, "uri") from None
 
-    def path_of(self, element: Element, key: str = "uri") -> Path:
+    def path_of(self, element: Element) -> Path:
         """Return the path that a relative URI names. Raises SceneError for any other URI."""
-        uri = element.text(key)
+        uri = element.text("uri")
         name = unquote(uri)
         parts = PurePosixPath(name).parts
         outside = SCHEME.match(name) or name.startswith(("/", "\\")) or ".." in parts
         if outside or not parts:
             message = f"{_shown(uri)} does not lie beside the file, so it is not read"
-            raise element.error(message, key)
+            raise element.error(message, "uri")
         return self.file.parent.joinpath(*parts)
 
     def _buffer(self, index: int) -> bytes:

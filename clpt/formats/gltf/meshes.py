@@ -348,8 +348,7 @@ def _transformed(part: Mesh, node: Element, to_world: Matrix) -> Mesh | None:
         return part.placed(to_world)
     # A node may be flat, or scaled to zero to hide it.
     moved = transforms.transform_points(to_world, part.vertices).astype(np.float32)
-    corners = moved[part.faces].astype(np.float64)
-    solid = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any(axis=1)
+    solid = transforms.edge_crosses(moved, part.faces).any(axis=1)
     if not solid.any():
         node.warn("not shown, since its transform leaves no area")
         return None

@@ -97,8 +97,7 @@ def join(meshes: list[Mesh]) -> Mesh:
 def has_area(mesh: Mesh) -> bool:
     """Return whether any triangle of a mesh has an area."""
     for first in range(0, len(mesh.faces), CHUNK):
-        corners = mesh.vertices[mesh.faces[first : first + CHUNK]].astype(np.float64)
-        if np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any():
+        if transforms.edge_crosses(mesh.vertices, mesh.faces[first : first + CHUNK]).any():
             return True
     return False
 

@@ -53,7 +53,7 @@ def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scen
     return _from_document(path, document, missing)
 
 
-def load_dict(scene: Mapping[str, Any], folder: Path, missing: Missing = "error", /) -> Scene:
+def load_dict(scene: Mapping[str, Any], folder: Path, missing: Missing, /) -> Scene:
     """Make a scene of Mitsuba 3's dictionary; `folder`: of its file names; missing: see clpt.load.
 
     Raises SceneError with the names of the entry for anything broken or not supported.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clpt import lenses
 from clpt.choices import AUTO
@@ -71,8 +72,7 @@ def sensor(element: Element, context: Context) -> Sensor:
     if element.type not in CAMERAS:
         raise unknown(element, CAMERAS)
     props = Properties(element, context)
-    film = default_film() if (child := props.object("film")) is None else _film(child, context)
-    sampler, spp, seed = _sampler(props.object("sampler"), context)
+    film, sampler, spp, seed = _film_and_sampler(props, context)
     opens = props.number("shutter_open", 0.0)
     closes = props.number("shutter_close", opens)
     if element.type not in ("thinlens", "lens"):
@@ -91,8 +91,7 @@ def batch(element: Element, context: Context) -> list[Sensor]:
     Mitsuba shows them in a row; here each is a camera of its own.
     """
     props = Properties(element, context)
-    film = default_film() if (child := props.object("film")) is None else _film(child, context)
-    sampler, spp, seed = _sampler(props.object("sampler"), context)
+    film, sampler, spp, seed = _film_and_sampler(props, context)
     inner = props.objects("sensor")
     props.ignore("srf")
     props.finish()
@@ -111,6 +110,11 @@ def batch(element: Element, context: Context) -> list[Sensor]:
     ):
         context.warn(element, "sensors whose own films have other sides see more or less")
     return [replace(item, film=part, sampler=sampler, spp=spp, seed=seed) for item in result]
+
+
+def _film_and_sampler(props: Properties, context: Context) -> tuple[Film, str, int, int]:
+    film = default_film() if (child := props.object("film")) is None else _film(child, context)
+    return film, *_sampler(props.object("sampler"), context)
 
 
 def default_film() -> Film:
@@ -149,10 +153,7 @@ def _glass(props: Properties) -> dict[str, Any]:
 
 def _lens(props: Properties, film: Film) -> cameras.Camera:
     """Ours, see docs/mitsuba_plugins.md."""
-    placed = props.placement()
-    if not np.allclose(np.linalg.norm(placed[:3, :3], axis=0), 1.0, atol=1e-3):
-        raise props.element.error("to_world must not scale")
-    values: dict[str, Any] = {"to_world": placed}
+    values: dict[str, Any] = {"to_world": _unscaled(props)}
     if "filename" in props.named:
         values["lens"] = lenses.read(props.file())
     elif "lens" in props.named:
@@ -182,9 +183,7 @@ CAMERAS = {
 
 
 def _pinhole(props: Properties, film: Film) -> dict[str, Any]:
-    to_world = props.placement()
-    if not np.allclose(np.linalg.norm(to_world[:3, :3], axis=0), 1.0, atol=1e-3):
-        raise props.element.error("to_world must not scale")
+    to_world = _unscaled(props)
     fov, axis = _field_of_view(props, film)
     near, far = _clip(props)
     return {
@@ -196,6 +195,13 @@ def _pinhole(props: Properties, film: Film) -> dict[str, Any]:
         "offset_x": props.number("principal_point_offset_x", 0.0),
         "offset_y": props.number("principal_point_offset_y", 0.0),
     }
+
+
+def _unscaled(props: Properties) -> NDArray[Any]:
+    to_world = props.placement()
+    if not np.allclose(np.linalg.norm(to_world[:3, :3], axis=0), 1.0, atol=1e-3):
+        raise props.element.error("to_world must not scale")
+    return to_world
 
 
 def _clip(props: Properties) -> tuple[float, float]:

@@ -143,10 +143,8 @@ def creased(mesh: Mesh, angle: float) -> Mesh:
     faces = np.asarray(mesh.faces, np.int64)
     corners = faces.reshape(-1)
     places = _places(mesh)[corners]
-    points = np.asarray(mesh.vertices, np.float64)[faces]
-    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.repeat(normals / np.where(lengths > 0.0, lengths, 1.0), 3, axis=0)
+    flat = transforms.unit_vectors(transforms.edge_crosses(mesh.vertices, faces))
+    normals = np.repeat(flat, 3, axis=0)
     group = np.full(len(corners), -1)
     least = np.cos(np.radians(min(angle, 180.0)))
     for turn in range(MOST_TURNS):

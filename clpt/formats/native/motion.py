@@ -55,7 +55,8 @@ def keys(cursor: Cursor) -> Keys | None:
     """Return the keys of a motion, None for null. Raises SceneError."""
     if cursor.value is None:
         return None
-    times, matrices = [], []
+    times: list[float] = []
+    matrices = []
     for entry in cursor.entries():
         entry.check_keys("key", ("time", "transform"), ("time", "transform"))
         times.append(entry.at("time").number())
@@ -86,10 +87,7 @@ def deformation(cursor: Cursor) -> Deformation | None:
     points, normals = [], []
     for entry in cursor.entries():
         entry.check_keys("key", ("time", *POINTS), ("time", "points"))
-        times.append(entry.at("time").number())
-        if len(times) > 1 and not times[-1] > times[-2]:
-            message = f"must be later than {times[-2]:g} s, the key before"
-            raise entry.at("time").error(message)
+        _add_time(entry.at("time"), times)
         points.append([row.numbers() for row in entry.at("points").entries()])
         if len(points[-1]) != len(points[0]):
             message = f"has {len(points[-1])} points where the first key has {len(points[0])}"
@@ -100,6 +98,12 @@ def deformation(cursor: Cursor) -> Deformation | None:
             raise entry.error("needs normals at every key, or at none")
     with cursor.locating():
         return Deformation(times, points, normals or None)
+
+
+def _add_time(cursor: Cursor, times: list[float]) -> None:
+    times.append(cursor.number())
+    if len(times) > 1 and not times[-1] > times[-2]:
+        raise cursor.error(f"must be later than {times[-2]:g} s, the key before")
 
 
 def _from_file(cursor: Cursor) -> Deformation:

@@ -9,6 +9,7 @@ import dataclasses
 import inspect
 import json
 import sys
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -155,10 +156,7 @@ def _spectra() -> list[str]:
         '| `{"values": [[nm, value], ...]}` | a table, linear between its rows |',
         f'| `{{"file": "name"}}` | {file} |',
     ]
-    for name, cls in SPECTRA.items():
-        fields = dataclasses.fields(cls)  # type: ignore[arg-type]
-        keys = "".join(f', "{field.name}": ...' for field in fields)
-        rows.append(f'| `{{"type": "{name}"{keys}}}` | {_first_line(cls)} |')
+    rows += _typed_rows(SPECTRA)
     names = {
         "Illuminants": spectra.illuminants(),
         "Glasses and liquids": spectra.glasses(),
@@ -174,15 +172,21 @@ def _reradiations() -> list[str]:
     """Return the paragraphs on objects that stand for fluorescence."""
     file = "a measured BFC matrix (whose diagonal is a spectrum of the same `file`), or a table"
     rows = ["| object | what it is |", "| --- | --- |", f'| `{{"file": "name"}}` | {file} |']
-    for name, cls in RERADIATIONS.items():
-        fields = dataclasses.fields(cls)  # type: ignore[arg-type]
-        keys = "".join(f', "{field.name}": ...' for field in fields)
-        rows.append(f'| `{{"type": "{name}"{keys}}}` | {_first_line(cls)} |')
+    rows += _typed_rows(RERADIATIONS)
     return [
         "## Re-radiation\n",
         "See [fluorescence](spectral.md#fluorescence).\n",
         "\n".join(rows) + "\n",
     ]
+
+
+def _typed_rows(classes: Mapping[str, type]) -> list[str]:
+    """Return the rows of a table of objects that have a type."""
+    rows = []
+    for name, cls in classes.items():
+        keys = "".join(f', "{field.name}": ...' for field in dataclasses.fields(cls))
+        rows.append(f'| `{{"type": "{name}"{keys}}}` | {_first_line(cls)} |')
+    return rows
 
 
 def _kind(category: str, cls: type[Kind]) -> str:

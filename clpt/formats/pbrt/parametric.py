@@ -21,6 +21,7 @@ from clpt.errors import SceneError
 from clpt.formats.pbrt.params import Parameters
 from clpt.scene import shapes
 from clpt.scene.shapes import Curves, Shape
+from clpt.transforms import unit_vectors
 
 Parts = dict[str, Any]
 AROUND, ALONG = 256, 128  # pieces of a mesh around a whole turn, and from pole to pole
@@ -124,8 +125,7 @@ def grid(columns: int, rows: int) -> tuple[Any, Any, NDArray[np.uint32]]:
 
 def _parts(points: Any, faces: Any, normals: Any, u: Any, v: Any) -> Parts:
     """A mesh's arrays, without the triangles that have no area at poles and centres."""
-    corners = points.astype(np.float32).astype(np.float64)[faces]
-    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sides = transforms.edge_crosses(points.astype(np.float32), faces)
     size = np.abs(points).max() ** 2
     return {
         "vertices": points.astype(np.float32),
@@ -210,15 +210,18 @@ def _ribbon(bezier: NDArray[Any], widths: NDArray[Any], normals: Any) -> Parts:
     points = [bezier[3 * piece + i] for i in range(4)]
     while len(points) > 2:
         points = [a + (b - a) * t for a, b in pairwise(points)]
-    center, along = points[0] + (points[1] - points[0]) * t, _unit(points[1] - points[0])
-    ends = _unit(np.asarray(normals, np.float64))
+    center, along = (
+        points[0] + (points[1] - points[0]) * t,
+        unit_vectors(points[1] - points[0]),
+    )
+    ends = unit_vectors(np.asarray(normals, np.float64))
     first, second = ends[piece], ends[piece + 1]
     angle = np.arccos(np.clip(np.einsum("ij,ij->i", first, second), -1.0, 1.0))[:, None]
     flat = np.sin(angle) < 1e-6
     sine = np.where(flat, 1.0, np.sin(angle))
     low = np.where(flat, 1.0 - t, np.sin((1.0 - t) * angle) / sine)
     high = np.where(flat, t, np.sin(t * angle) / sine)
-    across = _unit(np.cross(low * first + high * second, along))
+    across = unit_vectors(np.cross(low * first + high * second, along))
     width = np.interp(u, np.linspace(0.0, count, len(widths)), widths[:, 0])[:, None]
     sides = np.stack([center - 0.5 * width * across, center + 0.5 * width * across], axis=1)
     a = 2 * np.arange(len(u) - 1)[:, None]
@@ -246,10 +249,6 @@ def areas(parts: Parts) -> NDArray[np.float64]:
         width = scale * (points[3 * i, 3] + points[3 * i + 3, 3])
         matches.append(length * width)
     return np.array(matches)
-
-
-def _unit(v: NDArray[Any]) -> NDArray[Any]:
-    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-30)
 
 
 def joined(items: Iterable[Shape]) -> Iterator[Shape]:

@@ -60,8 +60,8 @@ class Geometry:
         if self.kind is not shapes.Mesh:
             return np.array([parametric.area(self.kind, self.parts)])
         points = transforms.transform_points(self.parts["to_world"], self.parts["vertices"])
-        a, b, c = (points[self.parts["faces"][:, i]] for i in range(3))
-        triangles = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        crosses = transforms.edge_crosses(points, self.parts["faces"])
+        triangles = 0.5 * np.linalg.norm(crosses, axis=1)
         if self.pieces is None:
             return np.array([triangles.sum()])
         return np.bincount(self.pieces, triangles) / self.split
@@ -158,10 +158,8 @@ def _with_pieces(result: Geometry | None, pieces: Any = None, split: int = 1) ->
 def _toward_normals(arrays: Parts) -> NDArray[np.uint32]:
     """The faces, turned where their normals point against their winding."""
     faces, points, normals = arrays["faces"], arrays["vertices"], arrays["normals"]
-    a, b, c = (points[faces[:, i]] for i in range(3))
-    front = np.cross(b - a, c - a)
     toward = normals[faces[:, 0]] + normals[faces[:, 1]] + normals[faces[:, 2]]
-    turned = np.einsum("ij,ij->i", front, toward) < 0.0
+    turned = (transforms.edge_crosses(points, faces) * toward).sum(axis=1) < 0.0
     if not turned.any():
         return faces
     return np.where(turned[:, None], faces[:, ::-1], faces)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 
 import numpy as np
 from pxr import Usd, UsdGeom, UsdShade
@@ -53,7 +53,8 @@ def curves(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
     if at_ends is not None:
         rows[:, 3] = _between(at_ends, [len(part) for part in kept], basis) / 2.0
     rows[:, 3] = np.maximum(rows[:, 3], 0.0)
-    look = surface(document, material, prim, both=True).settled(_means(document, prim))
+    look = surface(document, material, prim, both=True)
+    look = look.settled(_means(document, prim, look.fallbacks))
     return [
         Curves(
             points=rows.astype(np.float32), lengths=tuple(len(part) for part in kept),
@@ -163,20 +164,21 @@ def points(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
     ]  # fmt: skip
 
 
-def _means(document: Document, prim: Usd.Prim) -> Callable[[str], tuple[float, ...] | None]:
-    """Return what gives the mean of a prim's primvar by name, None for none."""
-
-    def mean(name: str) -> tuple[float, ...] | None:
+def _means(
+    document: Document, prim: Usd.Prim, names: Iterable[str]
+) -> dict[str, tuple[float, ...]]:
+    """Return the means of the primvars that a prim has, by name."""
+    means: dict[str, tuple[float, ...]] = {}
+    for name in names:
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
         value = primvar.ComputeFlattened(document.time) if primvar else None
         if value is None or not len(value):
-            return None
+            continue
         if len(value) > 1:
             document.warn(f"the mean of primvar {name!r} stands for its values", prim.GetPath())
         table = np.asarray(value, np.float64).reshape(len(value), -1)
-        return tuple(table.mean(axis=0).tolist())
-
-    return mean
+        means[name] = tuple(table.mean(axis=0).tolist())
+    return means
 
 
 READERS = {"BasisCurves": curves, "Points": points}

@@ -10,6 +10,7 @@ import numpy as np
 from pxr import Gf, Sdf, UsdShade
 
 from clpt.arrays import Floats
+from clpt.images.colour import LUMINANCE
 from clpt.scene.textures import Graph
 from clpt.scene.textures.graph import TEXTURE, Operand, Step
 from clpt.scene.values import Texture
@@ -82,8 +83,8 @@ class GraphWriter:
         if form == "float" and self.graph.channel in "rgba":
             value = self._channel(value, "rgba".index(self.graph.channel))
         elif form == "float" and self.graph.width > 2:
-            weights = np.array([0.2126, 0.7152, 0.0722])
-            value = self._node("dotproduct", "vector3", "float", in1=value, in2=_numbers(weights))
+            weights = _numbers(LUMINANCE.astype(float))
+            value = self._node("dotproduct", "vector3", "float", in1=value, in2=weights)
         found = self._as(value, form)
         if found.shader is not None:
             return found.shader

@@ -98,8 +98,7 @@ def _revolved(runs: list[Floats], axis: str) -> dict[str, Any]:
         first += len(run) * len(angle)
     order = np.roll([0, 1, 2], AXES.get(axis, 2) + 1)  # of x, y, z; the last column is the axis
     points, triangles = np.concatenate(vertices), np.concatenate(faces)
-    a, b, c = (points[triangles[:, i]] for i in range(3))
-    solid = np.abs(np.cross(b - a, c - a)).max(axis=1) > 0.0
+    solid = transforms.edge_crosses(points, triangles).any(axis=1)
     return {
         "vertices": points[:, order].astype(np.float32),
         "normals": np.concatenate(normals)[:, order].astype(np.float32),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -48,14 +48,14 @@ class Surface:
         widths = {name: len(values) for name, values in self.fallbacks.items()}
         return {**widths, **dict.fromkeys(self.uv_sets, 2)}
 
-    def settled(self, value_of: Callable[[str], tuple[float, ...] | None]) -> Surface:
+    def settled(self, values: Mapping[str, tuple[float, ...]]) -> Surface:
         """Return the surface of a shape without primvars: numbers stand for them.
 
-        value_of: gives them by a primvar's name, None for its fallback.
+        values: of the primvars by their names; others have their fallbacks.
         """
         if not self.fallbacks:
             return self
-        rows = {name: value_of(name) or row for name, row in self.fallbacks.items()}
+        rows = {**self.fallbacks, **values}
         emission = None if self.emission is None else _settled(self.emission, rows)
         inner = _settled(self.material, rows)
         return Surface(inner, emission, self.uv_sets, interior=self.interior)

@@ -218,10 +218,10 @@ def pixels(bitmap: Bitmap) -> NDArray[np.float32]:
     return stored.decoded()
 
 
-def bitmap_of(node: Node, uses: Uses, *, channel: str | None, raw: bool = False) -> Bitmap | None:
+def bitmap_of(node: Node, uses: Uses, *, channel: str | None) -> Bitmap | None:
     """Return the bitmap of a UsdUVTexture; None, with a warning, where its file is not there.
 
-    channel: of r, g, b, a that a number is taken from. raw: numbers whatever the color space.
+    channel: of r, g, b, a that a number is taken from.
     """
     space = str(node.value("sourceColorSpace", "auto"))
     if space not in SPACES:
@@ -240,7 +240,7 @@ def bitmap_of(node: Node, uses: Uses, *, channel: str | None, raw: bool = False)
         return None
     if channel is not None:
         values["channel"] = channel
-    return Bitmap(**_decoded(stored, "raw" if raw else space), **values)
+    return Bitmap(**_decoded(stored, space), **values)
 
 
 def _decoded(stored: images.Stored, space: str) -> dict[str, Any]:

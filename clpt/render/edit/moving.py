@@ -6,7 +6,7 @@ device. Nothing is lowered or built, and the host waits for nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -29,7 +29,6 @@ from clpt.render.edit.moving_parts import (
 from clpt.render.edit.plans import Plan
 from clpt.render.edit.scene_edit import Replacements
 from clpt.render.wavefront.device_scene import DeviceScene
-from clpt.scene import Scene
 from clpt.scene.params import fields_of
 from clpt.scene.shapes import Curves, Shape, Spheres
 
@@ -69,12 +68,12 @@ class _Ranges:
 class Moving:
     """The shapes of a scene on a device, and the kernels that move them.
 
-    target: the scene on the device; scene: as it was lowered. These stay on the device: a copy of
-    the vertices and normals of each shape that moved without new vertices; for each smooth mesh
-    whose vertices moved, 4 bytes a vertex and 12 a triangle.
+    target: the scene on the device; placed: its shapes as they were lowered. These stay on the
+    device: a copy of the vertices and normals of each shape that moved without new vertices; for
+    each smooth mesh whose vertices moved, 4 bytes a vertex and 12 a triangle.
     """
 
-    def __init__(self, target: DeviceScene, scene: Scene):
+    def __init__(self, target: DeviceScene, placed: Sequence[Shape]):
         self.target = target
         self.building = bvh.Building(target.device, stream=target.stream)
         self.ranges: dict[int, list[_Ranges]] = {}  # by the number of the scene's shape
@@ -89,17 +88,17 @@ class Moving:
             number = int(ranges.row["number"])
             if ranges.row["kind"] == 0 and ranges.faces[0] >= world:
                 continue  # a shape of a group: only its instances move
-            shape = scene.shapes[number]
+            shape = placed[number]
             if shape.group is not None:
                 outer = shapes.placement(shape)
                 ranges.in_group = transforms.inverse(outer) @ shapes.placement(ranges.shape)
             self.ranges.setdefault(number, []).append(ranges)
 
-    def plan(self, scene: Scene, replaced: Replacements) -> Move | str:
+    def plan(self, placed: Sequence[Shape], replaced: Replacements) -> Move | str:
         """Return a plan of new transforms and vertices of shapes, and of refits of trees.
 
-        scene: the present scene; replaced: the shapes that move, and their replacements. Returns
-        the reason as a text if the scene must be lowered again.
+        placed: the scene's present shapes; replaced: the shapes that move, and their replacements.
+        Returns the reason as a text if the scene must be lowered again.
 
         Triangles, instances, spheres, disks, cylinders and curves can move. A shape must keep its
         number of vertices, its orientation and its kind, and must not emit light. A mesh that has
@@ -108,22 +107,22 @@ class Moving:
         Raises SceneError for a transform that is singular, and arrays of the wrong shape or type.
         """
         try:
-            return Move(self, self._plan(scene, replaced))
+            return Move(self, self._plan(placed, replaced))
         except CannotMove as reason:
             return str(reason)
 
-    def _plan(self, scene: Scene, replaced: Replacements) -> list[Action]:
+    def _plan(self, placed: Sequence[Shape], replaced: Replacements) -> list[Action]:
         """Return the actions that enqueue a move. Raises CannotMove."""
         features = self.target.lowered.features
         if any(kernels.transport.light_paths for kernels in features.passes):
             raise CannotMove("light is traced from lights, whose choice follows from the shapes")
-        if any(shape.motion is not None for shape in scene.shapes):
+        if any(shape.motion is not None for shape in placed):
             raise CannotMove("shapes move while the shutter is open")
         if features.motion.vertices:
             raise CannotMove("vertices move while the shutter is open")
         if features.motion.spheres:
             raise CannotMove("spheres move by themselves while the shutter is open")
-        numbers = {id(shape): number for number, shape in enumerate(scene.shapes)}
+        numbers = {id(shape): number for number, shape in enumerate(placed)}
         actions: list[Action] = []
         instances: list[tuple[int, Shape]] = []
         matrices: list[Location | None] = []

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import logging
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +34,7 @@ from clpt.scene import Scene
 from clpt.scene.cameras import Camera
 from clpt.scene.materials import Material
 from clpt.scene.params import fields_of
+from clpt.scene.shapes import Shape
 
 
 class Plan(ABC):
@@ -306,7 +308,7 @@ def prepare_patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Patch 
     function returns the difference as a text. Raises SceneError as `lower` does.
     """
     lowered = on_device.lowered
-    pairs = [] if scene.shapes is former.shapes else _pairs(former, scene)
+    pairs = [] if scene.shapes is former.shapes else _pairs(former.shapes, scene.shapes)
     if pairs is None:
         return "a material is of another kind or structure"
     if lowered.features.transport.balanced and any(
@@ -343,10 +345,10 @@ def _reflects(camera: Camera) -> tuple[bool, bool]:
     return camera.reflects, camera.has_ghosts
 
 
-def _pairs(former: Scene, scene: Scene) -> list[tuple[Any, Any]] | None:
+def _pairs(former: Sequence[Shape], placed: Sequence[Shape]) -> list[tuple[Any, Any]] | None:
     """Return pairs of old and new leaf materials; None if more than values differs."""
     pairs: Replacements = {}
-    for old, new in zip(distinct(former.shapes), distinct(scene.shapes), strict=True):
+    for old, new in zip(distinct(former), distinct(placed), strict=True):
         if not _pair(old.material, new.material, pairs):
             return None
     changed = [(old, new) for old, new in pairs.values() if old is not new]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import operator
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeAlias
 from weakref import WeakKeyDictionary
@@ -94,12 +94,12 @@ def edit_scene(
     return edit.edited_scene(), edit.replacements()
 
 
-def match_replacements(former: Scene, scene: Scene) -> Replacements:
+def match_replacements(former: Sequence[Shape], placed: Sequence[Shape]) -> Replacements:
     """Return the shapes that replaced removed shapes at equal indices of lists of equal length."""
-    if len(former.shapes) != len(scene.shapes):
+    if len(former) != len(placed):
         return {}
-    present = {id(shape) for shape in scene.shapes}
-    pairs = zip(former.shapes, scene.shapes, strict=True)
+    present = {id(shape) for shape in placed}
+    pairs = zip(former, placed, strict=True)
     return {id(old): (old, new) for old, new in pairs if id(old) not in present}
 
 

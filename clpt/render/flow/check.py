@@ -60,7 +60,7 @@ def check_at_rest(scene: Scene, cache: LoweringCache) -> None:
     check_instances(scene.shapes)
     _check_surfaces(shapes_, scene.film)
     check_light_paths(scene, shapes_)
-    check_motion(scene, Motions.of(scene))
+    check_motion(scene.shapes, Motions.of(scene))
     check_bodies([*shapes_, *(s for s in scene.shapes if isinstance(s, Instance))])
     if scene.integrator.from_lights_alone:
         check_lit_media(scene, cache)

@@ -14,7 +14,7 @@ import re
 
 from clpt import bvh, device
 from clpt.errors import SceneError, UnknownKindError
-from clpt.layout import SLAB_BLOCK
+from clpt.records.layout import SLAB_BLOCK
 from clpt.render.flow import blocks, bounce, choices, flags, stages, vertices
 from clpt.render.flow.stages import functions_text
 from clpt.render.geometry import cases as shapes

@@ -80,15 +80,13 @@ def _is_clear(absorption: Spectrum) -> bool:
     return plain and not np.any(absorption.to_rgb("unbounded"))
 
 
-def media_around(
-    scene: Scene, cached: LoweringCache | None = None, time: float | None = None
-) -> tuple[Filling, ...]:
+def media_around(scene: Scene, cached: LoweringCache | None = None) -> tuple[Filling, ...]:
     """Return what fills the camera's place, as `media_at` does, or `camera.medium`.
 
     camera.medium is taken to be around a body that absorbs. cached: keeps the triangles of
     boundaries. Raises SceneError for invalid shapes and cameras.
     """
-    camera, time = scene.camera, moment(scene.camera, time)
+    camera, time = scene.camera, moment(scene.camera)
     fillings = media_at(scene.shapes, camera_origin(camera, scene.film, time), time, cached)
     if camera.medium is not None:
         fillings = (*(f for f in fillings[:1] if isinstance(f, Absorber)), camera.medium)
@@ -173,16 +171,13 @@ def open_medium(
 
 
 def bodies_around(
-    scene: Scene,
-    matter: MatterOf,
-    cached: LoweringCache | None = None,
-    time: float | None = None,
+    scene: Scene, matter: MatterOf, cached: LoweringCache | None = None
 ) -> tuple[tuple[Any, ...], ...]:
     """Return the matter of the bodies around the camera. Raises as `media_around` does.
 
     A shape inside of a body faces it, as the inner side of a glass does.
     """
-    time = moment(scene.camera, time)
+    time = moment(scene.camera)
     origin = camera_origin(scene.camera, scene.film, time)
     return bodies_at(scene.shapes, matter, origin, time, cached)
 
@@ -320,9 +315,9 @@ def camera_origin(camera: Camera, film: Film, time: float) -> NDArray[np.float64
     return np.asarray(transforms.transform_points(matrix, origin), np.float64)
 
 
-def moment(camera: Camera, time: float | None = None) -> float:
-    """Return a time [s], by default when the shutter opens."""
-    return (camera.shutter or AT_ONCE).open if time is None else time
+def moment(camera: Camera) -> float:
+    """Return the time [s] when the shutter opens."""
+    return (camera.shutter or AT_ONCE).open
 
 
 def _deformed(shape: Shape, time: float) -> Shape:

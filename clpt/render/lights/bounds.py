@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt import transforms
 from clpt.arrays import Faces, Floats, Points
 from clpt.geometry import analytic
 from clpt.scene.lights import Light
@@ -77,15 +78,14 @@ def of_shape(shape: Shape, two_sided: bool) -> Bounds:
 def of_triangles(vertices: Points, faces: Faces, two_sided: bool) -> Bounds:
     """Return the bounds (m) of triangles (m, 3); the front is on the winding's side."""
     corners = np.asarray(vertices, np.float64)[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = transforms.unit_vectors(transforms.edge_crosses(vertices, faces))
     count = len(faces)
     return Bounds(
         corners.min(axis=1),
         corners.max(axis=1),
         corners.mean(axis=1),
-        normals / np.where(lengths > 0.0, lengths, 1.0),
-        np.where(lengths[:, 0] > 0.0, 0.0, np.pi),
+        normals,
+        np.where(normals.any(axis=1), 0.0, np.pi),
         np.full(count, np.pi / 2.0),
         np.full(count, two_sided),
         np.full(count, True),

@@ -68,12 +68,7 @@ def rotation(lamp: Light) -> NDArray[np.float64]:
 
     Raises SceneError for a matrix that is no rotation, but for its scale.
     """
-    where = f"{lamp.kind}.to_world"
-    matrix = invertible(fields_of(lamp)["to_world"], where)
-    axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
-    if np.abs(axes.T @ axes - np.eye(3)).max() > SHEAR:
-        raise SceneError("must be a rotation: this one shears", where=where)
-    return axes
+    return unsheared(fields_of(lamp)["to_world"], f"{lamp.kind}.to_world")[1]
 
 
 def unsheared(to_world: ArrayLike, where: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from clpt import transforms
 from clpt.arrays import Floats
 from clpt.files import budget
 from clpt.render.lights.bounds import Bounds
@@ -308,9 +309,8 @@ class Cones:
 def around(cones: Cones, starts: NDArray[np.int64]) -> Cones:
     """Return the cones around the segments of `cones` that begin at `starts`."""
     total = np.add.reduceat(cones.axis, starts)
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    lost = length[:, 0] < 1e-6
-    axis = np.where(lost[:, None], [0.0, 0.0, 1.0], total / np.where(length > 0.0, length, 1.0))
+    lost = np.linalg.norm(total, axis=1) < 1e-6
+    axis = np.where(lost[:, None], [0.0, 0.0, 1.0], transforms.unit_vectors(total))
     counts = np.diff(np.append(starts, len(cones.theta_o)))
     leans = angle(np.repeat(axis, counts, axis=0), cones.axis) + cones.theta_o
     theta_o = np.where(lost, np.pi, np.minimum(np.maximum.reduceat(leans, starts), np.pi))

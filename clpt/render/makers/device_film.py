@@ -112,7 +112,7 @@ class DeviceFilm:
             tuning=self._tuning,
             slots=options.get("slots"),
             trees=options.get("tree_quality", "high"),
-            halves=options.get("halves", False) or needs.halves(scene, denoise),
+            halves=options.get("halves", False) or needs.halves(denoise, scene.noise),
         )
         self._opened: Wavefront | None = None
         lowered = self.lower(scene, share, former, anew=True)

@@ -137,7 +137,7 @@ def plan(
 def _edited(film: DeviceFilm, changes: Changes, share: Once | None) -> tuple[Scene, Replacements]:
     """Return the changed scene, and the replacements of its parts."""
     scene = film.scene if changes.scene is None else changes.scene
-    replaced = {} if changes.scene is None else match_replacements(film.scene, scene)
+    replaced = {} if changes.scene is None else match_replacements(film.scene.shapes, scene.shapes)
     if changes.by_key:
 
         def edit() -> tuple[Scene, Replacements]:
@@ -174,11 +174,11 @@ def _quick_plans(
 def _move(film: DeviceFilm, changes: Changes, share: Once | None) -> Move | None:
     """Return the plan that moves shapes on the device; None if they cannot move there."""
     if film.moving is None:
-        film.moving = Moving(film.wavefront.scene, film.scene)
+        film.moving = Moving(film.wavefront.scene, film.scene.shapes)
     moved, replaced = _edited(film, changes.moves, share)
     if _enters_a_medium(film, moved):
         return None
-    move = film.moving.plan(film.scene, replaced)
+    move = film.moving.plan(film.scene.shapes, replaced)
     if isinstance(move, str):
         log.debug("shapes cannot move on the device: %s", move)
         return None

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from clpt.layout import row_words
+from clpt.records.layout import row_words
 from clpt.render.records import Features
 from clpt.render.records.dispatch import Case, choose, function, indented
 from clpt.render.records.materials import (

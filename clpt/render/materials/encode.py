@@ -257,17 +257,19 @@ def _plastic(values: Values) -> tuple[float, float]:
 
 def _principled(values: Values) -> tuple[float, float]:
     metal, albedo = _mean(values["metallic"]), _mean(values["base_color"])
-    straight = metal * albedo + (1.0 - metal) * STRAIGHT
-    return _mean(values["roughness"], ROUGHLY) ** 2, _share(straight, (1.0 - metal) * albedo)
+    return _mean(values["roughness"], ROUGHLY) ** 2, _metallic_share(metal, albedo)
 
 
 def _openpbr(values: Values) -> tuple[float, float]:
     metal, albedo = _mean(values["base_metalness"]), _mean(values["base_color"])
-    straight = metal * albedo + (1.0 - metal) * STRAIGHT
     rough, coat = _mean(values["specular_roughness"], ROUGHLY), _mean(values["coat_weight"])
     if coat > metal:
         rough = min(rough, _mean(values["coat_roughness"], ROUGHLY))
-    return rough**2, _share(straight, (1.0 - metal) * albedo)
+    return rough**2, _metallic_share(metal, albedo)
+
+
+def _metallic_share(metal: float, albedo: float) -> float:
+    return _share(metal * albedo + (1.0 - metal) * STRAIGHT, (1.0 - metal) * albedo)
 
 
 def _phong(values: Values) -> tuple[float, float]:

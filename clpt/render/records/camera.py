@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from clpt.layout import Record
+from clpt.records.layout import Record
 from clpt.render.records.macros import flag
 from clpt.scene import cameras
 from clpt.scene.params import Kind, params

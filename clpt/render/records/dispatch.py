@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from clpt.layout import select_name
+from clpt.records.layout import select_name
 
 
 @dataclass(frozen=True)

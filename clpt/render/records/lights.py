@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from clpt.geometry import shapes
-from clpt.layout import Record
+from clpt.records.layout import Record
 from clpt.render.records.macros import flag, macro
 from clpt.scene.lights import KINDS as LIGHTS
 from clpt.scene.lights import Light

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from clpt.layout import Record
+from clpt.records.layout import Record
 from clpt.render.records.macros import flag
 
 _COMMON = {

@@ -28,12 +28,14 @@ from clpt.render.records.textures import (
     OPERATIONS,
     PROGRAM,
     RECORDS,
+    GraphNode,
+    Operand,
     Structure,
     TextureFeatures,
 )
 from clpt.render.spectra.encode import SpectraTable
 from clpt.render.textures.bitmaps import Images, has_levels
-from clpt.render.textures.graphs import Encoded
+from clpt.render.textures.graphs import SECOND
 from clpt.render.textures.texels import bands, texel_words
 from clpt.scene.params import params
 from clpt.scene.pixels import channel
@@ -50,7 +52,9 @@ from clpt.scene.textures import (
     Placed,
     Solid,
     Voxels,
+    graph,
 )
+from clpt.scene.textures.graph import TEXTURE, Step, parts_of
 from clpt.scene.values import Operation, Texture, Use, constant_number, is_texture, separated
 from clpt.spectra import RGB, Constant, RGBIlluminant, RGBUnbounded, luminance
 
@@ -289,13 +293,8 @@ def _marble(texture: Marble, role: Role, table: TextureTable) -> int:
 
 
 def _graph(texture: Graph, role: Role, table: TextureTable) -> int:
-    encoded = Encoded(
-        texture,
-        row_of=lambda part: table.row(part, REAL),
-        second_uv=lambda: _second_uv(table),
-        ramp=lambda words: table.store.append("textures", words),
-    )
-    table.mappings |= "texcoord1" in texture.sources
+    encoded = _EncodedGraph(texture, table)
+    table.mappings |= SECOND in texture.sources
     channel, few = params(Graph)["channel"].choices.index(texture.channel), texture.width < 3
     members = {
         "structure": table.graphs.setdefault(encoded.structure, len(table.graphs)),
@@ -305,6 +304,44 @@ def _graph(texture: Graph, role: Role, table: TextureTable) -> int:
         "uplift": 0 if role is REAL else table.uplift(),
     }
     return table.append_leaf(texture, role, **members)
+
+
+class _EncodedGraph:
+    """The structure of a graph, and its words."""
+
+    def __init__(self, texture: Graph, table: TextureTable):
+        self._texture, self._table = texture, table
+        self.words: list[int] = []
+        nodes = tuple(self._node(step) for step in texture.steps)
+        self.structure = Structure(nodes, self._operand(texture.result))
+
+    def _node(self, step: Step) -> GraphNode:
+        operands = [self._operand(operand) for operand in step.operands.values()]
+        settings = step.settings
+        if step.kind == TEXTURE:
+            parts = parts_of(self._texture.textures[settings["texture"]], step.width)
+            rows = [self._table.row(part, REAL) for part in parts]
+            operands.insert(0, ("rows", self._append(*rows), len(rows)))
+            settings = {}
+        if step.stops is not None:
+            stops = step.stops.astype(np.float32).view(np.uint32)
+            words = np.array([len(stops), *stops.reshape(-1)], np.uint32)
+            first = self._table.store.append("textures", words)
+            operands.append(("rows", self._append(first), 1))
+        return GraphNode(step.kind, tuple(operands), (*settings.values(),), step.width)
+
+    def _operand(self, operand: graph.Operand) -> Operand:
+        if isinstance(operand, int):
+            return "step", operand
+        if isinstance(operand, str):
+            second = [self._append(_second_uv(self._table))] if operand == SECOND else []
+            return (operand, *second)
+        words = operand.astype(np.float32).view(np.uint32)
+        return "words", self._append(*words.tolist()), len(words)
+
+    def _append(self, *words: int) -> int:
+        self.words += words
+        return len(self.words) - len(words)
 
 
 def _voxels(texture: Voxels, role: Role, table: TextureTable) -> int:

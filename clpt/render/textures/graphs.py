@@ -1,4 +1,4 @@
-"""Graphs of nodes: their structures and numbers, and the kernel text of a structure.
+"""The kernel text of graphs of nodes, a function for each structure.
 
 Graphs that differ by numbers and textures alone have the same structure, and so the same function:
 their rows hold the numbers.
@@ -6,67 +6,14 @@ their rows hold the numbers.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import numpy as np
-
-from clpt.arrays import Words
 from clpt.render.records.dispatch import Case, Function, active, function
 from clpt.render.records.textures import GraphNode, Operand, Structure
-from clpt.scene.textures import graph as scene
-from clpt.scene.textures.graph import TEXTURE, Graph, Step
+from clpt.scene.textures.graph import TEXTURE
 from clpt.scene.textures.nodes import FILLING, NODES, SOURCES, channels_of
-from clpt.scene.values import Texture
 
 TYPES = ("", "real", "vec2", "vec3", "vec4")  # of values, by their channels
 XYZW = ("x", "y", "z", "w")
 SECOND = "texcoord1"
-
-
-class Encoded:
-    """The structure of a graph, and its words.
-
-    row_of: returns the first word of a texture's row, as a number; second_uv: the first word of the
-    attributes of a mesh's second uv; ramp: appends a ramp's stops, and returns their first word.
-    """
-
-    def __init__(
-        self,
-        graph: Graph,
-        row_of: Callable[[Texture], int],
-        second_uv: Callable[[], int],
-        ramp: Callable[[Words], int],
-    ):
-        self._graph, self._row_of, self._second_uv, self._ramp = graph, row_of, second_uv, ramp
-        self.words: list[int] = []
-        nodes = tuple(self._node(step) for step in graph.steps)
-        self.structure = Structure(nodes, self._operand(graph.result))
-
-    def _node(self, step: Step) -> GraphNode:
-        operands = [self._operand(operand) for operand in step.operands.values()]
-        settings = step.settings
-        if step.kind == TEXTURE:
-            parts = scene.parts_of(self._graph.textures[settings["texture"]], step.width)
-            rows = [self._row_of(part) for part in parts]
-            operands.insert(0, ("rows", self._append(*rows), len(rows)))
-            settings = {}
-        if step.stops is not None:
-            table = step.stops.astype(np.float32).view(np.uint32)
-            first = self._ramp(np.array([len(table), *table.reshape(-1)], np.uint32))
-            operands.append(("rows", self._append(first), 1))
-        return GraphNode(step.kind, tuple(operands), (*settings.values(),), step.width)
-
-    def _operand(self, operand: scene.Operand) -> Operand:
-        if isinstance(operand, int):
-            return "step", operand
-        if isinstance(operand, str):
-            return (operand, self._append(self._second_uv())) if operand == SECOND else (operand,)
-        words = operand.astype(np.float32).view(np.uint32)
-        return "words", self._append(*words.tolist()), len(words)
-
-    def _append(self, *words: int) -> int:
-        self.words += words
-        return len(self.words) - len(words)
 
 
 def graph_text(structures: tuple[Structure, ...]) -> list[str]:

@@ -23,8 +23,9 @@ from numpy.typing import ArrayLike, NDArray
 from clpt import device
 from clpt.arrays import Floats, Image
 from clpt.denoise import needs
-from clpt.denoise.oidn import LUMINANCE, Oidn
+from clpt.denoise.oidn import Oidn
 from clpt.denoise.statistical import Statistical
+from clpt.images.colour import LUMINANCE
 from clpt.render.film.pictures import Pictures
 from clpt.render.flow import programs
 from clpt.render.wavefront.path_buffers import SIDE

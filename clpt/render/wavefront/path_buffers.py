@@ -20,8 +20,8 @@ from clpt import device
 from clpt.arrays import Integers
 from clpt.device.buffers import Buffers
 from clpt.errors import MemoryBudgetError
-from clpt.layout import SLAB_BLOCK, Record
 from clpt.records import COUNTER_NUMBERS, PATH, PATH_BITS, SLABS
+from clpt.records.layout import SLAB_BLOCK, Record
 from clpt.render.flow.scene_to_tables import Lowered
 
 FOREVER = np.iinfo(np.int32).max  # an end that no sample reaches

@@ -90,7 +90,7 @@ class Graph(Texture):
             message = "cannot be textures that combine others: nodes do that"
             raise SceneError(message, where="graph.textures")
         object.__setattr__(self, "textures", tuple(self.textures))
-        _Resolver(self).resolve([*self.nodes])  # those that the value does not need, too
+        _Resolver(self).resolve([*self.nodes])  # also the nodes that the value does not need
 
     @cached_property
     def _resolved(self) -> tuple[list[Step], Operand]:
@@ -143,6 +143,10 @@ class Graph(Texture):
             else:
                 values.append(step.computed(inputs))
         return value(self.result)
+
+    def values_at(self, look: Look, uv: Floats) -> Floats:
+        """Return the value at uv (m, k, 2), (m, k, channels); images are not averaged."""
+        return self.evaluated(_OnSurface(self, look, uv, np.zeros(len(uv)), {}))
 
     def mean(self, look: Look) -> float:
         axis = (np.arange(SIDE) + 0.5) / SIDE

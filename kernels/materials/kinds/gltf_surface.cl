@@ -11,13 +11,7 @@
 typedef struct { vec3 wo, wi; } GltfPair;
 inline vec3 gltf_turn(GltfSurface m, vec3 w, real sign)
 {
-    if (USES_GLTF_SURFACE_ANISOTROPY) {
-        real s, c, turns = m.anisotropy_rotation * (1.0f / 360.0f);
-        sincos_2pi(turns - floor(turns), &s, &c);
-        s *= sign;
-        w = v3(c * w.x + s * w.y, c * w.y - s * w.x, w.z);
-    }
-    return w;
+    return USES_GLTF_SURFACE_ANISOTROPY ? turned_about_z(w, m.anisotropy_rotation, sign) : w;
 }
 inline real gltf_side(GltfSurface m, vec3 wo)
 {

@@ -386,13 +386,7 @@ inline real openpbr_density(Openpbr m, OpenpbrParts p, OpenpbrLobes l, vec3 wo, 
 /* A direction along and across the tangent, to which u is turned; sign -1: back. */
 inline vec3 openpbr_turn(Openpbr m, vec3 w, real sign)
 {
-    if (USES_OPENPBR_ANISOTROPY_ROTATION) {
-        real s, c, turns = m.anisotropy_rotation * (1.0f / 360.0f);
-        sincos_2pi(turns - floor(turns), &s, &c);
-        s *= sign;
-        w = v3(c * w.x + s * w.y, c * w.y - s * w.x, w.z);
-    }
-    return w;
+    return USES_OPENPBR_ANISOTROPY_ROTATION ? turned_about_z(w, m.anisotropy_rotation, sign) : w;
 }
 /* Likewise, on the front of a thin surface. */
 inline vec3 openpbr_up(Openpbr m, vec3 wo, vec3 w)

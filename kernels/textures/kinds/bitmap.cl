@@ -89,7 +89,8 @@ Spectrum bitmap_texel(Bitmap t, Scene scene, TexturePoint point, vec2 u, Wavelen
     return spectrum_sel(inside, spectrum_texel_at(scene.images, at, lambdas), spectrum_of(0.0f));
 }
 
-Spectrum bitmap_reflectance(Bitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
+/* light: whether the texels are emission. */
+inline Spectrum bitmap_spectrum(Bitmap t, Scene scene, TexturePoint point, int light, Wavelengths lambdas)
 {
     BitmapTexels b = bitmap_texels(t, scene, point);
     Spectrum sum = spectrum_of(0.0f);
@@ -97,24 +98,21 @@ Spectrum bitmap_reflectance(Bitmap t, Scene scene, TexturePoint point, Wavelengt
         real weight;
         integer at = t.first + SPECTRUM_SIZE * bitmap_corner(t, b, corner, &weight);
         if (!any(weight > 0.0f)) continue;
-        Spectrum texel = spectrum_texel_at(scene.images, at, lambdas);
+        Spectrum texel = light ? spectrum_light_texel_at(scene, scene.images, at, lambdas)
+                               : spectrum_texel_at(scene.images, at, lambdas);
         sum = spectrum_madd(texel, weight, sum);
     }
     return sum;
 }
 
+Spectrum bitmap_reflectance(Bitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
+{
+    return bitmap_spectrum(t, scene, point, 0, lambdas);
+}
+
 Spectrum bitmap_emission(Bitmap t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    BitmapTexels b = bitmap_texels(t, scene, point);
-    Spectrum sum = spectrum_of(0.0f);
-    for (int corner = 0; corner < 4; corner++) {
-        real weight;
-        integer at = t.first + SPECTRUM_SIZE * bitmap_corner(t, b, corner, &weight);
-        if (!any(weight > 0.0f)) continue;
-        Spectrum texel = spectrum_light_texel_at(scene, scene.images, at, lambdas);
-        sum = spectrum_madd(texel, weight, sum);
-    }
-    return sum;
+    return bitmap_spectrum(t, scene, point, 1, lambdas);
 }
 
 real bitmap_real(Bitmap t, Scene scene, TexturePoint point)

@@ -10,30 +10,30 @@ inline integer mesh_attribute_at(MeshAttribute t, Scene scene, TexturePoint poin
            sel_i((t.per_face != 0) & (point.face >= 0), point.face, vertex);
 }
 
-Spectrum mesh_attribute_reflectance(MeshAttribute t, Scene scene, TexturePoint point, Wavelengths lambdas)
+/* light: whether the values are emission. */
+inline Spectrum mesh_attribute_spectrum(MeshAttribute t, Scene scene, TexturePoint point, int light,
+                                        Wavelengths lambdas)
 {
     Spectrum sum = spectrum_of(0.0f);
     for (int corner = 0; corner < 3; corner++) {
         real weight;
         integer at = mesh_attribute_at(t, scene, point, corner, &weight);
         vec4 row = gather_w4(scene.attributes, at);
-        Spectrum value = spectrum_texel(row.x, row.y, row.z, row.w, lambdas);
+        Spectrum value = light ? spectrum_light_texel(scene, row.x, row.y, row.z, row.w, lambdas)
+                               : spectrum_texel(row.x, row.y, row.z, row.w, lambdas);
         sum = spectrum_madd(value, weight, sum);
     }
     return sum;
 }
 
+Spectrum mesh_attribute_reflectance(MeshAttribute t, Scene scene, TexturePoint point, Wavelengths lambdas)
+{
+    return mesh_attribute_spectrum(t, scene, point, 0, lambdas);
+}
+
 Spectrum mesh_attribute_emission(MeshAttribute t, Scene scene, TexturePoint point, Wavelengths lambdas)
 {
-    Spectrum sum = spectrum_of(0.0f);
-    for (int corner = 0; corner < 3; corner++) {
-        real weight;
-        integer at = mesh_attribute_at(t, scene, point, corner, &weight);
-        vec4 row = gather_w4(scene.attributes, at);
-        Spectrum value = spectrum_light_texel(scene, row.x, row.y, row.z, row.w, lambdas);
-        sum = spectrum_madd(value, weight, sum);
-    }
-    return sum;
+    return mesh_attribute_spectrum(t, scene, point, 1, lambdas);
 }
 
 real mesh_attribute_real(MeshAttribute t, Scene scene, TexturePoint point)

@@ -153,11 +153,11 @@ def test_what_cannot_be_is_told(renderer: Renderer) -> None:
 
 def test_where_light_is_traced_from_lights_nothing_moves_in_place(renderer: Renderer) -> None:
     target = renderer._wavefront.scene
-    moving, lowered = Moving(target, renderer.scene), target.lowered
-    assert isinstance(moving.plan(renderer.scene, {}), Move)
+    moving, lowered = Moving(target, renderer.scene.shapes), target.lowered
+    assert isinstance(moving.plan(renderer.scene.shapes, {}), Move)
     features = dataclasses.replace(lowered.features, transport=TransportFeatures(light_paths=True))
     target.lowered = dataclasses.replace(lowered, features=features)
-    assert "traced from lights" in str(moving.plan(renderer.scene, {}))
+    assert "traced from lights" in str(moving.plan(renderer.scene.shapes, {}))
     target.lowered = lowered
 
 
@@ -179,7 +179,7 @@ def test_the_reason_why_a_shape_does_not_move(
     renderer: Renderer, name: str, changes: dict[str, Any], reason: str
 ) -> None:
     scene_ = scene()
-    moving = Moving(renderer._wavefront.scene, scene_)
+    moving = Moving(renderer._wavefront.scene, scene_.shapes)
     old = next(shape for shape in scene_.shapes if shape.name == name)
-    refusal = moving.plan(scene_, {id(old): (old, dataclasses.replace(old, **changes))})
+    refusal = moving.plan(scene_.shapes, {id(old): (old, dataclasses.replace(old, **changes))})
     assert reason in str(refusal)

@@ -13,8 +13,8 @@ import pytest
 import clpt
 from clpt import device
 from clpt.device import Source
-from clpt.layout import SLAB_BLOCK, Record
 from clpt.records import HIT, PATH, SHADOW, SLABS
+from clpt.records.layout import SLAB_BLOCK, Record
 from clpt.render.flow import programs
 from clpt.render.flow.blocks import blocks_text, members, unused
 from clpt.render.flow.flags import scene_text

@@ -8,7 +8,7 @@ and other numbers that both sides know, each a file `generated/<name>.cl` of ker
 
 from __future__ import annotations
 
-from clpt.layout import Constants, Record, bits
+from clpt.records.layout import Constants, Record, bits
 
 PATH = Record(
     "Path",

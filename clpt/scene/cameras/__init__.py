@@ -1,0 +1,19 @@
+"""Cameras. Camera space: +z forward, +x left, +y up (as look_at makes it, see clpt.transforms)."""
+
+from clpt.scene.cameras.calibrated import Calibrated, Matrix, Rays
+from clpt.scene.cameras.camera import (
+    Camera,
+    Lens,
+    Orthographic,
+    Perspective,
+    Spherical,
+    ThinLens,
+)
+
+KINDS = (Perspective, ThinLens, Lens, Orthographic, Spherical, Matrix, Rays, Calibrated)
+CONNECTED = tuple(camera.kind for camera in KINDS if camera.connects)
+
+__all__ = [
+    "CONNECTED", "KINDS", "Calibrated", "Camera", "Lens", "Matrix", "Orthographic", "Perspective",
+    "Rays", "Spherical", "ThinLens",
+]  # fmt: skip

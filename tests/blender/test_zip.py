@@ -1,0 +1,50 @@
+"""The extension as a file for Blender, with the wheels that are there."""
+
+from __future__ import annotations
+
+import importlib.util
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def maker(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+    """packaging/blender_zip.py, without a network and with a store of its own."""
+    file = ROOT / "packaging" / "blender_zip.py"
+    spec = importlib.util.spec_from_file_location("blender_zip", file)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    monkeypatch.setattr(module, "pip", lambda *_: False)
+    monkeypatch.setattr(module, "WHEELS", tmp_path / "wheels")
+    return module
+
+
+def test_without_a_network_it_says_what_is_missing(maker: Any, tmp_path: Path) -> None:
+    missing = maker.write(tmp_path / "clpt.zip", ["linux-x64"])
+    assert {"clpt", "pyopencl", "pyyaml"} <= set(missing) and "numpy" not in missing
+    with zipfile.ZipFile(tmp_path / "clpt.zip") as archive:
+        names = set(archive.namelist())
+        manifest = archive.read("blender_manifest.toml").decode()
+    sources = {file.name for file in (ROOT / "blender").glob("*.py")}
+    assert sources | {"LICENSE", "blender_manifest.toml"} == names
+    assert "wheels" not in manifest and "[permissions]" in manifest
+
+
+def test_the_wheels_that_are_there_are_in_the_manifest(maker: Any, tmp_path: Path) -> None:
+    folder = tmp_path / "wheels" / "linux-x64"
+    folder.mkdir(parents=True)
+    for name in ("pyopencl-1-cp311-cp311-manylinux_2_28_x86_64.whl", "numpy-2-py3-none-any.whl"):
+        (folder / name).write_bytes(b"")
+    missing = maker.write(tmp_path / "clpt.zip", ["linux-x64"])
+    assert "pyopencl" not in missing and "clpt" in missing
+    with zipfile.ZipFile(tmp_path / "clpt.zip") as archive:
+        manifest = archive.read("blender_manifest.toml").decode()
+        wheels = [name for name in archive.namelist() if name.endswith(".whl")]
+    assert wheels == ["wheels/pyopencl-1-cp311-cp311-manylinux_2_28_x86_64.whl"]
+    assert f'  "./{wheels[0]}",' in manifest and manifest.index(wheels[0]) < manifest.index("[perm")
