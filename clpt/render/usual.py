@@ -38,7 +38,7 @@ TEXTURES = (
     ("packed_bitmap", "reflectance"),
 )
 MIXTURES = 2  # masks in blends, or blends in masks
-LOBES = ("absorption", "clearcoat", "metallic", "spec_tint")  # of those that a parameter of 0 leaves out
+LOBES = ("absorption", "clearcoat", "metallic", "spec_tint")  # those that 0 leaves out
 INNER: Sources = frozenset({
     ("emission", "value", "constant"),
     ("emission", "value", "table"),
