@@ -9,8 +9,7 @@ from typing import Any
 from clpt.geometry import instancing, shapes
 from clpt.geometry.instancing import Placed, Prototype
 from clpt.geometry.motion import Motions
-from clpt.render import usual
-from clpt.render.records import GridFeatures, materials
+from clpt.render.records import GridFeatures, materials, usual
 from clpt.scene import Film, Scene
 from clpt.scene import materials as mt
 from clpt.scene.cameras import Camera

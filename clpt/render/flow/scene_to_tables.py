@@ -17,7 +17,6 @@ from clpt.geometry import shapes
 from clpt.geometry.instancing import Instances
 from clpt.geometry.refining import is_refined
 from clpt.records import SHAPE_BITS
-from clpt.render import usual
 from clpt.render.camera import encode_camera
 from clpt.render.film import filters
 from clpt.render.film.colour import sensor
@@ -51,6 +50,7 @@ from clpt.render.records import (
     LayerFeatures,
     SpectraFeatures,
     TransportFeatures,
+    usual,
 )
 from clpt.render.records.film import LayerNames
 from clpt.render.records.materials import row_words

@@ -10,9 +10,9 @@ import pytest
 from scipy import stats
 
 import clpt
-from clpt.render import usual
 from clpt.render.flow import programs
 from clpt.render.flow.scene_to_tables import lower
+from clpt.render.records import usual
 from clpt.scene import Film, Scene, lights, shapes, textures
 from clpt.scene import materials as mt
 from clpt.scene.cameras import Perspective
