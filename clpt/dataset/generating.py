@@ -25,8 +25,11 @@ from clpt.dataset.truth import Truth, ground_truth, truth_scene
 from clpt.dataset.writers import WRITERS, Writer
 from clpt.errors import ClptError, SceneError, UnknownKindError
 from clpt.files import output_files
+from clpt.render.flow.scene_to_tables import lower
 from clpt.render.options import RenderOptions
+from clpt.render.records import Features
 from clpt.render.renderer import Renderer
+from clpt.render.wavefront.strategy import UNTUNED, Strategy, choose
 from clpt.scene import Scene
 from clpt.scene.fingerprint import fingerprint
 
@@ -129,6 +132,7 @@ class _Renderers:
         if self.truth not in TRUTHS:
             raise UnknownKindError("truth", self.truth, TRUTHS)
         self.open: list[Renderer] = []
+        self.needs: set[tuple[tuple[Features, Strategy], ...]] = set()  # of scenes that came
 
     def __enter__(self) -> _Renderers:
         return self
@@ -148,13 +152,27 @@ class _Renderers:
         return image, ground_truth(scene, self._for_truth(scene), silhouettes=alone)
 
     def prepare(self, scene: Scene) -> None:
-        """Compile what `render` needs."""
+        """Compile what `render` needs, where no scene before needed the same."""
+        parts = [scene] if self.truth == "none" else [scene, truth_scene(scene)]
+        if self.open and not self._is_new(parts):
+            return
         self._bring(scene)
         self.open[0].prepare()
         if self.truth != "none":
             renderer = self._for_truth(scene)
-            renderer.update(scene=truth_scene(scene))
+            renderer.update(scene=parts[1])
             renderer.prepare()
+
+    def _is_new(self, parts: list[Scene]) -> bool:
+        """Return whether scenes may need other programs than those before."""
+        device = self.open[0].device
+        tables = [lower(scene) for scene in parts]
+        if any(lowered.candidates for lowered in tables):  # a trial render decides
+            return True
+        needs = tuple((each.features, choose(device, each, UNTUNED)) for each in tables)
+        before = len(self.needs)
+        self.needs.add(needs)
+        return len(self.needs) > before
 
     @property
     def compiled(self) -> int:
