@@ -3,16 +3,19 @@
 
 from __future__ import annotations
 
-from . import engine, panels
+from . import engine, panels, preferences, process, viewport
+
+PARTS = (preferences, panels, viewport, engine)
 
 
 def register() -> None:
     """Make Blender know the engine and its panels."""
-    panels.register()
-    engine.register()
+    for part in PARTS:
+        part.register()
 
 
 def unregister() -> None:
     """Take the engine and its panels away."""
-    engine.unregister()
-    panels.unregister()
+    for part in reversed(PARTS):
+        part.unregister()
+    process.end_all()

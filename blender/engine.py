@@ -11,8 +11,9 @@ from typing import Any
 import bpy
 import numpy as np
 
-from . import scenes
-from .process import Process, ProcessError
+from . import preferences, scenes
+from .process import ProcessError, give_back, take
+from .viewport import Viewport
 
 ENGINE = "CLPT"
 # Passes of Blender: the layer, the option of the view layer, channels, what they mean.
@@ -23,6 +24,13 @@ PASSES = {
     "UV": ("uv", "use_pass_uv", "UVA", "VECTOR"),
     "Diffuse Color": ("albedo", "use_pass_diffuse_color", "RGB", "COLOR"),
 }
+Pass = tuple[str, str, str, str]  # its name, the layer of clpt, channels, what they mean
+MATTES = {
+    "crypto_object": ("use_pass_cryptomatte_object", "CryptoObject"),
+    "crypto_material": ("use_pass_cryptomatte_material", "CryptoMaterial"),
+}
+LEVELS = 3  # of mattes, of two names each
+PREVIEW_SAMPLES = 32
 FAR = 1e10  # depth where nothing is seen, as in Blender
 WAIT = 0.2  # [s] until the engine looks for a press of Escape
 
@@ -32,52 +40,70 @@ class ClptEngine(bpy.types.RenderEngine):
 
     bl_idname = ENGINE
     bl_label = "clpt"
-    bl_use_preview = False
+    bl_use_preview = True
     bl_use_postprocess = True
     bl_use_shading_nodes_custom = False
+    viewport: Viewport | None = None
 
     def update_render_passes(self, scene: Any, renderlayer: Any) -> None:
         """Tell Blender which passes the compositor gets."""
-        for name, (_, option, channels, kind) in PASSES.items():
-            if getattr(renderlayer, option):
-                self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
+        for name, _, channels, kind in _passes(renderlayer):
+            self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
+
+    def view_update(self, context: Any, depsgraph: bpy.types.Depsgraph) -> None:
+        """Take what has changed in the scene that a viewport shows."""
+        if self.viewport is None:
+            self.viewport = Viewport(self)
+        self.viewport.update(depsgraph)
+
+    def view_draw(self, context: Any, depsgraph: bpy.types.Depsgraph) -> None:
+        """Draw the picture of a viewport."""
+        if self.viewport is not None:
+            self.viewport.draw(context)
 
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Render the frame that Blender asks for. An error becomes a line of Blender's."""
-        settings = depsgraph.scene.clpt
-        scale = depsgraph.scene.render.resolution_percentage / 100.0
-        width = max(int(depsgraph.scene.render.resolution_x * scale), 1)
-        height = max(int(depsgraph.scene.render.resolution_y * scale), 1)
         with tempfile.TemporaryDirectory(prefix="clpt_") as folder:
             try:
-                self.update_stats("", "clpt: the scene is read")
-                writer = scenes.Writer(depsgraph, Path(folder), width, height, self.frame_set)
-                file = writer.write()
-                for line in writer.told:
-                    self.report({"WARNING"}, f"clpt: {line}")
-                shown = depsgraph.view_layer
-                passes = [name for name, row in PASSES.items() if getattr(shown, row[1])]
-                for name in passes:
-                    channels = PASSES[name][2]
-                    self.add_pass(name, len(channels), channels, layer=shown.name)
-                self._run(file, settings, (width, height), passes)
+                self._write_and_run(depsgraph, Path(folder))
             except ProcessError as error:
                 self.report({"ERROR"}, f"clpt: {error}")
             except Exception as error:  # a fault of the add-on is a line, and Blender goes on
                 traceback.print_exc()
                 self.report({"ERROR"}, f"clpt: {type(error).__name__}: {error}")
 
-    def _run(self, file: Path, settings: Any, size: tuple[int, int], passes: list[str]) -> None:
-        process = Process(python=settings.python)
+    def _write_and_run(self, depsgraph: bpy.types.Depsgraph, folder: Path) -> None:
+        scene, shown = depsgraph.scene, depsgraph.view_layer
+        scale = scene.render.resolution_percentage / 100.0
+        width = max(int(scene.render.resolution_x * scale), 1)
+        height = max(int(scene.render.resolution_y * scale), 1)
+        self.update_stats("", "clpt: the scene is read")
+        writer = scenes.Writer(depsgraph, folder, width, height, self.frame_set)
+        order = {"file": str(writer.write()), "width": width, "height": height}
+        for line in writer.told:
+            self.report({"WARNING"}, f"clpt: {line}")
+        passes = [] if self.is_preview else _passes(shown)
+        for name, _, channels, _ in passes:
+            self.add_pass(name, len(channels), channels, layer=shown.name)
+        settings = scene.clpt
+        if self.is_preview:
+            order |= {"mode": "rgb", "samples": PREVIEW_SAMPLES}
+        else:
+            order |= {
+                "mode": settings.mode, "samples": settings.samples, "noise": settings.noise,
+                "denoise": settings.denoise,
+            }  # fmt: skip
+        if scene.render.use_border and not self.is_preview:
+            order["crop"] = _border(scene.render, width, height)
+        self._run({**order, "layers": list({row[1]: None for row in passes})}, passes, shown.name)
+
+    def _run(self, order: dict[str, Any], passes: list[Pass], layer: str) -> None:
+        """Have a picture made, and show it as it comes."""
+        process, done = take(preferences.python()), False
+        size = order["crop"][2:] if "crop" in order else (order["width"], order["height"])
         try:
-            process.send(
-                {
-                    "file": str(file), "width": size[0], "height": size[1], "mode": settings.mode,
-                    "layers": [PASSES[name][0] for name in passes],
-                    "samples": settings.samples, "denoise": settings.denoise,
-                }
-            )  # fmt: skip
-            done = asked = False
+            process.send(order)
+            asked = False
             while not done:
                 if self.test_break() and not asked:
                     process.send({"stop": True})
@@ -87,25 +113,58 @@ class ClptEngine(bpy.types.RenderEngine):
                     continue
                 message, pictures = received
                 samples = message["samples"]
-                self.update_progress(samples / settings.samples)
-                self.update_stats("", f"clpt: sample {samples} of {settings.samples}")
+                self.update_progress(samples / order["samples"])
+                self.update_stats("", f"clpt: sample {samples} of {order['samples']}")
                 for line in message.get("warnings", ()):
                     self.report({"WARNING"}, f"clpt: {line}")
                 if pictures:
-                    self._show(pictures, size, passes)
+                    layers = dict(zip(("", *order["layers"]), pictures, strict=False))
+                    self._show(layers, size, passes if len(pictures) > 1 else [], layer)
                 done = message.get("done", False)
         finally:
-            process.stop()
+            if done:
+                give_back(process)
+            else:
+                process.stop()
 
-    def _show(self, pictures: list[bytes], size: tuple[int, int], passes: list[str]) -> None:
+    def _show(
+        self, layers: dict[str, bytes], size: tuple[int, int], passes: list[Pass], layer: str
+    ) -> None:
         """Show the picture, and its passes where they are there: they come with the last one."""
-        result = self.begin_result(0, 0, *size)
-        for name, pixels in zip(("Combined", *passes), pictures, strict=False):
-            values = np.frombuffer(pixels, np.float32)
+        result = self.begin_result(0, 0, *size, layer=layer)
+        there = result.layers[0].passes
+        there["Combined"].rect.foreach_set(np.frombuffer(layers[""], np.float32))
+        for name, source, _, _ in passes:
+            values = np.frombuffer(layers[source], np.float32)
             if name == "Depth":
                 values = np.where(values > 0.0, values, np.float32(FAR))
-            result.layers[0].passes[name].rect.foreach_set(values)
+            elif source in MATTES:
+                values = _level(values, int(name[-2:]), size)
+            there[name].rect.foreach_set(values)
         self.end_result(result)
+
+
+def _passes(layer: bpy.types.ViewLayer) -> list[Pass]:
+    """Return the passes that a view layer asks for."""
+    passes = [(n, *row[:1], *row[2:]) for n, row in PASSES.items() if getattr(layer, row[1])]
+    levels = (min(layer.pass_cryptomatte_depth, 2 * LEVELS) + 1) // 2
+    for source, (option, name) in MATTES.items():
+        if getattr(layer, option):
+            passes += [(f"{name}{i:02d}", source, "RGBA", "COLOR") for i in range(levels)]
+    return passes
+
+
+def _level(values: np.ndarray, level: int, size: tuple[int, int]) -> np.ndarray:
+    """Return two names and their shares of a pixel, of those in a matte (h w n)."""
+    width, height = size
+    return values.reshape(height * width, -1)[:, 4 * level : 4 * level + 4].ravel()
+
+
+def _border(render: bpy.types.RenderSettings, width: int, height: int) -> tuple[int, int, int, int]:
+    """Return the part of the picture that is rendered: x, y from above, width, height."""
+    left, right = (int(share * width) for share in (render.border_min_x, render.border_max_x))
+    below, above = (int(share * height) for share in (render.border_min_y, render.border_max_y))
+    return left, height - above, max(right - left, 1), max(above - below, 1)
 
 
 def _shared_panels() -> list[type]:

@@ -3,13 +3,12 @@
 
 from __future__ import annotations
 
+import ctypes
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-CORNER = [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("nx", "<f4"), ("ny", "<f4"), ("nz", "<f4")]
-UV = [("s", "<f4"), ("t", "<f4")]
 FACE = np.dtype([("count", "u1"), ("corners", "<u4", (3,))])
 
 
@@ -22,40 +21,77 @@ def write(mesh: bpy.types.Mesh, folder: Path, name: str) -> dict[int, str]:
     count = len(mesh.loop_triangles)
     if count == 0:
         return {}
-    corners = np.empty(count * 3, np.int32)
-    mesh.loop_triangles.foreach_get("loops", corners)
-    slots = np.empty(count, np.int32)
-    mesh.loop_triangles.foreach_get("material_index", slots)
-    rows = _rows(mesh)
+    rows, corners = _rows(mesh)
+    faces = corners[_triangles(mesh)]
+    slots = np.zeros(1, np.int32)
+    if mesh.attributes.get("material_index") is not None:
+        slots = np.empty(count, np.int32)
+        mesh.loop_triangles.foreach_get("material_index", slots)
     files = {}
     for slot in np.unique(slots).tolist():
-        chosen = corners.reshape(-1, 3)[slots == slot]
-        used, faces = np.unique(chosen, return_inverse=True)
         file = f"{name}_{slot}.ply"
-        _write(folder / file, rows[used], faces.reshape(-1, 3))
+        _write(folder / file, *_used(rows, faces[slots == slot] if len(slots) > 1 else faces))
         files[slot] = file
     return files
 
 
-def _rows(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Return positions, normals and texture coordinates of all corners."""
-    loops = len(mesh.loops)
-    vertices = np.empty(len(mesh.vertices) * 3, np.float32)
-    mesh.vertices.foreach_get("co", vertices)
-    places = np.empty(loops, np.int32)
-    mesh.loops.foreach_get("vertex_index", places)
-    normals = np.empty(loops * 3, np.float32)
-    mesh.corner_normals.foreach_get("vector", normals)
-    layer = mesh.uv_layers.active
-    rows = np.empty(loops, CORNER + (UV if layer is not None else []))
-    for axis, (place, normal) in enumerate(zip("xyz", ("nx", "ny", "nz"), strict=True)):
-        rows[place] = vertices.reshape(-1, 3)[places, axis]
-        rows[normal] = normals.reshape(-1, 3)[:, axis]
+def _triangles(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Return the corners of all triangles (n, 3), in Blender's memory; `foreach_get` is slow."""
+    memory = (ctypes.c_int32 * (3 * len(mesh.loop_triangles))).from_address(
+        mesh.loop_triangles[0].as_pointer()
+    )
+    return np.frombuffer(memory, np.int32).reshape(-1, 3)
+
+
+def _used(rows: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows that faces have, and these faces."""
+    used = np.zeros(len(rows), bool)
+    used[faces] = True
+    return (rows, faces) if used.all() else (rows[used], (np.cumsum(used) - 1)[faces])
+
+
+def _values(attribute: bpy.types.Attribute, name: str, width: int, kind: type) -> np.ndarray:
+    """Return an attribute (n, width) at once; properties of vertices would be read one by one."""
+    values = np.empty((len(attribute.data), width), kind)
+    attribute.data.foreach_get(name, values.ravel())
+    return values
+
+
+def _rows(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Return rows of positions, normals and texture coordinates, and the row of each corner.
+
+    The corners of a vertex share a row where they are equal; flat meshes have no normals.
+    """
+    vertices = _values(mesh.attributes["position"], "vector", 3, np.float32)
+    corners = _values(mesh.attributes[".corner_vert"], "value", 1, np.int32)[:, 0]
+    layer, domain = mesh.uv_layers.active, mesh.normals_domain
+    parts = {}
+    if domain == "CORNER":
+        parts["nx", "ny", "nz"] = normals = np.empty((len(corners), 3), np.float32)
+        mesh.corner_normals.foreach_get("vector", normals.ravel())
     if layer is not None:
-        uvs = np.empty(loops * 2, np.float32)
-        layer.uv.foreach_get("vector", uvs)
-        rows["s"], rows["t"] = uvs.reshape(-1, 2).T
-    return rows
+        parts["s", "t"] = _values(mesh.attributes[layer.name], "vector", 2, np.float32)
+    last = np.zeros(len(vertices), np.int32)  # a corner of each vertex
+    last[corners] = np.arange(len(corners), dtype=np.int32)
+    origin = np.arange(len(vertices), dtype=np.int32)
+    if parts:
+        other = np.zeros(len(corners), bool)
+        for values in parts.values():
+            other |= (values != values[last[corners]]).any(axis=1)
+        origin = np.concatenate([origin, corners[other]])
+        last = np.concatenate([last, np.flatnonzero(other).astype(np.int32)])
+        corners[other] = np.arange(len(vertices), len(origin), dtype=np.int32)
+    parts = {names: values[last] for names, values in parts.items()}
+    if domain == "POINT":
+        normals = np.empty((len(vertices), 3), np.float32)
+        mesh.vertex_normals.foreach_get("vector", normals.ravel())
+        parts = {("nx", "ny", "nz"): normals[origin], **parts}
+    parts = {("x", "y", "z"): vertices[origin], **parts}
+    rows = np.empty(len(origin), [(name, "<f4") for names in parts for name in names])
+    for names, values in parts.items():
+        for axis, name in enumerate(names):
+            rows[name] = values[:, axis]
+    return rows, corners
 
 
 def _write(file: Path, rows: np.ndarray, faces: np.ndarray) -> None:

@@ -28,9 +28,16 @@ class ClptSettings(bpy.types.PropertyGroup):
     denoise: bpy.props.BoolProperty(
         name="Denoise", description="Take most of the noise from the finished picture"
     )
-    python: bpy.props.StringProperty(
-        name="Python", subtype="FILE_PATH",
-        description="A Python that has clpt; empty: CLPT_PYTHON, or Blender's own",
+    noise: bpy.props.FloatProperty(
+        name="Noise Limit",
+        description="Pixels below this relative noise get no more samples; 0: no limit",
+        min=0.0,
+        max=1.0,
+        precision=3,
+    )
+    viewport_samples: bpy.props.IntProperty(
+        name="Viewport Samples", description="Paths of each pixel there", default=256, min=1,
+        max=1 << 20,
     )  # fmt: skip
 
 
@@ -115,11 +122,11 @@ class Panel(bpy.types.Panel):
 
 
 class CLPT_PT_sampling(Panel):
-    """Samples, mode, and the Python that renders."""
+    """Samples and mode."""
 
     bl_label = "Sampling"
     bl_context = "render"
-    names = ("mode", "samples", "denoise", "python")
+    names = ("mode", "samples", "noise", "denoise", "viewport_samples")
 
 
 class CLPT_PT_material(Panel):

@@ -28,10 +28,11 @@ class Process:
     """A process of clpt and the connection to it."""
 
     def __init__(self, python: str = ""):
+        self.python = python or interpreter()
         key = secrets.token_bytes(32)
         with Listener(("127.0.0.1", 0), authkey=key) as listener:
             listener._listener._socket.settimeout(0.5)  # accept() has no limit of its own
-            command = [python or interpreter(), str(WORKER), str(listener.address[1])]
+            command = [self.python, str(WORKER), str(listener.address[1])]
             try:
                 self.child = subprocess.Popen(command, stdin=subprocess.PIPE)
             except OSError as error:
@@ -85,6 +86,36 @@ class Process:
         except subprocess.TimeoutExpired:
             self.child.kill()
             self.child.wait()
+
+
+_idle: list[Process] = []  # one at most, for the next picture: it need not start again
+
+
+def take(python: str = "") -> Process:
+    """Return a process that waits for work. Raises ProcessError."""
+    python = python or interpreter()
+    while _idle:
+        process = _idle.pop()
+        if process.python == python and process.child.poll() is None:
+            with suppress(ProcessError):
+                if process.receive(0.0) is None:
+                    return process
+        process.stop()
+    return Process(python)
+
+
+def give_back(process: Process) -> None:
+    """Keep a process whose work is done, or end it."""
+    if _idle:
+        process.stop()
+    else:
+        _idle.append(process)
+
+
+def end_all() -> None:
+    """End processes that wait for work."""
+    while _idle:
+        _idle.pop().stop()
 
 
 def interpreter() -> str:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Callable
@@ -44,6 +45,7 @@ class Writer:
         self.told: dict[str, None] = {}
         self.tree = Tree(self.image, self.tell)
         self.images: dict[str, Json | None] = {}
+        self.numbers = itertools.count()  # of files
         self.materials: dict[str, tuple[str, Any]] = {}
         self.named: dict[str, Json] = {}
         self.groups: dict[str, list[Json]] = {}
@@ -53,6 +55,12 @@ class Writer:
 
     def write(self) -> Path:
         """Write all; return the scene file."""
+        file = self.folder / "scene.json"
+        file.write_text(json.dumps(self.describe()), "utf-8")
+        return file
+
+    def describe(self) -> Json:
+        """Write meshes and images; return the scene that names their files."""
         shapes: list[Json] = []
         lights: list[Json] = []
         parts: dict[int, list[Json]] = {}
@@ -78,7 +86,7 @@ class Writer:
             shapes += self._placed(parts[key], [_moved(row, poses) for row in placed])
         if poses and self.depsgraph.scene.camera is not None:
             camera |= {"shutter": {"open": 0.0, "close": poses[-1][0]}, **self._moved_camera(poses)}
-        content = {
+        return {
             "version": 2,
             "camera": camera,
             "film": {
@@ -91,9 +99,6 @@ class Writer:
             "shapes": shapes,
             "lights": lights,
         }
-        file = self.folder / "scene.json"
-        file.write_text(json.dumps(content), "utf-8")
-        return file
 
     def _poses(self) -> list[Pose]:
         """Return when the shutter is open [s], and where all is then; nothing without motion blur.
@@ -135,26 +140,27 @@ class Writer:
 
     def _parts(self, number: int, source: Any) -> list[Json]:
         """Return the shapes of an object in its own space, one for each material."""
-        if source.type == "CURVES":
-            return self._hair(number, source)
-        is_mesh = isinstance(source.data, bpy.types.Mesh)
-        try:
-            mesh = source.data if is_mesh else source.to_mesh()
-        except RuntimeError:  # such as curves without a surface
-            return []
-        files = meshes.write(mesh, self.folder, f"mesh{number}")
-        slots = [slot.material for slot in source.material_slots] or list(mesh.materials)
+        files = self._files(number, source)
+        slots = [slot.material for slot in source.material_slots] or list(source.data.materials)
         parts = [self._part(file, slots, slot, source.name) for slot, file in files.items()]
-        if not is_mesh:
-            source.to_mesh_clear()
+        if source.type == "CURVES":
+            return [{**part, "type": "curves", "basis": "bezier"} for part in parts]
         return parts
 
-    def _hair(self, number: int, source: Any) -> list[Json]:
-        file = f"hair{number}.txt"
-        if not meshes.write_strands(source.data, self.folder / file):
-            return []
-        part = self._part(file, [slot.material for slot in source.material_slots], 0, source.name)
-        return [{**part, "type": "curves", "basis": "bezier"}]
+    def _files(self, number: int, source: Any) -> dict[int, str]:
+        """Write the geometry of an object; return the file of each of its material slots."""
+        if source.type == "CURVES":
+            file = f"hair{number}.txt"
+            return {0: file} if meshes.write_strands(source.data, self.folder / file) else {}
+        as_mesh = isinstance(source.data, bpy.types.Mesh) and not source.data.is_editmode
+        try:
+            mesh = source.data if as_mesh else source.to_mesh()
+        except RuntimeError:  # such as curves without a surface
+            return {}
+        files = meshes.write(mesh, self.folder, f"mesh{number}")
+        if not as_mesh:
+            source.to_mesh_clear()
+        return files
 
     def _part(self, file: str, slots: list[Any], slot: int, name: str) -> Json:
         material = slots[slot] if slot < len(slots) else None
@@ -190,7 +196,7 @@ class Writer:
         pixels = pixels.reshape(height, width, 4)[::-1]
         if not (image.is_float or data):
             pixels = np.concatenate([_linear(pixels[..., :3]), pixels[..., 3:]], axis=2)
-        file = self.folder / f"image{len(self.images)}.npy"
+        file = self.folder / f"image{next(self.numbers)}.npy"
         np.save(file, np.ascontiguousarray(pixels))
         return {"type": "bitmap", "image": str(file), "raw": True}
 
@@ -333,18 +339,19 @@ class Writer:
                 "fov": math.degrees(2.0 * math.atan(1.0 / window[0][0])),
                 "offset_x": 0.5 * window[0][2], "offset_y": -0.5 * window[1][2],
             }  # fmt: skip
-            if camera.dof.use_dof:
-                focus = camera.dof.focus_distance
-                if camera.dof.focus_object is not None:
-                    there = camera.dof.focus_object.matrix_world.translation
-                    focus = (there - matrix.translation).length
-                radius = 0.5e-3 * camera.lens / camera.dof.aperture_fstop
-                described |= {
-                    "type": "thin_lens",
-                    "aperture_radius": radius,
-                    "focus_distance": focus,
-                }
+            described |= lens(camera, matrix)
         return {**described, "to_world": [list(row) for row in place]}
+
+
+def lens(camera: bpy.types.Camera, matrix: Matrix) -> Json:
+    """Return what a camera at a place has for depth of field."""
+    if not camera.dof.use_dof:
+        return {}
+    focus = camera.dof.focus_distance
+    if camera.dof.focus_object is not None:
+        focus = (camera.dof.focus_object.matrix_world.translation - matrix.translation).length
+    radius = 0.5e-3 * camera.lens / camera.dof.aperture_fstop
+    return {"type": "thin_lens", "aperture_radius": radius, "focus_distance": focus}
 
 
 def _key(instance: bpy.types.DepsgraphObjectInstance) -> Key:

@@ -1,86 +1,68 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Renders scene files for Blender: python worker.py PORT, with the connection's key at stdin."""
+"""Renders for Blender: python worker.py PORT, with the connection's key at stdin."""
 
 from __future__ import annotations
 
-import dataclasses
 import json
+import os
 import sys
-import time
+import threading
 from multiprocessing.connection import Client, Connection
+from queue import Empty, SimpleQueue
 from typing import Any
 
-import numpy as np
+IDLE = 300.0  # [s] without work, after which the process ends
 
-import clpt
 
-SHOWN_EVERY = 0.5  # [s] of pictures on the way
-WIDTHS = {"uv": 3}  # channels of layers that have more in Blender
+class Link:
+    """The connection to Blender. All that Blender sends is taken at once, so it never waits."""
+
+    def __init__(self, connection: Connection):
+        self.connection = connection
+        self.inbox: SimpleQueue[dict[str, Any]] = SimpleQueue()
+        self.is_seen = True  # whether Blender has taken the last picture of a viewport
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        """Take messages. When Blender closes the connection, this process ends."""
+        try:
+            while True:
+                message = json.loads(self.connection.recv_bytes())
+                if "seen" in message:
+                    self.is_seen = True
+                else:
+                    self.inbox.put(message)
+        except (EOFError, OSError):
+            os._exit(0)
+
+    def send(self, message: dict[str, Any], *pictures: Any) -> None:
+        """Send a message, and arrays after it."""
+        message["pictures"] = len(pictures)
+        try:
+            self.connection.send_bytes(json.dumps(message).encode())
+            for picture in pictures:
+                self.connection.send_bytes(picture.data.cast("B"))
+        except OSError:
+            os._exit(0)
 
 
 def main() -> None:
     """Answer messages until Blender closes the connection."""
     key = sys.stdin.buffer.read()
     with Client(("127.0.0.1", int(sys.argv[1])), authkey=key) as connection:
+        link = Link(connection)
         while True:
             try:
-                message = json.loads(connection.recv_bytes())
-            except (EOFError, OSError):
+                message = link.inbox.get(timeout=IDLE)
+            except Empty:
                 return
             try:
-                _render(connection, message)
-            except (EOFError, OSError):
-                return
+                import rendering  # after the connection: Blender hears of a clpt that is missing
+
+                rendering.answer(link, message)
             except Exception as error:  # whatever happens, Blender is told
-                _send(connection, {"error": f"{type(error).__name__}: {error}"})
-
-
-def _send(connection: Connection, message: dict[str, Any], *pictures: np.ndarray) -> None:
-    connection.send_bytes(json.dumps({**message, "pictures": len(pictures)}).encode())
-    for picture in pictures:
-        connection.send_bytes(picture.tobytes())
-
-
-def _render(connection: Connection, message: dict[str, Any]) -> None:
-    """Render a file until its samples are there, its noise is low, or Blender says stop."""
-    scene = clpt.load(message["file"])
-    size = {"width": message["width"], "height": message["height"]}
-    scene.film = dataclasses.replace(
-        scene.film, mode=message["mode"], layers=tuple(message["layers"]), **size
-    )
-    total, shown = int(message["samples"]), time.monotonic()
-    denoise = "oidn" if message.get("denoise") else None
-    with clpt.Renderer(scene, denoise=denoise) as renderer:
-        _send(connection, {"samples": 0, "warnings": scene.warnings})
-        while renderer.samples < total:
-            renderer.run(1 if renderer.samples == 0 else min(4, total - renderer.samples))
-            if connection.poll() and json.loads(connection.recv_bytes()).get("stop"):
-                break
-            if time.monotonic() - shown > SHOWN_EVERY:
-                _send(connection, {"samples": renderer.samples}, _pixels(renderer.image()))
-                shown = time.monotonic()
-        image = renderer.denoised() if denoise else renderer.image()
-        layers = renderer.layers() if message["layers"] else {}
-        _send(
-            connection,
-            {"samples": renderer.samples, "done": True},
-            _pixels(image),
-            *(_upward(layers[name], WIDTHS.get(name, 0)) for name in message["layers"]),
-        )
-
-
-def _pixels(picture: Any) -> np.ndarray:
-    """Return a picture as Blender has it: (h, w, 4) float32, the bottom row first."""
-    return _upward(picture, 4, 1.0)
-
-
-def _upward(picture: Any, width: int = 0, filled: float = 0.0) -> np.ndarray:
-    """Return an array (h, w, width) float32, the bottom row first; more channels are `filled`."""
-    image = np.asarray(picture, np.float32)
-    image = image.reshape(*image.shape[:2], -1)
-    padded = np.full((*image.shape[:2], width or image.shape[2]), filled, np.float32)
-    padded[..., : image.shape[2]] = image
-    return np.ascontiguousarray(padded[::-1])
+                lines = str(error).splitlines() or [""]
+                link.send({"error": f"{type(error).__name__}: {lines[0]}"})
 
 
 if __name__ == "__main__":

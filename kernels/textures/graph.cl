@@ -3,6 +3,7 @@
  * which calls these. A node of numbers is called for each channel. The others take and return vectors: a number stands
  * in all channels, and what a value does not have is 0. */
 #include "core/lattice_noise.cl"
+#include "textures/graph_cells.cl"
 
 inline vec4 vec4_sel(mask m, vec4 a, vec4 b)
 {
@@ -228,9 +229,9 @@ inline vec4 graph_splittb(vec4 t, vec4 b, real center, vec2 uv) { return vec4_se
 called vec4 graph_ramp(real x, Scene scene, integer table, int interpolation)
 {
     integer count = min_i(max_i(gather_i(scene.textures, table), (integer)(2)), (integer)(256)), upper = 1;
-    for (int i = 1; any((integer)(i) < count - 1); i++) {
-        real at = gather_w(scene.textures, table + 1 + 5 * min_i((integer)(i), count - 1));
-        upper = sel_i(((integer)(i) < count - 1) & (x >= at), (integer)(i + 1), upper);
+    for (int step = 128; step; step >>= 1) {
+        integer next = min_i(upper + step, count - 1);
+        upper = sel_i(x >= gather_w(scene.textures, table + 1 + 5 * (next - 1)), next, upper);
     }
     integer row = table + 1 + 5 * upper;
     real low = gather_w(scene.textures, row - 5), high = gather_w(scene.textures, row);
@@ -291,4 +292,22 @@ inline vec4 graph_worleynoise2d(vec2 p, real jitter, int channels, int style)
 {
     vec3 d = lattice_worley(v3(p.x, p.y, (real)(0.0f)), jitter, channels, style, 1);
     return v4(d.x, d.y, d.z, (real)(0.0f));
+}
+inline vec3 graph_voronoi3d(vec3 p, real randomness, real smoothness, real exponent, int feature, int metric,
+                            int output)
+{
+    return cells_voronoi(p, randomness, smoothness, exponent, feature, metric, output, 0);
+}
+inline vec3 graph_voronoi2d(vec2 p, real randomness, real smoothness, real exponent, int feature, int metric,
+                            int output)
+{
+    vec3 planar = v3(p.x, p.y, (real)(0.0f));
+    return cells_voronoi(planar, randomness, smoothness, exponent, feature, metric, output, 1);
+}
+inline real graph_noise1d(real x) { return cells_perlin1(x); }
+inline real graph_noise4d(vec4 p) { return cells_perlin4(p); }
+inline vec3 graph_whitenoise(vec4 p, int dimensions) { return cells_white(p, dimensions); }
+inline vec2 graph_brick(vec2 p, vec2 size, vec2 mortar, real bias, vec2 offset, vec2 squash)
+{
+    return cells_brick(p, size, mortar, bias, offset, squash);
 }

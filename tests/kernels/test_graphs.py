@@ -51,7 +51,10 @@ def graph_of(kind: str, declared: NodeKind, width: int, **settings: int) -> Grap
     node: dict[str, Any] = {"type": kind, **settings}
     for name, key in zip(NAMES, declared.inputs, strict=False):
         nodes[f"{name}{width}"] = {"type": "convert", "in": name, "channels": width}
-        node[key] = f"{name}{width}" if key not in ("octaves", "pivot") else 2.0
+        node[key] = f"{name}{width}" if key not in ("octaves", "pivot", "exponent") else 2.0
+    if kind == "whitenoise":  # of bits: of what has no rounding
+        nodes["whole"] = {"type": "floor", "in": node["in"]}
+        node["in"] = "whole"
     return Graph(nodes={**nodes, "node": node}, channel="r")
 
 

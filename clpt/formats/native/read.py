@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,11 @@ def load(
     UnusedParameterError with file, line and path of the value.
     """
     return _Reader(parse(path, confined), outside, missing).scene()
+
+
+def from_json(value: dict[str, Any], folder: Path, missing: Missing = "error") -> Scene:
+    """Return a scene that a program has as the content of a scene.json in `folder`, see `load`."""
+    return _Reader(Cursor(value, folder / "scene.json", json.dumps(value)), (), missing).scene()
 
 
 MATERIALX = "materialx"  # the type of a material that stands in a document

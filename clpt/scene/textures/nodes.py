@@ -1,6 +1,7 @@
 """Kinds of nodes of graphs: their inputs, and what they compute on arrays (..., channels) float64.
 
-Names, inputs and defaults are those of MaterialX's standard library. `kernels/textures/graph.cl`
+Names, inputs and defaults are those of MaterialX's standard library, but for the patterns of
+`cells`. `kernels/textures/graph.cl`
 has a function for each kind.
 """
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from clpt.arrays import Floats
 from clpt.errors import SceneError
-from clpt.scene.textures import noise
+from clpt.scene.textures import cells, noise
 
 SOURCES = {"texcoord": 2, "texcoord1": 2, "position": 3}  # names without a node; their channels
 FILLING = (0.0, 0.0, 0.0, 1.0)  # of channels that a value does not have
@@ -290,7 +291,7 @@ def _each(function: Function, **inputs: Default) -> NodeKind:
     return NodeKind(function, inputs)
 
 
-def _vectors(function: Function, width: int = 0, **inputs: Default) -> NodeKind:
+def _vectors(function: Function, width: int = 0, /, **inputs: Default) -> NodeKind:
     return NodeKind(function, inputs, "vectors", width)
 
 
@@ -314,6 +315,14 @@ def _pattern(
     if function is noise.worley:
         settings["style"] = (0, 0, 1)
     return NodeKind(function, {place: place, **inputs}, "vectors", 0, settings)
+
+
+def _voronoi(place: str) -> NodeKind:
+    inputs: dict[str, Default] = {
+        place: place, "randomness": 1.0, "smoothness": 0.25, "exponent": 2.0
+    }  # fmt: skip
+    settings = {"feature": (0, 0, 4), "metric": (0, 0, 3), "output": (0, 0, 2)}
+    return NodeKind(cells.voronoi, inputs, "vectors", 3, settings)
 
 
 ONE, TWO, THREE, FOUR = 0.0, (0.0,) * 2, (0.0,) * 3, (0.0,) * 4  # defaults, by their widths
@@ -404,6 +413,15 @@ NODES: dict[str, NodeKind] = {
     "cellnoise3d": _pattern(noise.cells, "position", {}),
     "worleynoise2d": _pattern(noise.worley, "texcoord", JITTER, 3),
     "worleynoise3d": _pattern(noise.worley, "position", JITTER, 3),
+    "voronoi2d": _voronoi("texcoord"),
+    "voronoi3d": _voronoi("position"),
+    "noise1d": _each(lambda x: cells.perlin(x[..., None])[..., 0], **IN),
+    "noise4d": _vectors(cells.perlin, 1, **{"in": FOUR}),
+    "whitenoise": NodeKind(cells.white, {"in": FOUR}, "vectors", 3, {"dimensions": (3, 1, 4)}),
+    "brick": _vectors(
+        cells.brick, 2, texcoord="texcoord", size=(0.5, 0.25), mortar=(0.02, 0.1), bias=0.0,
+        offset=(0.5, 2.0), squash=(1.0, 2.0),
+    ),
     "combine2": NodeKind(joined, {"in1": ONE, "in2": ONE}, "routes", -1),
     "combine3": NodeKind(joined, {"in1": ONE, "in2": ONE, "in3": ONE}, "routes", -1),
     "combine4": NodeKind(joined, {"in1": ONE, "in2": ONE, "in3": ONE, "in4": ONE}, "routes", -1),

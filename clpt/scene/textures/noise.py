@@ -21,8 +21,8 @@ def _turned(x: Words, bits: int) -> Words:
     return (x << np.uint32(bits)) | (x >> np.uint32(32 - bits))
 
 
-def _hash(*words: Words) -> Words:
-    """Jenkins' hash lookup3 of up to four words."""
+def jenkins(*words: Words) -> Words:
+    """Return Jenkins' hash lookup3 of one to four words."""
     seed = np.uint32((0xDEADBEEF + (len(words) << 2) + 13) & 0xFFFFFFFF)
     state = [np.full_like(words[0], seed) for _ in range(3)]
     for i, word in enumerate(words[:3]):
@@ -39,8 +39,14 @@ def _hash(*words: Words) -> Words:
     return state[2]
 
 
-def _lattice(whole: Floats) -> list[Words]:
+def lattice(whole: Floats) -> list[Words]:
+    """Return whole numbers (..., n) as n words."""
     return [whole[..., i].astype(np.int64).astype(np.uint32) for i in range(whole.shape[-1])]
+
+
+def fade(t: Floats) -> Floats:
+    """Return Perlin's weight of the upper corner, for shares t."""
+    return t**3 * (t * (t * 6.0 - 15.0) + 10.0)
 
 
 def _gradient(hashed: Words, at: Floats) -> Floats:
@@ -65,11 +71,11 @@ def perlin(at: Floats, channels: int) -> Floats:
         return np.concatenate([perlin(at, 3), perlin(at + APART[: at.shape[-1]], 1)], axis=-1)
     whole = np.floor(at)
     within = at - whole
-    smooth = within**3 * (within * (within * 6.0 - 15.0) + 10.0)
+    smooth = fade(within)
     sums = np.zeros((*at.shape[:-1], channels))
     for corner in itertools.product((0.0, 1.0), repeat=at.shape[-1]):
         weight = np.prod(np.where(corner, smooth, 1.0 - smooth), axis=-1)
-        hashed = _hash(*_lattice(whole + corner))
+        hashed = jenkins(*lattice(whole + corner))
         for channel in range(channels):
             bits = hashed if channels == 1 else (hashed >> np.uint32(8 * channel)) & np.uint32(255)
             sums[..., channel] += weight * _gradient(bits, within - corner)
@@ -89,11 +95,11 @@ def fractal(
 
 def cells(at: Floats, channels: int) -> Floats:
     """Return a number in [0, 1] for each unit cell and channel, (..., channels)."""
-    words = _lattice(np.floor(at))
+    words = lattice(np.floor(at))
     if channels == 1:
-        return (_hash(*words) / 0xFFFFFFFF)[..., None]
+        return (jenkins(*words) / 0xFFFFFFFF)[..., None]
     numbers = (np.full_like(words[0], i) for i in range(channels))
-    return np.stack([_hash(*words, number) / 0xFFFFFFFF for number in numbers], axis=-1)
+    return np.stack([jenkins(*words, number) / 0xFFFFFFFF for number in numbers], axis=-1)
 
 
 def worley(at: Floats, jitter: Floats, channels: int, style: int) -> Floats:
