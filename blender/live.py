@@ -114,6 +114,7 @@ class Parts:
             {
                 "version": 2, "camera": {"type": "perspective"},
                 "materials": described["materials"] if fresh["material"] else {},
+                "media": described["media"],
                 "shapes": [*fresh["shape"].values(), *carriers],
                 "lights": list(fresh["lamp"].values()),
             },

@@ -6,28 +6,113 @@ A node that has no counterpart is told once; the value of its socket stands for 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
 import bpy
 import numpy as np
 
-Json = dict[str, Any]
-PASSING = ("REROUTE",)
+from .graphs import Graph, Json, Site, Value, origin, socket_of
+from .textures import TEXTURES
+
 GREY = [0.8, 0.8, 0.8]
 
 
-class Tree:
-    """The nodes of a material.
+class Expression:
+    """A graph in the making: what nodes that are no shaders compute."""
 
-    image: writes an image and returns its bitmap, without coordinates; tell: takes what is lost.
+    def __init__(self, tree: Tree):
+        self.tree, self.g, self.tell, self.image = tree, Graph(), tree.tell, tree.image
+        self.object, self.random = tree.object, tree.random
+        self.known: dict[tuple[Any, ...], Value] = {}
+
+    def input(self, at: Site, key: str | int) -> Value:
+        """Return an input of a node, by its number, identifier or name; 0 if it has none."""
+        socket = socket_of(at.node, key)
+        return self.g.value(0.0) if socket is None else self.socket(at.groups, socket)
+
+    def inputs(self, at: Site) -> Callable[[str], Value]:
+        return lambda key: self.input(at, key)
+
+    def socket(self, groups: tuple[bpy.types.Node, ...], socket: Any) -> Value:
+        site, end = origin(groups, socket)
+        if site is None:
+            return self._own(end)
+        key = (site.node.as_pointer(), *(g.as_pointer() for g in site.groups), site.output)
+        if key not in self.known:
+            read = TEXTURES.get(site.node.type)
+            value = None if read is None else read(self, site)
+            if value is None:
+                label = f"{site.node.bl_label} ({site.output})"
+                self.tell(f"{label} is not read; the socket's own value stands for it")
+                value = self._own(socket)
+            self.known[key] = value
+        value = self.known[key]
+        if socket.type in ("VALUE", "INT", "BOOLEAN") and value.width > 1:
+            color = end.type == "RGBA"
+            value = self.g.gray(value) if color else (value[0] + value[1] + value[2]) / 3.0
+        return value
+
+    def _own(self, socket: Any) -> Value:
+        if socket is None or socket.type in ("SHADER", "STRING", "MENU"):
+            return self.g.value(0.0)
+        value = socket.default_value
+        return self.g.value(value if isinstance(value, (int, float)) else list(value)[:3])
+
+    def vector(self, at: Site, coordinates: str) -> Value:
+        """Return where a texture is looked up; unlinked: at the coordinates of that name."""
+        if not at.node.inputs["Vector"].is_linked:
+            return self.attribute(coordinates)
+        return self.input(at, "Vector")
+
+    def constant(self, at: Site, key: str, default: float) -> float:
+        """Return a number that cannot vary; `default` where it does."""
+        value = self.input(at, key).constant()
+        if value is None:
+            self.tell(f"{key} of {at.node.bl_label} cannot vary: it is {default:g}")
+        return default if value is None else value[0]
+
+    def told(self, at: Site, text: str, value: float) -> Value:
+        self.tell(text)
+        return self.g.value(value)
+
+    def attribute(self, kind: str, name: str = "") -> Value:
+        """Return coordinates or an attribute of meshes; of a world its directions."""
+        if not self.tree.surface:
+            return Value(self.g, "position", 3)
+        if kind == "uv" and not name:
+            return self.g("convert", Value(self.g, "texcoord", 2), channels=3)
+        number = self.tree.attributes.setdefault((kind, name), len(self.tree.attributes))
+        self.tree.used.add(number)
+        return self.g.look({"type": "mesh_attribute", "name": f"vertex_b{number}"}, 3)
+
+    def of_object(self, source: bpy.types.Object) -> Value:
+        """Return the place as another object has it."""
+        rows, place = source.matrix_world.inverted_safe(), Value(self.g, "position", 3)
+        parts = (self.g("dotproduct", place, list(row)[:3]) + row[3] for row in list(rows)[:3])
+        return self.g("combine3", *parts)
+
+    def stops(self, value: Value, rows: list[list[float]], how: int) -> Value:
+        """Return a ramp's color (4 channels); rows: positions that rise, and 1, 3 or 4 numbers."""
+        rows = sorted(rows, key=lambda row: row[0])
+        return self.g("ramp", value, stops=rows, interpolation=how)
+
+
+class Tree:
+    """The nodes of materials.
+
+    image: writes the image of a node and returns its bitmap, without coordinates; tell: takes what
+    is lost. attributes: of meshes that the materials read, by what they are, with their numbers.
+    object, random: what Object Info knows; surface: False while a world is read.
     """
 
-    def __init__(
-        self, image: Callable[[bpy.types.Image], Json | None], tell: Callable[[str], None]
-    ):
+    def __init__(self, image: Callable[[bpy.types.Node], Json | None], tell: Callable[[str], None]):
         self.image, self.tell = image, tell
+        self.attributes: dict[tuple[str, str], int] = {}
+        self.used: set[int] = set()  # attributes that the material reads
+        self.personal = False  # whether it reads what only its object knows
+        self.object: bpy.types.Object | None = None
+        self.random, self.surface = 0.0, True
 
     def material(self, material: bpy.types.Material | None) -> tuple[Json, Any]:
         """Return a material and the radiance that it emits, None if it is dark."""
@@ -38,81 +123,81 @@ class Tree:
         if not material.use_nodes or material.node_tree is None:
             return {"type": "diffuse", "reflectance": list(material.diffuse_color)[:3]}, None
         output = material.node_tree.get_output_node("CYCLES")
-        source = None if output is None else _source(output.inputs["Surface"])
-        if output is not None and _source(output.inputs["Volume"]) is not None:
-            self.tell(f"material {material.name!r}: its volume is left out")
-        if source is None:
-            return {"type": "diffuse", "reflectance": 0.0}, None
-        return self.shader(source)
+        shader = None if output is None else self.linked(Site(output, (), ""), "Surface")
+        if shader is None:
+            filled = output is not None and output.inputs["Volume"].is_linked
+            return {"type": "null"} if filled else {"type": "diffuse", "reflectance": 0.0}, None
+        return shader
 
-    def shader(self, node: bpy.types.Node) -> tuple[Json, Any]:
+    def linked(self, at: Site, key: str | int) -> tuple[Json, Any] | None:
+        """Return the material and the light of a linked shader, None without one."""
+        site, _ = origin(at.groups, socket_of(at.node, key))
+        return None if site is None else self.shader(site)
+
+    def shader(self, at: Site) -> tuple[Json, Any]:
         """Return the material of a shader node, and what it emits."""
-        read = SHADERS.get(node.type)
+        read = SHADERS.get(at.node.type)
         if read is None:
-            self.tell(f"{node.bl_label} is not read; grey stands for it")
+            self.tell(f"{at.node.bl_label} is not read; grey stands for it")
             return {"type": "diffuse", "reflectance": GREY}, None
-        return read(self, node)
+        return read(self, at)
 
-    def color(self, node: bpy.types.Node, name: str) -> Any:
+    def color(self, at: Site, key: str) -> Any:
         """Return a color input: three numbers or a texture."""
-        socket = node.inputs[name]
-        source = _source(socket)
-        if source is not None:
-            texture = self.texture(source, socket, wide=True)
-            if texture is not None:
-                return texture
-        return [max(value, 0.0) for value in list(socket.default_value)[:3]]
+        expression = Expression(self)
+        return _positive(expression.g.finished(expression.input(at, key), wide=True))
 
-    def number(self, node: bpy.types.Node, name: str, default: float = 0.0) -> Any:
+    def number(self, at: Site, key: str, default: float = 0.0) -> Any:
         """Return an input that is a number or a texture; `default` where a node lacks it."""
-        socket = node.inputs.get(name)
-        if socket is None:
+        if socket_of(at.node, key) is None:
             return default
-        source = _source(socket)
-        if source is not None:
-            texture = self.texture(source, socket, wide=False)
-            if texture is not None:
-                return texture
-        value = socket.default_value
-        return float(value if isinstance(value, (int, float)) else np.mean(list(value)[:3]))
+        expression = Expression(self)
+        value = expression.input(at, key)
+        return expression.g.finished(expression.g.gray(value), wide=False)
 
-    def texture(self, node: bpy.types.Node, socket: Any, *, wide: bool) -> Any:
-        """Return a texture, a color or a number for a node; None where it is not read."""
-        read = TEXTURES.get(node.type)
-        if read is None:
-            self.tell(f"{node.bl_label} is not read; the socket's own value stands for it")
-            return None
-        value = read(self, node, _output(socket))
-        if value is None or isinstance(value, dict):
+    def single(self, at: Site, key: str, default: float = 0.0) -> float:
+        """Return an input that cannot vary; `default` where it does, or where a node lacks it."""
+        value = self.number(at, key, default)
+        if isinstance(value, float):
             return value
-        if wide:
-            return value if isinstance(value, list) else [value] * 3
-        return float(np.mean(value))
+        self.tell(f"{key} of {at.node.bl_label} cannot vary: it is {default:g}")
+        return default
 
-    def bent(self, node: bpy.types.Node, material: Json) -> Json:
+    def made(self, compute: Callable[[Expression], Value], *, wide: bool = False) -> Any:
+        """Return what is computed: numbers or a texture."""
+        expression = Expression(self)
+        return expression.g.finished(compute(expression), wide=wide)
+
+    def light(self, at: Site, color: str, strength: str) -> Any:
+        """Return what a node emits, None for nothing."""
+        shown = self.made(lambda e: e.input(at, color) * e.input(at, strength), wide=True)
+        return None if isinstance(shown, list) and not any(v > 0.0 for v in shown) else shown
+
+    def bent(self, at: Site, material: Json) -> Json:
         """Return a material with the normal map or the heights of a shader's input."""
-        socket = node.inputs.get("Normal")
-        source = None if socket is None else _source(socket)
-        if source is None:
+        socket = socket_of(at.node, "Normal")
+        site = None if socket is None else origin(at.groups, socket)[0]
+        if site is None:
             return material
-        if source.type == "NORMAL_MAP" and source.space == "TANGENT":
-            map_ = self.color(source, "Color")
-            if isinstance(map_, dict) and map_["type"] == "bitmap":
-                scale = self.number(source, "Strength", 1.0)
+        node = site.node
+        if node.type == "NORMAL_MAP" and node.space == "TANGENT":
+            map_ = self.color(site, "Color")
+            if isinstance(map_, dict):
+                raw = {"raw": True} if map_["type"] == "bitmap" else {}
+                scale = self.single(site, "Strength", 1.0)
                 return {
-                    "type": "normal_map", "material": material, "map": {**map_, "raw": True},
-                    "scale": scale if isinstance(scale, float) else 1.0,
+                    "type": "normal_map", "material": material, "map": {**map_, **raw},
+                    "scale": scale,
                 }  # fmt: skip
-        if source.type == "BUMP":
-            height = self.number(source, "Height", 0.0)
-            strength, distance = (self.number(source, n, 1.0) for n in ("Strength", "Distance"))
-            if isinstance(height, dict) and isinstance(strength, float):
-                sign = -1.0 if source.invert else 1.0
-                return {
-                    "type": "bump_map", "material": material, "height": height,
-                    "scale": sign * strength * (distance if isinstance(distance, float) else 1.0),
-                }  # fmt: skip
-        self.tell(f"{source.bl_label} as a normal is not read")
+        if node.type == "BUMP":
+            height = self.number(site, "Height")
+            scale = self.single(site, "Strength", 1.0) * self.single(site, "Distance", 1.0)
+            material = self.bent(site, material)
+            if not isinstance(height, dict):
+                return material
+            scale *= -1.0 if node.invert else 1.0
+            return {"type": "bump_map", "material": material, "height": height, "scale": scale}
+        self.tell(f"{node.bl_label} as a normal is not read")
         return material
 
 
@@ -129,89 +214,48 @@ def named(settings: bpy.types.PropertyGroup) -> Json:
     return _both({"type": kind, "metal": settings.metal, **facets, **layers})
 
 
-def _source(socket: Any) -> bpy.types.Node | None:
-    """Return the node that a socket is linked to, past reroutes and muted links."""
-    while socket.is_linked:
-        link = socket.links[0]
-        if link.is_muted or not link.is_valid:
-            return None
-        if link.from_node.type not in PASSING:
-            return link.from_node
-        socket = link.from_node.inputs[0]
-    return None
+def _positive(value: Any) -> Any:
+    return [max(part, 0.0) for part in value] if isinstance(value, list) else value
 
 
-def _output(socket: Any) -> str:
-    """Return the name of the output that a socket is linked to."""
-    while socket.links[0].from_node.type in PASSING:
-        socket = socket.links[0].from_node.inputs[0]
-    return socket.links[0].from_socket.name
-
-
-def _alpha(roughness: Any) -> Any:
-    """Return the square of a roughness."""
-    if isinstance(roughness, float):
-        return max(roughness * roughness, 1e-4)
-    return {"type": "product", "first": roughness, "second": roughness}
-
-
-def _times(value: Any, factor: float) -> Any:
-    if isinstance(value, dict):
-        return {"type": "product", "first": value, "second": factor}
-    return [part * factor for part in value] if isinstance(value, list) else value * factor
-
-
-def _light(tree: Tree, node: bpy.types.Node, color: str, strength: str) -> Any:
-    """Return what a node emits, None for nothing."""
-    amount, shown = tree.number(node, strength, 1.0), tree.color(node, color)
-    if isinstance(amount, dict):
-        return {"type": "product", "first": shown, "second": amount}
-    dark = isinstance(shown, list) and not any(shown)
-    return None if amount <= 0.0 or dark else _times(shown, amount)
-
-
-def _principled(tree: Tree, node: bpy.types.Node) -> tuple[Json, Any]:
-    color, level = tree.color(node, "Base Color"), tree.number(node, "Specular IOR Level", 0.5)
-    through = tree.number(node, "Transmission Weight")
+def _principled(tree: Tree, at: Site) -> tuple[Json, Any]:
+    color, through = tree.color(at, "Base Color"), tree.number(at, "Transmission Weight")
     values: Json = {
         "base_weight": 1.0,
         "base_color": color,
-        "base_metalness": tree.number(node, "Metallic"),
-        "base_diffuse_roughness": tree.number(node, "Diffuse Roughness"),
-        "specular_weight": _times(level, 2.0),
-        "specular_roughness": tree.number(node, "Roughness", 0.5),
+        "base_metalness": tree.number(at, "Metallic"),
+        "base_diffuse_roughness": tree.number(at, "Diffuse Roughness"),
+        "specular_weight": tree.made(lambda e: e.input(at, "Specular IOR Level") * 2.0),
+        "specular_color": tree.color(at, "Specular Tint"),
+        "specular_roughness": tree.number(at, "Roughness", 0.5),
+        "specular_ior": min(max(tree.single(at, "IOR", 1.5), 1.0), 4.0),
+        "specular_roughness_anisotropy": tree.number(at, "Anisotropic"),
+        "anisotropy_rotation": tree.made(lambda e: e.input(at, "Anisotropic Rotation") * 360.0),
         "transmission_weight": through,
-        "coat_weight": tree.number(node, "Coat Weight"),
-        "coat_roughness": tree.number(node, "Coat Roughness"),
-        "coat_color": tree.color(node, "Coat Tint"),
+        "coat_weight": tree.number(at, "Coat Weight"),
+        "coat_roughness": tree.number(at, "Coat Roughness"),
+        "coat_color": tree.color(at, "Coat Tint"),
+        "coat_ior": min(max(tree.single(at, "Coat IOR", 1.5), 1.0), 3.0),
         "coat_darkening": 0.0,
-        "fuzz_weight": tree.number(node, "Sheen Weight"),
-        "fuzz_roughness": tree.number(node, "Sheen Roughness", 0.5),
-        "fuzz_color": tree.color(node, "Sheen Tint"),
-        "subsurface_weight": tree.number(node, "Subsurface Weight"),
+        "fuzz_weight": tree.number(at, "Sheen Weight"),
+        "fuzz_roughness": tree.number(at, "Sheen Roughness", 0.5),
+        "fuzz_color": tree.color(at, "Sheen Tint"),
+        "subsurface_weight": tree.number(at, "Subsurface Weight"),
         "subsurface_color": color,
-        "specular_roughness_anisotropy": tree.number(node, "Anisotropic"),
     }
-    for name, key, low, high in (
-        ("IOR", "specular_ior", 1.0, 4.0),
-        ("Coat IOR", "coat_ior", 1.0, 3.0),
-    ):
-        index = tree.number(node, name, 1.5)
-        values[key] = min(max(index, low), high) if isinstance(index, float) else 1.5
     if through != 0.0:
         values["transmission_tint"] = color
-    thickness = tree.number(node, "Thin Film Thickness")
+    thickness = tree.number(at, "Thin Film Thickness")
     if thickness != 0.0:
-        film = tree.number(node, "Thin Film IOR", 1.33)
         values |= {
-            "thin_film_weight": 1.0, "thin_film_thickness": _times(thickness, 1e-3),
-            "thin_film_ior": film if isinstance(film, float) else 1.33,
+            "thin_film_weight": 1.0, "thin_film_ior": tree.single(at, "Thin Film IOR", 1.33),
+            "thin_film_thickness": tree.made(lambda e: e.input(at, "Thin Film Thickness") * 1e-3),
         }  # fmt: skip
-    material = tree.bent(node, {"type": "openpbr", **_plain(values)})
-    alpha = tree.number(node, "Alpha", 1.0)
+    material = tree.bent(at, {"type": "openpbr", **_plain(values)})
+    alpha = tree.number(at, "Alpha", 1.0)
     if alpha != 1.0:
         material = {"type": "mask", "material": material, "opacity": alpha}
-    return _both(material, through), _light(tree, node, "Emission Color", "Emission Strength")
+    return _both(material, through), tree.light(at, "Emission Color", "Emission Strength")
 
 
 def _plain(values: Json) -> Json:
@@ -230,69 +274,170 @@ def _both(material: Json, through: Any = 0.0) -> Json:
     return material if through != 0.0 else {"type": "two_sided", "front": material}
 
 
-def _diffuse(tree: Tree, node: bpy.types.Node) -> tuple[Json, Any]:
-    color, roughness = tree.color(node, "Color"), tree.number(node, "Roughness")
+def _diffuse(tree: Tree, at: Site) -> tuple[Json, Any]:
+    color, roughness = tree.color(at, "Color"), tree.number(at, "Roughness")
     matte = {"type": "diffuse", "reflectance": color}
     if isinstance(roughness, float) and roughness > 0.0:
-        sigma = 90.0 * roughness * 0.5
-        matte = {"type": "oren_nayar", "reflectance": color, "sigma": sigma}
-    return _both(tree.bent(node, matte)), None
+        matte = {"type": "oren_nayar", "reflectance": color, "sigma": 45.0 * roughness}
+    return _both(tree.bent(at, matte)), None
 
 
-def _glossy(tree: Tree, node: bpy.types.Node) -> tuple[Json, Any]:
-    metal = {
-        "type": "openpbr", "base_weight": 1.0, "base_metalness": 1.0,
-        "base_color": tree.color(node, "Color"),
-        "specular_roughness": tree.number(node, "Roughness", 0.5),
-        "specular_roughness_anisotropy": 0.0,
-    }  # fmt: skip
-    return _both(tree.bent(node, metal)), None
+def _open(tree: Tree, at: Site, **values: Any) -> tuple[Json, Any]:
+    """Return OpenPBR without a dielectric's reflection, unless `values` say so."""
+    plain = {"type": "openpbr", "base_weight": 1.0, "specular_weight": 0.0}
+    return _both(tree.bent(at, {**plain, **_plain(values)})), None
 
 
-def _glass(tree: Tree, node: bpy.types.Node) -> tuple[Json, Any]:
-    index, roughness = tree.number(node, "IOR", 1.5), tree.number(node, "Roughness")
-    color = tree.color(node, "Color")
+def _glossy(tree: Tree, at: Site) -> tuple[Json, Any]:
+    return _open(
+        tree, at, base_metalness=1.0, base_color=tree.color(at, "Color"), specular_weight=1.0,
+        specular_roughness=tree.number(at, "Roughness", 0.5),
+        specular_roughness_anisotropy=tree.number(at, "Anisotropy"),
+        anisotropy_rotation=tree.made(lambda e: e.input(at, "Rotation") * 360.0),
+    )  # fmt: skip
+
+
+def _metallic(tree: Tree, at: Site) -> tuple[Json, Any]:
+    rough = tree.number(at, "Roughness", 0.5)
+    if at.node.fresnel_type == "PHYSICAL_CONDUCTOR":
+        alpha = tree.made(lambda e: e.input(at, "Roughness") * e.input(at, "Roughness"))
+        metal = {
+            "type": "rough_conductor", "alpha_u": _wide(alpha), "alpha_v": _wide(alpha),
+            **{key: list(at.node.inputs[name].default_value)
+               for key, name in (("eta", "IOR"), ("k", "Extinction"))},
+        }  # fmt: skip
+        return _both(tree.bent(at, metal)), None
+    return _open(
+        tree, at, base_metalness=1.0, base_color=tree.color(at, "Base Color"), specular_weight=1.0,
+        specular_color=tree.color(at, "Edge Tint"), specular_roughness=rough,
+        specular_roughness_anisotropy=tree.number(at, "Anisotropy"),
+        anisotropy_rotation=tree.made(lambda e: e.input(at, "Rotation") * 360.0),
+    )  # fmt: skip
+
+
+def _wide(alpha: Any) -> Any:
+    return max(alpha, 1e-4) if isinstance(alpha, float) else alpha
+
+
+def _glass(tree: Tree, at: Site) -> tuple[Json, Any]:
     values: Json = {
-        "int_ior": max(index, 1.0) if isinstance(index, float) else 1.5, "ext_ior": 1.0,
-        "specular_transmittance": color,
+        "int_ior": max(tree.single(at, "IOR", 1.5), 1.0), "ext_ior": 1.0,
+        "specular_transmittance": tree.color(at, "Color"),
     }  # fmt: skip
-    if node.type == "REFRACTION":
+    if at.node.type == "BSDF_REFRACTION":
         values["specular_reflectance"] = 0.0
-    smooth = isinstance(roughness, float) and roughness < 1e-3
+    alpha = tree.made(lambda e: e.input(at, "Roughness") * e.input(at, "Roughness"))
+    smooth = isinstance(alpha, float) and alpha < 1e-6
     kind: Json = {"type": "dielectric"} if smooth else {
-        "type": "rough_dielectric", "alpha_u": _alpha(roughness), "alpha_v": _alpha(roughness),
+        "type": "rough_dielectric", "alpha_u": _wide(alpha), "alpha_v": _wide(alpha),
     }  # fmt: skip
-    return tree.bent(node, {**kind, **values}), None
+    return tree.bent(at, {**kind, **values}), None
 
 
-def _translucent(tree: Tree, node: bpy.types.Node) -> tuple[Json, Any]:
-    color = tree.color(node, "Color")
+def _translucent(tree: Tree, at: Site) -> tuple[Json, Any]:
+    color = tree.color(at, "Color")
     return {"type": "diffuse_transmission", "transmittance": color, "reflectance": 0.0}, None
 
 
-def _transparent(tree: Tree, node: bpy.types.Node) -> tuple[Json, Any]:
-    color = tree.color(node, "Color")
-    if color != [1.0, 1.0, 1.0]:
-        tree.tell("the color of Transparent BSDF is read as white")
+def _transparent(tree: Tree, at: Site) -> tuple[Json, Any]:
+    color = tree.color(at, "Color")
+    if color == [1.0, 1.0, 1.0]:
+        return {"type": "null"}, None
+    values = {"int_ior": 1.0, "ext_ior": 1.0, "specular_transmittance": color}
+    return {"type": "thin_dielectric", **values}, None
+
+
+def _emission(tree: Tree, at: Site) -> tuple[Json, Any]:
+    return {"type": "diffuse", "reflectance": 0.0}, tree.light(at, "Color", "Strength")
+
+
+def _hair(tree: Tree, at: Site) -> tuple[Json, Any]:
+    """Principled Hair by Chiang et al. 2016; colors and melanin by Benedikt et al. 2011."""
+    old, along = at.node.type == "BSDF_HAIR", tree.single(at, "Roughness", 0.3)
+    around = tree.single(at, "Radial Roughness", 0.3)
+    kind = "COLOR" if old else at.node.parametrization
+    if kind == "ABSORPTION":
+        absorbed = list(at.node.inputs["Absorption Coefficient"].default_value)
+    elif kind == "MELANIN":
+        amount = -np.log(max(1.0 - tree.single(at, "Melanin", 0.8), 1e-4))
+        red = tree.single(at, "Melanin Redness", 1.0)
+        pigments = np.array([[0.506, 0.841, 1.653], [0.343, 0.733, 1.924]])
+        absorbed = (amount * np.array([1.0 - red, red]) @ pigments).tolist()
+    else:
+        b = around if not old else 0.3
+        scale = 5.969 - 0.215 * b + 2.532 * b**2 - 10.73 * b**3 + 5.574 * b**4 + 0.245 * b**5
+        color = tree.color(at, "Color")
+        color = color if isinstance(color, list) else GREY
+        absorbed = [float((np.log(max(c, 1e-3)) / scale) ** 2) for c in color]
+    return {
+        "type": "hair", "sigma_a": absorbed, "longitudinal_roughness": along,
+        "azimuthal_roughness": around, "eta": tree.single(at, "IOR", 1.55),
+        "scale_tilt": float(np.degrees(tree.single(at, "Offset", 0.035))),
+    }, None  # fmt: skip
+
+
+def _sheen(tree: Tree, at: Site) -> tuple[Json, Any]:
+    return _open(
+        tree, at, base_color=0.0, fuzz_weight=1.0, fuzz_color=tree.color(at, "Color"),
+        fuzz_roughness=tree.number(at, "Roughness", 0.5),
+    )  # fmt: skip
+
+
+def _subsurface(tree: Tree, at: Site) -> tuple[Json, Any]:
+    color = tree.color(at, "Color")
+    return _open(tree, at, base_color=color, subsurface_weight=1.0, subsurface_color=color)
+
+
+def _toon(tree: Tree, at: Site) -> tuple[Json, Any]:
+    tree.tell(f"{at.node.bl_label} is read as diffuse")
+    return _both({"type": "diffuse", "reflectance": tree.color(at, "Color")}), None
+
+
+def _holdout(tree: Tree, at: Site) -> tuple[Json, Any]:
+    tree.tell(f"{at.node.bl_label} is read as nothing at all")
     return {"type": "null"}, None
 
 
-def _emission(tree: Tree, node: bpy.types.Node) -> tuple[Json, Any]:
-    return {"type": "diffuse", "reflectance": 0.0}, _light(tree, node, "Color", "Strength")
+def _mix(tree: Tree, at: Site) -> tuple[Json, Any]:
+    nothing: tuple[Json, Any] = ({"type": "null"}, None)
+    factor = origin(at.groups, socket_of(at.node, "Fac"))[0]
+    parts = [tree.linked(at, i) or nothing for i in (1, 2)]
+    if factor is not None and factor.output == "Backfacing":
+        (front, light), (back, _) = parts
+        fronts = [part.get("front", part) for part in (front, back)]
+        return {"type": "two_sided", "front": fronts[0], "back": fronts[1]}, light
+    coated = None if factor is None else _coated(tree, at, factor)
+    if coated is not None:
+        return coated
+    share = tree.number(at, "Fac", 0.5)
+    if share in (0.0, 1.0):
+        return parts[int(share)]
+    return _blended(tree, *parts, share)
 
 
-def _mix(tree: Tree, node: bpy.types.Node) -> tuple[Json, Any]:
-    share = tree.number(node, "Factor" if "Factor" in node.inputs else "Fac", 0.5)
-    sources = [_source(node.inputs[i]) for i in (1, 2)]
-    (first, light), (second, glow) = (
-        ({"type": "null"}, None) if source is None else tree.shader(source) for source in sources
-    )
-    return _blended(tree, first, second, share, light, glow)
+def _coated(tree: Tree, at: Site, factor: Site) -> tuple[Json, Any] | None:
+    """Return a matte base below a dielectric: a mixture by Fresnel of the two; None for others."""
+    ends = [origin(at.groups, at.node.inputs[i])[0] for i in (1, 2)]
+    matte, gloss = ends
+    if matte is None or gloss is None or factor.output not in ("Fac", "Fresnel"):
+        return None
+    kinds = (matte.node.type, gloss.node.type, factor.node.type)
+    if kinds[:2] != ("BSDF_DIFFUSE", "BSDF_GLOSSY") or kinds[2] not in ("FRESNEL", "LAYER_WEIGHT"):
+        return None
+    index = tree.single(factor, "IOR", 1.5)
+    if kinds[2] == "LAYER_WEIGHT":
+        index = 1.0 / max(1.0 - tree.single(factor, "Blend", 0.5), 0.25)
+    return _open(
+        tree, matte, base_color=tree.color(matte, "Color"), specular_weight=1.0,
+        specular_color=tree.color(gloss, "Color"), specular_ior=min(max(index, 1.0), 4.0),
+        specular_roughness=tree.number(gloss, "Roughness", 0.5),
+    )  # fmt: skip
 
 
 def _blended(
-    tree: Tree, first: Json, second: Json, share: Any, light: Any, glow: Any
+    tree: Tree, below: tuple[Json, Any], above: tuple[Json, Any], share: Any
 ) -> tuple[Json, Any]:
+    (first, light), (second, glow) = below, above
     emitted = None
     if light is not None or glow is not None:
         before, after = (part if part is not None else [0.0] * 3 for part in (light, glow))
@@ -310,9 +455,9 @@ def _blend(first: Json, second: Json, share: Any) -> Json:
     return {"type": "two_sided", "front": blend} if opaque else blend
 
 
-def _add(tree: Tree, node: bpy.types.Node) -> tuple[Json, Any]:
+def _add(tree: Tree, at: Site) -> tuple[Json, Any]:
     """Return the sum of a material and an emission; of two materials their mean, told."""
-    parts = [tree.shader(source) for i in (0, 1) if (source := _source(node.inputs[i])) is not None]
+    parts = [part for i in (0, 1) if (part := tree.linked(at, i)) is not None]
     if not parts:
         return {"type": "null"}, None
     lights = [light for _, light in parts if light is not None]
@@ -323,109 +468,11 @@ def _add(tree: Tree, node: bpy.types.Node) -> tuple[Json, Any]:
     return scattering[0], lights[0] if lights else None
 
 
-SHADERS: dict[str, Callable[[Tree, bpy.types.Node], tuple[Json, Any]]] = {
-    "BSDF_PRINCIPLED": _principled,
-    "BSDF_DIFFUSE": _diffuse,
-    "BSDF_GLOSSY": _glossy,
-    "BSDF_ANISOTROPIC": _glossy,
-    "BSDF_GLASS": _glass,
-    "BSDF_REFRACTION": _glass,
-    "BSDF_TRANSLUCENT": _translucent,
-    "BSDF_TRANSPARENT": _transparent,
-    "EMISSION": _emission,
-    "MIX_SHADER": _mix,
-    "ADD_SHADER": _add,
-}
-
-
-def _image(tree: Tree, node: bpy.types.Node, output: str) -> Any:
-    if node.image is None:
-        return [1.0, 0.0, 1.0]
-    bitmap = tree.image(node.image)
-    if bitmap is None:
-        return [1.0, 0.0, 1.0]
-    wraps = {"REPEAT": "repeat", "EXTEND": "clamp", "CLIP": "zero", "MIRROR": "mirror"}
-    to_uv = _placed(tree, node)
-    placed = {} if np.array_equal(to_uv, np.eye(3)) else {"to_uv": to_uv.tolist()}
-    channel = {"channel": "a"} if output == "Alpha" else {}
-    nearest = {"filter": "nearest"} if node.interpolation == "Closest" else {}
-    return {**bitmap, "wrap": wraps[node.extension], **placed, **channel, **nearest}
-
-
-def _placed(tree: Tree, node: bpy.types.Node) -> np.ndarray:
-    """Return the transform of texture coordinates that Mapping nodes before a texture make."""
-    matrix, source = np.eye(3), _source(node.inputs["Vector"])
-    while source is not None and source.type == "MAPPING":
-        turn = list(source.inputs["Rotation"].default_value)[2]
-        scale = list(source.inputs["Scale"].default_value)[:2]
-        move = list(source.inputs["Location"].default_value)[:2]
-        cosine, sine = math.cos(turn), math.sin(turn)
-        step = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]]) @ np.diag(
-            [*scale, 1.0]
-        )
-        step[:2, 2] = move
-        matrix, source = matrix @ step, _source(source.inputs["Vector"])
-    if source is not None and source.type not in ("TEX_COORD", "UVMAP"):
-        tree.tell(
-            f"{source.bl_label} before an image is not read; its own coordinates stand for it"
-        )
-    return matrix
-
-
-def _checker(tree: Tree, node: bpy.types.Node, output: str) -> Any:
-    scale = tree.number(node, "Scale", 5.0)
-    size = scale if isinstance(scale, float) else 5.0
-    tree.tell("Checker Texture follows texture coordinates")
-    return {
-        "type": "checkerboard", "color0": tree.color(node, "Color1"),
-        "color1": tree.color(node, "Color2"),
-        "to_uv": (np.diag([size / 2.0, size / 2.0, 1.0]) @ _placed(tree, node)).tolist(),
-    }  # fmt: skip
-
-
-def _constant_color(tree: Tree, node: bpy.types.Node, output: str) -> Any:
-    return list(node.outputs[0].default_value)[:3]
-
-
-def _constant(tree: Tree, node: bpy.types.Node, output: str) -> Any:
-    return float(node.outputs[0].default_value)
-
-
-def _mix_colors(tree: Tree, node: bpy.types.Node, output: str) -> Any:
-    """Return a mixture; of the blend types Mix and Multiply."""
-    old = node.type == "MIX_RGB"
-    if not old and node.data_type not in ("RGBA", "FLOAT"):
-        tree.tell("Mix of vectors is not read")
-        return None
-    wide = old or node.data_type == "RGBA"
-    sockets = [socket for socket in node.inputs if socket.enabled]
-    names = {socket.name: socket for socket in sockets}
-    share = _input(tree, names.get("Factor") or names.get("Fac") or sockets[0], wide=False)
-    ends = [names.get(new) or names[former] for new, former in (("A", "Color1"), ("B", "Color2"))]
-    first, second = (_input(tree, end, wide=wide) for end in ends)
-    blend = node.blend_type if wide else "MIX"
-    if blend == "MULTIPLY":
-        second = {"type": "product", "first": first, "second": second}
-    elif blend != "MIX":
-        tree.tell(f"Mix of the blend type {blend.title()} is read as Mix")
-    return {"type": "mix", "first": first, "second": second, "amount": share}
-
-
-def _input(tree: Tree, socket: Any, *, wide: bool) -> Any:
-    source = _source(socket)
-    texture = None if source is None else tree.texture(source, socket, wide=wide)
-    if texture is not None:
-        return texture
-    value = socket.default_value
-    numbers = [float(value)] if isinstance(value, (int, float)) else list(value)[:3]
-    return (numbers * 3)[:3] if wide else float(np.mean(numbers))
-
-
-TEXTURES: dict[str, Callable[[Tree, bpy.types.Node, str], Any]] = {
-    "TEX_IMAGE": _image,
-    "TEX_CHECKER": _checker,
-    "RGB": _constant_color,
-    "VALUE": _constant,
-    "MIX": _mix_colors,
-    "MIX_RGB": _mix_colors,
-}
+SHADERS: dict[str, Callable[[Tree, Site], tuple[Json, Any]]] = {
+    "BSDF_PRINCIPLED": _principled, "BSDF_DIFFUSE": _diffuse, "BSDF_GLOSSY": _glossy,
+    "BSDF_METALLIC": _metallic, "BSDF_GLASS": _glass, "BSDF_REFRACTION": _glass,
+    "BSDF_TRANSLUCENT": _translucent, "BSDF_TRANSPARENT": _transparent, "BSDF_SHEEN": _sheen,
+    "BSDF_HAIR": _hair, "BSDF_HAIR_PRINCIPLED": _hair, "BSDF_TOON": _toon, "EMISSION": _emission,
+    "BACKGROUND": _emission, "SUBSURFACE_SCATTERING": _subsurface, "HOLDOUT": _holdout,
+    "BSDF_RAY_PORTAL": _holdout, "MIX_SHADER": _mix, "ADD_SHADER": _add,
+}  # fmt: skip

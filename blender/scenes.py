@@ -8,25 +8,37 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
-from . import meshes
-from .nodes import Json, Tree, _source
+from . import meshes, volumes
+from .graphs import Json, Site, jenkins, origin
+from .nodes import Tree
 
 SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 TO_CLPT = Matrix.Diagonal((-1.0, 1.0, -1.0, 1.0))  # cameras and lamps look along +z there
 # A dome of clpt has +y up and +z in its middle; of Blender +z up and +x in its middle.
 DOME = [[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+LINEAR = ("Non-Color", "Linear Rec.709", "Raw", "Linear")  # spaces without a curve
+READ = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".tga", ".bmp", ".webp")  # files that clpt reads
 SILENT = {"CAMERA", "EMPTY", "ARMATURE", "LATTICE", "LIGHT_PROBE", "SPEAKER"}
 
 CAMERA = ("", "", ())  # the key of the camera
 
 Key = tuple[str, str, tuple[int, ...]]  # of an instance, at all times
 Pose = tuple[float, dict[Key, Matrix]]
+
+
+class Made(NamedTuple):
+    """A material that is written: its name, light, what it reads of meshes, and what is inside."""
+
+    name: str
+    radiance: Any
+    attributes: frozenset[int]
+    interior: str
 
 
 class Writer:
@@ -46,8 +58,11 @@ class Writer:
         self.tree = Tree(self.image, self.tell)
         self.images: dict[str, Json | None] = {}
         self.numbers = itertools.count()  # of files
-        self.materials: dict[str, tuple[str, Any]] = {}
+        self.materials: dict[str, Made] = {}
+        self.personal: set[str] = set()  # materials that are others for each object
         self.named: dict[str, Json] = {}
+        self.media: dict[str, Json] = {}
+        self.origins: dict[str, meshes.Rows] = {}
         self.groups: dict[str, list[Json]] = {}
 
     def tell(self, text: str) -> None:
@@ -63,25 +78,33 @@ class Writer:
         """Write meshes and images; return the scene that names their files."""
         shapes: list[Json] = []
         lights: list[Json] = []
-        parts: dict[int, list[Json]] = {}
-        places: dict[int, list[tuple[Key, Matrix]]] = {}
+        parts: dict[Any, list[Json]] = {}
+        places: dict[Any, list[tuple[Key, Matrix]]] = {}
         for instance in self.depsgraph.object_instances:
+            source, matrix = instance.object, instance.matrix_world.copy()  # gone after its turn
+            if instance.show_particles and not instance.is_instance:
+                shapes += self._particles(source)
             if not instance.show_self:
                 continue
-            source = instance.object  # it is gone after its turn
             if source.type in SURFACES or source.type == "CURVES":
-                key = source.data.as_pointer()
+                self.tree.random = _random(instance)
+                made = [self._material(slot, source) for slot in _slots(source)]
+                key = (source.data.as_pointer(), *(m.name for m in made))
                 if key not in parts:
                     parts[key] = self._parts(len(parts), source)
-                placed = _key(instance), instance.matrix_world.copy()
-                places.setdefault(key, []).append(placed)
+                places.setdefault(key, []).append((_key(instance), matrix))
             elif source.type == "LIGHT":
-                self._lamp(source, instance.matrix_world.copy(), lights, shapes)
+                self._lamp(source, matrix, lights, shapes)
+            elif source.type == "VOLUME":
+                shapes += self._volume(source, matrix)
             elif source.type not in SILENT:
                 self.tell(f"objects of the type {source.type.title()} are left out")
         lights += self._world()
         camera = self._camera()
-        poses = self._poses()
+        deforming = {
+            rows[0][0]: parts[key] for key, rows in places.items() if len(rows) == 1
+        }  # fmt: skip
+        poses = self._poses(deforming)
         for key, placed in places.items():
             shapes += self._placed(parts[key], [_moved(row, poses) for row in placed])
         if poses and self.depsgraph.scene.camera is not None:
@@ -95,15 +118,17 @@ class Writer:
                 "alpha": self.depsgraph.scene.render.film_transparent,
             },
             "materials": self.named,
+            "media": self.media,
             "groups": self.groups,
             "shapes": shapes,
             "lights": lights,
         }
 
-    def _poses(self) -> list[Pose]:
+    def _poses(self, parts: dict[Key, list[Json]]) -> list[Pose]:
         """Return when the shutter is open [s], and where all is then; nothing without motion blur.
 
-        The frame of the scene is set to these times, and back.
+        The frame of the scene is set to these times, and back. Parts whose meshes change meanwhile
+        get a deformation.
         """
         scene, frames = self.depsgraph.scene, self.depsgraph.scene.render
         length = frames.motion_blur_shutter
@@ -112,16 +137,42 @@ class Writer:
         start = {"START": 0.0, "CENTER": -0.5, "END": -1.0}[frames.motion_blur_position] * length
         rate = frames.fps / frames.fps_base
         present, poses = scene.frame_current_final, []
+        seen: dict[Key, list[tuple[float, np.ndarray, np.ndarray]]] = {}
         for share in (0.0, 0.5, 1.0):
             frame = present + start + share * length
             self.set_frame(math.floor(frame), subframe=frame - math.floor(frame))
-            places = {_key(i): i.matrix_world.copy() for i in self.depsgraph.object_instances}
+            places = {}
+            for instance in self.depsgraph.object_instances:
+                key, source = _key(instance), instance.object
+                places[key] = instance.matrix_world.copy()
+                if key in parts and _deforms(source):
+                    shape = meshes.positions(source.data), meshes.normals(source.data)
+                    seen.setdefault(key, []).append((share * length / rate, *shape))
             camera = scene.camera
             if camera is not None:
                 places[CAMERA] = camera.evaluated_get(self.depsgraph).matrix_world.copy()
             poses.append((share * length / rate, places))
         self.set_frame(math.floor(present), subframe=present - math.floor(present))
+        for key, keys in seen.items():
+            for part in parts[key]:
+                self._deform(part, keys)
         return poses
+
+    def _deform(self, part: Json, keys: list[tuple[float, np.ndarray, np.ndarray]]) -> None:
+        """Let a part move as the vertices and the normals of its mesh, (n, 3) at times."""
+        rows, first = self.origins.get(part["file"]), keys[0]
+        if rows is None or all(np.array_equal(points, first[1]) for _, points, _ in keys):
+            return
+        if any(k[1].shape != first[1].shape or k[2].shape != first[2].shape for k in keys):
+            self.tell(f"{part['name']} gets other vertices while the shutter is open: it is still")
+            return
+        normals = (
+            {"normals": np.stack([n[rows.corners] for _, _, n in keys])} if rows.smooth else {}
+        )
+        file = self.folder / f"{part['file']}.npz"
+        points = np.stack([points[rows.vertices] for _, points, _ in keys])
+        np.savez(file, times=np.array([time for time, _, _ in keys]), points=points, **normals)
+        part["deformation"] = {"file": file.name}
 
     def _moved_camera(self, poses: list[Pose]) -> Json:
         matrix = self.depsgraph.scene.camera.evaluated_get(self.depsgraph).matrix_world.copy()
@@ -140,52 +191,125 @@ class Writer:
 
     def _parts(self, number: int, source: Any) -> list[Json]:
         """Return the shapes of an object in its own space, one for each material."""
-        files = self._files(number, source)
-        slots = [slot.material for slot in source.material_slots] or list(source.data.materials)
-        parts = [self._part(file, slots, slot, source.name) for slot, file in files.items()]
+        files, slots = self._files(number, source), _slots(source)
+        parts = [self._part(file, slots, slot, source) for slot, file in files.items()]
         if source.type == "CURVES":
             return [{**part, "type": "curves", "basis": "bezier"} for part in parts]
         return parts
+
+    def wanted(self, source: Any) -> meshes.Wanted:
+        """Return the attributes that an object's materials read, by their numbers."""
+        used = {n for slot in _slots(source) for n in self._material(slot, source).attributes}
+        return {n: key for key, n in self.tree.attributes.items() if n in used}
+
+    def _particles(self, source: Any) -> list[Json]:
+        """Return the hair of an object's particle systems, in the world."""
+        found = []
+        for system in source.particle_systems:
+            settings = system.settings
+            if settings.type != "HAIR" or settings.render_type != "PATH":
+                continue
+            file = f"particles{next(self.numbers)}.txt"
+            strands = meshes.particle_strands(source, system)
+            if meshes.write_strands(*strands, self.folder / file):
+                part = self._part(file, _slots(source), settings.material - 1, source)
+                found.append({**part, "type": "curves", "basis": "bezier"})
+        return found
+
+    def _volume(self, source: Any, matrix: Matrix) -> list[Json]:
+        """Return the box of a volume object, whose inside is the grid of its file."""
+        grids = source.data.grids
+        grids.load()
+        path, slots = Path(bpy.path.abspath(grids.frame_filepath)), _slots(source)
+        output = None if not slots else slots[0].node_tree.get_output_node("CYCLES")
+        if not path.is_file() or output is None:
+            self.tell(f"the volume {source.name!r} has no file or no material: it is left out")
+            return []
+        medium = volumes.medium(self.tree, output, file=str(path))
+        if medium is None:
+            return []
+        low, high = (np.array(source.bound_box)[i] for i in (0, 6))
+        box = (
+            matrix
+            @ Matrix.Translation(0.5 * (low + high))
+            @ Matrix.Diagonal((*(0.505 * (high - low)), 1.0))
+        )
+        self.media[source.name_full] = {**medium, "to_world": [list(row) for row in matrix]}
+        return [{
+            "type": "cube", "material": {"type": "null"}, "name": source.name,
+            "interior": source.name_full, "to_world": [list(row) for row in box],
+        }]  # fmt: skip
 
     def _files(self, number: int, source: Any) -> dict[int, str]:
         """Write the geometry of an object; return the file of each of its material slots."""
         if source.type == "CURVES":
             file = f"hair{number}.txt"
-            return {0: file} if meshes.write_strands(source.data, self.folder / file) else {}
+            strands = meshes.strands(source.data)
+            return {0: file} if meshes.write_strands(*strands, self.folder / file) else {}
         as_mesh = isinstance(source.data, bpy.types.Mesh) and not source.data.is_editmode
         try:
             mesh = source.data if as_mesh else source.to_mesh()
         except RuntimeError:  # such as curves without a surface
             return {}
-        files = meshes.write(mesh, self.folder, f"mesh{number}")
+        wanted, matrix = self.wanted(source), source.matrix_world
+        files = meshes.write(mesh, self.folder, f"mesh{number}", wanted, matrix, self.origins)
         if not as_mesh:
             source.to_mesh_clear()
         return files
 
-    def _part(self, file: str, slots: list[Any], slot: int, name: str) -> Json:
-        material = slots[slot] if slot < len(slots) else None
+    def _material(self, material: Any, source: Any) -> Made:
+        """Return a material as an object has it."""
         key = "none" if material is None else material.name_full
-        if key not in self.materials:
-            described, radiance = self.tree.material(material)
-            self.named[key] = described
-            self.materials[key] = key, radiance
-        named, radiance = self.materials[key]
-        part: Json = {"type": "mesh", "file": file, "material": named, "name": name}
-        if radiance is not None:
-            part["emission"] = {"type": "area", "radiance": radiance, "two_sided": True}
+        own = f"{key} of {source.name_full}"
+        found = self.materials.get(own if key in self.personal else key)
+        if found is not None:
+            return found
+        tree = self.tree
+        tree.used, tree.object, tree.personal = set(), source, False
+        described, radiance = tree.material(material)
+        if tree.personal:
+            self.personal.add(key)
+        key, interior = own if tree.personal else key, ""
+        nodes = None if material is None else material.node_tree
+        output = None if nodes is None else nodes.get_output_node("CYCLES")
+        medium = None if output is None else volumes.medium(tree, output)
+        if medium is not None:
+            self.media[key], interior = medium, key
+        self.named[key] = described
+        self.materials[key] = made = Made(key, radiance, frozenset(tree.used), interior)
+        return made
+
+    def _part(self, file: str, slots: list[Any], slot: int, source: Any) -> Json:
+        made = self._material(slots[min(slot, len(slots) - 1)] if slots else None, source)
+        part: Json = {"type": "mesh", "file": file, "material": made.name, "name": source.name}
+        if made.interior:
+            part["interior"] = made.interior
+        if made.radiance is not None:
+            part["emission"] = {"type": "area", "radiance": made.radiance, "two_sided": True}
         return part
 
-    def image(self, image: bpy.types.Image) -> Json | None:
-        """Return an image as a bitmap; its file as it is, or what Blender has in memory."""
-        key = image.name_full
+    def image(self, node: bpy.types.Node) -> Json | None:
+        """Return a node's image as a bitmap; its file as it is, or what Blender has in memory."""
+        image = node.image
+        path = bpy.path.abspath(image.filepath_from_user(image_user=node.image_user),
+                                library=image.library)  # fmt: skip
+        key = f"{image.name_full} {path}"
         if key not in self.images:
-            self.images[key] = self._image(image)
-        return self.images[key]
+            self.images[key] = self._image(image, Path(path))
+        found = self.images[key]
+        return None if found is None else {**found}
 
-    def _image(self, image: bpy.types.Image) -> Json | None:
-        data = image.colorspace_settings.name == "Non-Color"
-        path = Path(bpy.path.abspath(image.filepath, library=image.library))
-        if image.source == "FILE" and not image.packed_file and path.is_file():
+    def _image(self, image: bpy.types.Image, path: Path) -> Json | None:
+        space = image.colorspace_settings.name
+        data = space in LINEAR
+        if space not in (*LINEAR, "sRGB"):
+            self.tell(f"image {image.name!r}: its color space {space} is read as sRGB")
+        if image.source == "TILED":
+            self.tell(f"image {image.name!r}: of its tiles the first one is read")
+        plain = image.source in ("FILE", "SEQUENCE") and not image.is_dirty
+        straight = not image.is_float or data
+        known = not image.packed_file and path.suffix.lower() in READ and path.is_file()
+        if plain and straight and known:
             return {"type": "bitmap", "image": str(path), "raw": data}
         width, height = image.size
         if width * height == 0:
@@ -194,7 +318,7 @@ class Writer:
         pixels = np.empty(width * height * 4, np.float32)
         image.pixels.foreach_get(pixels)
         pixels = pixels.reshape(height, width, 4)[::-1]
-        if not (image.is_float or data):
+        if not data:
             pixels = np.concatenate([_linear(pixels[..., :3]), pixels[..., 3:]], axis=2)
         file = self.folder / f"image{next(self.numbers)}.npy"
         np.save(file, np.ascontiguousarray(pixels))
@@ -278,21 +402,23 @@ class Writer:
         if not world.use_nodes or world.node_tree is None:
             return [{"type": "constant", "radiance": list(world.color)}]
         output = world.node_tree.get_output_node("CYCLES")
-        source = None if output is None else _source(output.inputs["Surface"])
-        if source is None or source.type != "BACKGROUND":
-            if source is not None:
-                self.tell(f"{source.bl_label} of the world is not read: it is dark")
+        site = None if output is None else origin((), output.inputs["Surface"])[0]
+        if site is None or site.node.type not in ("BACKGROUND", "EMISSION"):
+            if site is not None:
+                self.tell(f"{site.node.bl_label} of the world is not read: it is dark")
             return []
-        strength = self.tree.number(source, "Strength", 1.0)
-        strength = strength if isinstance(strength, float) else 1.0
-        texture = _source(source.inputs["Color"])
-        if texture is None or texture.type != "TEX_ENVIRONMENT" or texture.image is None:
-            if texture is not None:
-                self.tell(f"{texture.bl_label} of the world is not read; its color stands for it")
-            color = list(source.inputs["Color"].default_value)[:3]
-            radiance = [c * strength for c in color]
-            return [{"type": "constant", "radiance": radiance}] if any(radiance) else []
-        return [self._dome(texture, strength)]
+        self.tree.surface = False
+        strength = self.tree.single(site, "Strength", 1.0)
+        texture, _ = origin(site.groups, site.node.inputs["Color"])
+        kind = "" if texture is None else texture.node.type
+        if kind == "TEX_ENVIRONMENT" and texture.node.image is not None:
+            return [self._dome(texture, strength)]
+        radiance = self.tree.light(site, "Color", "Strength")
+        self.tree.surface = True
+        if isinstance(radiance, dict):
+            self.tell("a pattern of the world is not read; its color stands for it")
+            radiance = [c * strength for c in list(site.node.inputs["Color"].default_value)[:3]]
+        return [] if radiance is None else [{"type": "constant", "radiance": radiance}]
 
     def _sky(self, sky: Any) -> Json:
         return {
@@ -302,11 +428,14 @@ class Writer:
             "sun_scale": sky.strength, "to_world": DOME,
         }  # fmt: skip
 
-    def _dome(self, texture: Any, strength: float) -> Json:
-        bitmap = self.image(texture.image) or {"image": ""}
-        turn, source = Matrix.Identity(4), _source(texture.inputs["Vector"])
-        if source is not None and source.type == "MAPPING":
-            angles = list(source.inputs["Rotation"].default_value)
+    def _dome(self, texture: Site, strength: float) -> Json:
+        bitmap = self.image(texture.node) or {"image": ""}
+        turn, (source, _) = (
+            Matrix.Identity(4),
+            origin(texture.groups, texture.node.inputs["Vector"]),
+        )
+        if source is not None and source.node.type == "MAPPING":
+            angles = list(source.node.inputs["Rotation"].default_value)
             turn = Matrix.Rotation(angles[2], 4, "Z")
         place = turn.inverted() @ Matrix(DOME)
         return {
@@ -352,6 +481,29 @@ def lens(camera: bpy.types.Camera, matrix: Matrix) -> Json:
         focus = (camera.dof.focus_object.matrix_world.translation - matrix.translation).length
     radius = 0.5e-3 * camera.lens / camera.dof.aperture_fstop
     return {"type": "thin_lens", "aperture_radius": radius, "focus_distance": focus}
+
+
+def _slots(source: Any) -> list[Any]:
+    """Return the materials of an object's slots."""
+    return [slot.material for slot in source.material_slots] or list(source.data.materials)
+
+
+def _random(instance: bpy.types.DepsgraphObjectInstance) -> float:
+    """Return the random number of an instance, or of an object by its name, as Cycles has it."""
+    if instance.is_instance:
+        return (instance.random_id & 0xFFFFFFFF) / 0xFFFFFFFF
+    number = 0
+    for letter in instance.object.name.encode():
+        number = (number * 37 + letter) & 0xFFFFFFFF
+    return jenkins(number, 0)
+
+
+def _deforms(source: Any) -> bool:
+    """Return whether a mesh may change with time."""
+    if source.type != "MESH" or not len(source.data.vertices):
+        return False
+    keys = source.original.data.shape_keys
+    return bool(source.modifiers) or keys is not None or source.parent_type == "ARMATURE"
 
 
 def _key(instance: bpy.types.DepsgraphObjectInstance) -> Key:

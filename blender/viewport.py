@@ -17,7 +17,7 @@ from . import preferences, process, scenes
 from .nodes import Json
 
 LISTENS_EVERY = 0.02  # [s]
-Key = tuple[int, int]  # of an object, and of its evaluated geometry
+Key = tuple[int, ...]  # of an object, its evaluated geometry, and what its materials read
 
 
 class LiveWriter(scenes.Writer):
@@ -31,7 +31,7 @@ class LiveWriter(scenes.Writer):
     def again(self, depsgraph: bpy.types.Depsgraph) -> Json:
         """Return the description of the scene as it is now."""
         self.depsgraph = depsgraph
-        self.materials, self.named, self.groups = {}, {}, {}
+        self.materials, self.named, self.groups, self.media = {}, {}, {}, {}
         self.used = set()
         changed = set()
         for update in depsgraph.updates:
@@ -56,13 +56,13 @@ class LiveWriter(scenes.Writer):
                 (self.folder / file).unlink(missing_ok=True)
 
     def _files(self, number: int, source: Any) -> dict[int, str]:
-        key = source.original.session_uid, source.data.as_pointer()
+        key = (source.original.session_uid, source.data.as_pointer(), *self.wanted(source))
         if key not in self.kept:
             self.kept[key] = super()._files(next(self.numbers), source)
         self.used.add(key)
         return self.kept[key]
 
-    def _poses(self) -> list[scenes.Pose]:
+    def _poses(self, parts: Any) -> list[scenes.Pose]:
         return []  # to set the frame would change what is shown
 
     def _camera(self) -> Json:
