@@ -15,8 +15,8 @@ from clpt.errors import SceneError, UnknownKindError
 from clpt.instruments import QUANTITIES, measure, photometer
 from clpt.scene import Film, Scene, cameras, lights, materials, media, shapes
 from clpt.scene.integrators import Box, Path
-from clpt.spectra import Constant
-from clpt.spectra.emission import UNIT_LUMINANCE
+from clpt.spectra import Blackbody, Constant, Tabulated
+from clpt.spectra.emission import LIGHT, PLANCK, UNIT_LUMINANCE
 
 DOWN = tf.rotate([1, 0, 0], 90)
 EVEN = Constant(1.0)  # W m^-2 sr^-1 nm^-1 at each wavelength
@@ -95,6 +95,23 @@ def test_photons_of_an_even_spectrum():
     lambdas = np.linspace(400.5, 699.5, 300) * 1e-9
     expected = 1e6 * (lambdas / (6.62607015e-34 * 299792458.0 * 6.02214076e23)).sum()
     agrees(measure(lit, "photon_flux_density", [0, 0, 0], samples=1024), expected)
+
+
+def test_infrared_of_satellites():
+    """Sentinel-2's band 12: a black body over a leaf whose table ends at 2500 nm."""
+    low, high, kelvin = 2100.0, 2280.0, 2856.0
+    leaf = materials.Diffuse(reflectance=Tabulated((400.0, 2000.0, 2500.0), (0.05, 0.4, 0.1)))
+    floor = shapes.Rectangle(to_world=tf.rotate([1, 0, 0], -90) @ tf.scale(50.0), material=leaf)
+    sky = lights.Constant(radiance=Blackbody(kelvin, scale=1e-3))
+    lit = dataclasses.replace(
+        scene(floor, lamps=(sky,)), film=Film(size=(8, 8), lambda_min=low, lambda_max=high)
+    )
+    lambdas = np.linspace(low, high, 1801) * 1e-9
+    planck = 2.0 * PLANCK * LIGHT**2 / lambdas**5 * 1e-9
+    planck /= np.expm1(PLANCK * LIGHT / (lambdas * 1.380649e-23 * kelvin))
+    share = np.interp(lambdas * 1e9, [2000.0, 2500.0], [0.4, 0.1])
+    measured = measure(lit, "radiance", [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], samples=4096)
+    agrees(measured, 1e-3 * (planck * share).mean() * (high - low))
 
 
 def test_rays():
