@@ -144,6 +144,18 @@ def test_a_matt_room_of_white_light():
     agrees(measure(room, "scalar_irradiance", at, samples=2048), RANGE * 8.0 * math.pi)
 
 
+def test_points_within_surfaces_and_on_them():
+    """Inside of a body it is dark; a point of a wall sees what is before the wall."""
+    body = shapes.Cube(to_world=tf.scale(0.2), material=materials.Diffuse(reflectance=0.0))
+    at = [[0.0, 0.0, 0.0], [0.0, 0.2, 0.0], [0.2, 0.0, 0.0]]
+    normals = [[0, 1, 0], [0, 1, 0], [-1, 0, 0]]
+    measured = measure(scene(square(), body), "irradiance", at, normals)
+    top = 4.0 * below_corner(0.5 / 0.8, 0.5 / 0.8)
+    assert not measured.values[[0, 2]].any()
+    agrees(measure(scene(square(), body), "irradiance", at[1:2]), RANGE * top)
+    assert not measure(scene(square(), body), "scalar_irradiance", at[:1]).values.any()
+
+
 def test_an_error_that_is_asked_for_ends_it():
     lit = scene(square())
     at = [[0.0, 0.0, 0.0], [1.0, 0.0, 1.0]]
