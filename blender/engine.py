@@ -67,10 +67,18 @@ class ClptEngine(bpy.types.RenderEngine):
             try:
                 self._write_and_run(depsgraph, Path(folder))
             except ProcessError as error:
-                self.report({"ERROR"}, f"clpt: {error}")
+                self.tell(str(error), "ERROR")
             except Exception as error:  # a fault of the add-on is a line, and Blender goes on
                 traceback.print_exc()
-                self.report({"ERROR"}, f"clpt: {type(error).__name__}: {error}")
+                self.tell(f"{type(error).__name__}: {error}", "ERROR")
+
+    def is_cancelled(self) -> bool:
+        """Return whether somebody wants no more of this picture."""
+        return self.test_break()
+
+    def tell(self, line: str, kind: str = "WARNING") -> None:
+        """Tell people a line."""
+        self.report({kind}, f"clpt: {line}")
 
     def _write_and_run(self, depsgraph: bpy.types.Depsgraph, folder: Path) -> None:
         scene, shown = depsgraph.scene, depsgraph.view_layer
@@ -81,7 +89,7 @@ class ClptEngine(bpy.types.RenderEngine):
         writer = scenes.Writer(depsgraph, folder, width, height, self.frame_set)
         order = {"file": str(writer.write()), "width": width, "height": height}
         for line in writer.told:
-            self.report({"WARNING"}, f"clpt: {line}")
+            self.tell(line)
         passes = [] if self.is_preview else _passes(shown)
         for name, _, channels, _ in passes:
             self.add_pass(name, len(channels), channels, layer=shown.name)
@@ -105,7 +113,7 @@ class ClptEngine(bpy.types.RenderEngine):
             process.send(order)
             asked = False
             while not done:
-                if self.test_break() and not asked:
+                if not asked and self.is_cancelled():
                     process.send({"stop": True})
                     asked = True
                 received = process.receive(WAIT)
@@ -116,7 +124,7 @@ class ClptEngine(bpy.types.RenderEngine):
                 self.update_progress(samples / order["samples"])
                 self.update_stats("", f"clpt: sample {samples} of {order['samples']}")
                 for line in message.get("warnings", ()):
-                    self.report({"WARNING"}, f"clpt: {line}")
+                    self.tell(line)
                 if pictures:
                     layers = dict(zip(("", *order["layers"]), pictures, strict=False))
                     self._show(layers, size, passes if len(pictures) > 1 else [], layer)
@@ -150,7 +158,7 @@ def _passes(layer: bpy.types.ViewLayer) -> list[Pass]:
     levels = (min(layer.pass_cryptomatte_depth, 2 * LEVELS) + 1) // 2
     for source, (option, name) in MATTES.items():
         if getattr(layer, option):
-            passes += [(f"{name}{i:02d}", source, "RGBA", "COLOR") for i in range(levels)]
+            passes += [(f"{name}{i:02d}", source, "rgba", "COLOR") for i in range(levels)]
     return passes
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from queue import Empty
 from typing import TYPE_CHECKING, Any
 
+import bake
 import numpy as np
 import rendering
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 DIVIDERS = (1, 2, 4, 8)  # of pictures while something moves
 SLOW, FAST = 0.08, 0.02  # [s] of such a picture: the next ones are coarser, or finer
 CANCEL_SECONDS = 0.05  # a pass ends within them when something moves
+REST = 0.1  # [s] without a change until the whole picture begins
 WAIT = 0.01  # [s] between looks whether a picture was taken
 SHARE = 0.1  # of the time, for sending pictures that get better
 PLACE = "to_world"
@@ -42,6 +44,7 @@ class Parts:
         needed: dict[tuple[str, ...], Any] = {}
         self._read(described, needed)
         dressed: dict[tuple[str, ...], Any] = {}
+        media = described["media"]
 
         def once(key: tuple[str, ...], make: Any) -> Any:
             if key not in dressed:
@@ -51,7 +54,7 @@ class Parts:
         def dress(entry: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
             """Return the shape with its material and light, in its own space, and its key."""
             bare, name, glow = _bare(entry), entry.get("material"), entry.get("emission")
-            keys = [_key("shape", bare)]
+            keys = [_key("shape", [bare, media.get(bare.get("interior"))])]
             changes: dict[str, Any] = {}
             if name is not None:
                 keys.append(_key("material", [name, described["materials"][name]]))
@@ -98,9 +101,12 @@ class Parts:
         """Bring the materials, shapes and lights of a description, which are known or read."""
         entries = [*described["shapes"], *(e for g in described["groups"].values() for e in g)]
         entries = [entry for entry in entries if entry["type"] != "instance"]
+        media = described["media"]
         wanted: dict[str, dict[tuple[str, ...], Any]] = {
             "material": {_key("material", [n, m]): n for n, m in described["materials"].items()},
-            "shape": {_key("shape", _bare(entry)): _bare(entry) for entry in entries},
+            "shape": {
+                _key("shape", [e, media.get(e.get("interior"))]): e for e in map(_bare, entries)
+            },
             "light": {_key("light", glow): glow for e in entries if (glow := e.get("emission"))},
             "lamp": {_key("lamp", entry): entry for entry in described["lights"]},
         }  # fmt: skip
@@ -212,6 +218,15 @@ def _edits(former: Scene, scene: Scene) -> dict[str, Any] | None:
     )
 
 
+def _linear(renderer: clpt.Renderer) -> np.ndarray:
+    """Return the picture so far as Blender has it: (h, w, 4) float32, the bottom row first."""
+    if renderer.scene.film.alpha:
+        return rendering.pixels(renderer.image())
+    picture = np.ascontiguousarray(renderer.film.get()[::-1])
+    picture[..., 3] = 1.0
+    return picture
+
+
 def _same(some: list[Any], others: list[Any]) -> bool:
     return len(some) == len(others) and all(a is b for a, b in zip(some, others, strict=True))
 
@@ -278,6 +293,8 @@ class Live:
         if "scene" in changes:
             self.described = {**changes["scene"], "camera": self.described.get("camera")}
             self.settings = changes["scene"]["settings"]
+            lights = bake.lights(self.described["lights"], self.parts.folder)
+            self.described["lights"] = lights
         if "camera" in changes:
             self.described["camera"] = changes["camera"]
         self.size = changes.get("size", self.size)
@@ -311,7 +328,9 @@ class Live:
         if self.scene is None:
             return
         follower = self.moving if self.moves and self.moving.divider > 1 else self.whole
-        if self.moves or self.whole.renderer is None or self.whole.scene is not self.scene:
+        if not self.moves and self.whole.scene is not self.scene and self._hears(REST):
+            return
+        if self.moves or self.whole.scene is not self.scene:
             began, was = time.perf_counter(), follower.renderer
             other = self.whole if follower is self.moving else self.moving
             renderer = follower.follow(self.scene, other.renderer)
@@ -330,6 +349,13 @@ class Live:
         if time.perf_counter() - self.sent > self.cost / SHARE or left <= 0:
             self._send(renderer, 1)
 
+    def _hears(self, seconds: float) -> bool:
+        """Return whether a message comes within some time."""
+        end = time.perf_counter() + seconds
+        while self.link.inbox.empty() and time.perf_counter() < end:
+            time.sleep(0.1 * seconds)
+        return not self.link.inbox.empty()
+
     def _adapt(self, took: float) -> None:
         """Let the next pictures of movement be coarser or finer."""
         place = DIVIDERS.index(self.moving.divider)
@@ -347,7 +373,7 @@ class Live:
             return
         self.link.is_seen = False
         began = time.perf_counter()
-        picture = rendering.pixels(renderer.image())
+        picture = _linear(renderer)
         message = {
             "samples": renderer.samples if divider == 1 else 0, "divider": divider,
             "size": [picture.shape[1], picture.shape[0]], "serial": self.serial,

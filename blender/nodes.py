@@ -12,10 +12,12 @@ from typing import Any
 import bpy
 import numpy as np
 
+from . import measured
 from .graphs import Graph, Json, Site, Value, origin, socket_of
 from .textures import TEXTURES
 
 GREY = [0.8, 0.8, 0.8]
+told: dict[str, list[str]] = {}  # by names of data: what is lost, for the panels
 
 
 class Expression:
@@ -119,7 +121,11 @@ class Tree:
         if material is None:
             return {"type": "diffuse", "reflectance": GREY}, None
         if material.clpt.kind != "NODES":
-            return named(material.clpt), None
+            try:
+                return measured.surface(material.clpt), None
+            except ValueError as error:
+                self.tell(str(error))
+                return {"type": "diffuse", "reflectance": GREY}, None
         if not material.use_nodes or material.node_tree is None:
             return {"type": "diffuse", "reflectance": list(material.diffuse_color)[:3]}, None
         output = material.node_tree.get_output_node("CYCLES")
@@ -199,19 +205,6 @@ class Tree:
             return {"type": "bump_map", "material": material, "height": height, "scale": scale}
         self.tell(f"{node.bl_label} as a normal is not read")
         return material
-
-
-def named(settings: bpy.types.PropertyGroup) -> Json:
-    """Return the glass or the metal that a material's panel names, with its film."""
-    rough = settings.roughness > 0.0
-    facets = {"roughness": settings.roughness} if rough else {}
-    film = {"layers": [{"eta": settings.film_ior, "thickness": settings.film_thickness}]}
-    layers = film if settings.film_thickness > 0.0 else {}
-    if settings.kind == "GLASS":
-        kind = "rough_dielectric" if rough else "dielectric"
-        return {"type": kind, "int_ior": settings.glass, "ext_ior": "air", **facets, **layers}
-    kind = "rough_conductor" if rough else "conductor"
-    return _both({"type": kind, "metal": settings.metal, **facets, **layers})
 
 
 def _positive(value: Any) -> Any:

@@ -7,6 +7,9 @@ from typing import Any, ClassVar
 
 import bpy
 
+from . import measured
+from .nodes import told
+
 MODES = (
     ("spectral", "Spectral", "Light has wavelengths: dispersion, fluorescence, measured metals"),
     ("rgb", "RGB", "Light has three colors, as in Cycles"),
@@ -15,7 +18,49 @@ SURFACES = (
     ("NODES", "Nodes", "What the material's nodes say"),
     ("GLASS", "Glass", "A measured glass, liquid or crystal; it disperses in spectral mode"),
     ("METAL", "Metal", "A measured metal"),
+    ("GRATING", "Grating", "A metal with grooves along u of the UV map"),
+    ("FLUORESCENT", "Fluorescent", "Paint with a dye that emits at longer wavelengths"),
+    ("SPECTRUM", "Spectrum", "Matte, by the spectrum of its reflectance"),
+    ("MEASURED", "Measured", "A measured surface: .bsdf (Dupuy and Jakob) or .binary (MERL)"),
 )
+FIELDS = {  # which settings matter to a surface
+    "GLASS": ("glass", "roughness", "absorption", "film_thickness", "film_ior"),
+    "METAL": ("metal", "roughness", "film_thickness", "film_ior"),
+    "GRATING": ("metal", "period", "angle", "depth"),
+    "FLUORESCENT": ("spectrum", "absorbed", "strength", "emitted", "quantum_yield"),
+    "SPECTRUM": ("spectrum",), "MEASURED": ("file",),
+}  # fmt: skip
+SENSORS = (
+    ("cie1931", "CIE 1931", "The eye, 2 degrees"), ("cie1964", "CIE 1964", "The eye, 10 degrees"),
+    ("FILE", "File", "Three curves of a camera, columns of a file"),
+)  # fmt: skip
+TYPED = "Typed, 400:0.1 700:0.6; or a file of columns, nm and values"
+
+
+def _tag(group: Any, context: Any) -> None:
+    """Let viewports know that a setting has changed."""
+    group.id_data.update_tag()
+
+
+def _named(name: str, names: tuple[str, ...], default: str = "", text: str = "") -> Any:
+    """Return a text that may be any of the names, which are offered."""
+    return bpy.props.StringProperty(
+        name=name, default=default, description=text, search=lambda self, context, edit: [
+            found for found in names if edit.lower() in found.lower()
+        ], search_options={"SUGGESTION"}, update=_tag,
+    )  # fmt: skip
+
+
+def _number(name: str, default: float, least: float, most: float, text: str = "") -> Any:
+    return bpy.props.FloatProperty(
+        name=name,
+        default=default,
+        min=least,
+        max=most,
+        description=text,
+        precision=3,
+        update=_tag,
+    )
 
 
 class ClptSettings(bpy.types.PropertyGroup):
@@ -39,64 +84,103 @@ class ClptSettings(bpy.types.PropertyGroup):
         name="Viewport Samples", description="Paths of each pixel there", default=256, min=1,
         max=1 << 20,
     )  # fmt: skip
+    sensor: bpy.props.EnumProperty(name="Sensor", items=SENSORS)
+    sensor_file: bpy.props.StringProperty(name="Sensor File", subtype="FILE_PATH")
+    white_balance: _named(
+        "White Balance", measured.LAMPS, "", "A standard or 4000 K becomes white; empty: none"
+    )
 
 
 class ClptMaterial(bpy.types.PropertyGroup):
     """A surface by its substance, in place of the nodes."""
 
     kind: bpy.props.EnumProperty(
-        name="Surface", items=SURFACES, description="What the surface is made of"
+        update=_tag, name="Surface", items=SURFACES, description="What the surface is made of"
     )
-    glass: bpy.props.StringProperty(
-        name="Glass",
-        default="n-bk7",
-        description="A glass, a liquid or a crystal: n-bk7, n-sf11, water, diamond, sapphire, ...",
+    glass: _named("Glass", measured.GLASSES, "n-bk7", "A glass, a liquid or a crystal")
+    metal: _named("Metal", measured.METALS, "gold", "Its measured index counts")
+    roughness: _number("Roughness", 0.0, 0.0, 1.0)
+    absorption: bpy.props.StringProperty(
+        update=_tag, name="Absorption", description=f"[1/m] {TYPED}"
     )
-    metal: bpy.props.StringProperty(
-        name="Metal", default="gold", description="Its measured index: gold, copper, silver, W, ..."
+    film_thickness: _number("Film", 0.0, 0.0, 1e5, "Thickness of a thin film [nm]; 0: none")
+    film_ior: _number("Film IOR", 1.33, 1.0, 4.0)
+    period: _number("Period", 1600.0, 100.0, 1e5, "From groove to groove [nm]")
+    depth: _number("Depth", 150.0, 0.0, 1000.0, "Of a groove [nm]")
+    angle: bpy.props.FloatProperty(
+        update=_tag, name="Angle", subtype="ANGLE", description="From u to v"
     )
-    roughness: bpy.props.FloatProperty(name="Roughness", min=0.0, max=1.0)
-    film_thickness: bpy.props.FloatProperty(
-        name="Film", description="Thickness of a thin film on it [nm]; 0: none", min=0.0, max=1e5
+    spectrum: bpy.props.StringProperty(
+        update=_tag, name="Reflectance", description=f"A number; {TYPED}"
     )
-    film_ior: bpy.props.FloatProperty(name="Film IOR", default=1.33, min=1.0, max=4.0)
+    absorbed: _number("Absorbed", 450.0, 260.0, 800.0, "Wavelength that the dye takes most of [nm]")
+    strength: _number("Strength", 0.8, 0.0, 1.0, "Share of the light there that it takes")
+    emitted: _number("Emitted", 550.0, 300.0, 850.0, "Wavelength that it emits most of [nm]")
+    quantum_yield: _number("Yield", 0.8, 0.0, 1.0, "Photons that come out of each")
+    file: bpy.props.StringProperty(update=_tag, name="File", subtype="FILE_PATH")
+    use_drops: bpy.props.BoolProperty(
+        update=_tag,
+        name="Drops Inside",
+        description="The inside is a fog of small balls, by Mie's theory",
+    )
+    drops: _named("Of", ("water", *measured.GLASSES), "water", "What the drops are made of")
+    radius: _number("Radius", 8.0, 0.01, 1000.0, "Of drops [micrometres]")
+    spread: _number("Spread", 0.1, 0.001, 2.0, "Standard deviation of the radii's logarithm")
+    share: _number("Share", 0.1, 0.0, 1e6, "Cubic centimetres of drops in a cubic metre")
 
 
 class ClptLamp(bpy.types.PropertyGroup):
     """What a lamp emits, by a standard."""
 
-    spectrum: bpy.props.StringProperty(
-        name="Spectrum",
-        description="A, D65, F1 to F12, HP1 to HP5, LED-B1, sodium, ...; empty: the color's",
-    )
+    spectrum: _named(
+        "Spectrum", measured.LAMPS, "",
+        "A standard, or 3000 K, or typed as 400:0.1 700:0.6, or a file; empty: the color's",
+    )  # fmt: skip
+
+
+class ClptCamera(bpy.types.PropertyGroup):
+    """A lens of glass surfaces, in place of the ideal one."""
+
+    lens: _named("Lens", measured.LENSES, "", "A real lens, or its file; empty: the ideal one")
+
+
+def _turbidity(world: Any) -> float:
+    """Return the turbidity of the haze: Angstrom's coefficient after Preetham 1999."""
+    return (world.haze * 0.55**1.3 + 0.04586) / 0.04608
+
+
+def _set_turbidity(world: Any, value: float) -> None:
+    world.haze = max(0.04608 * value - 0.04586, 0.0) / 0.55**1.3
 
 
 class ClptWorld(bpy.types.PropertyGroup):
     """A clear sky by the physics of air."""
 
-    use_sky: bpy.props.BoolProperty(name="Clear Sky")
+    use_sky: bpy.props.BoolProperty(update=_tag, name="Clear Sky")
     elevation: bpy.props.FloatProperty(
-        name="Sun Elevation", subtype="ANGLE", default=0.6, min=-0.2, max=1.5707
+        update=_tag, name="Sun Elevation", subtype="ANGLE", default=0.6, min=-0.2, max=1.5707
     )
     azimuth: bpy.props.FloatProperty(
+        update=_tag,
         name="Sun Azimuth",
         description="From +X toward +Y",
         subtype="ANGLE",
         min=-6.2831,
         max=6.2831,
     )
-    haze: bpy.props.FloatProperty(
-        name="Haze",
-        description="Optical depth straight up at 550 nm",
-        default=0.1,
-        min=0.0,
-        max=2.0,
+    haze: _number("Haze", 0.1, 0.0, 2.0, "Optical depth straight up at 550 nm")
+    turbidity: bpy.props.FloatProperty(
+        name="Turbidity", description="The same haze as in other skies", min=1.0, max=20.0,
+        get=_turbidity, set=_set_turbidity,
+    )  # fmt: skip
+    ozone: _number("Ozone", 300.0, 0.0, 1000.0, "Column of ozone [Dobson units]")
+    altitude: bpy.props.FloatProperty(
+        update=_tag, name="Altitude", unit="LENGTH", min=0.0, max=60000.0
     )
-    altitude: bpy.props.FloatProperty(name="Altitude", unit="LENGTH", min=0.0, max=60000.0)
     ground: bpy.props.FloatVectorProperty(
-        name="Ground", subtype="COLOR", default=(0.2, 0.2, 0.2), min=0.0, max=1.0
+        update=_tag, name="Ground", subtype="COLOR", default=(0.2, 0.2, 0.2), min=0.0, max=1.0
     )
-    strength: bpy.props.FloatProperty(name="Strength", default=1.0, min=0.0)
+    strength: bpy.props.FloatProperty(update=_tag, name="Strength", default=1.0, min=0.0)
 
 
 class Panel(bpy.types.Panel):
@@ -115,10 +199,17 @@ class Panel(bpy.types.Panel):
     def poll(cls, context: bpy.types.Context) -> bool:
         return context.engine in cls.COMPAT_ENGINES and cls.owner(context) is not None
 
+    @classmethod
+    def shown(cls, settings: Any) -> tuple[str, ...]:
+        return cls.names
+
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
-        for name in self.names:
-            self.layout.prop(self.owner(context).clpt, name)
+        owner = self.owner(context)
+        for name in self.shown(owner.clpt):
+            self.layout.prop(owner.clpt, name)
+        for line in told.get(owner.name_full, ()):
+            self.layout.label(text=line, icon="INFO")
 
 
 class CLPT_PT_sampling(Panel):
@@ -129,16 +220,41 @@ class CLPT_PT_sampling(Panel):
     names = ("mode", "samples", "noise", "denoise", "viewport_samples")
 
 
+class CLPT_PT_film(Panel):
+    """How the film sees wavelengths."""
+
+    bl_label = "Film Response"
+    bl_context = "render"
+    bl_options: ClassVar = {"DEFAULT_CLOSED"}
+    names = ("sensor", "sensor_file", "white_balance")
+
+
 class CLPT_PT_material(Panel):
-    """Measured glasses and metals, and films on them."""
+    """What a surface and its inside are made of, and what its nodes lose."""
 
     bl_label = "Measured Surface"
     bl_context = "material"
-    names = ("kind", "glass", "metal", "roughness", "film_thickness", "film_ior")
 
     @classmethod
     def owner(cls, context: bpy.types.Context) -> Any:
         return context.material
+
+    @classmethod
+    def shown(cls, settings: Any) -> tuple[str, ...]:
+        drops = ("drops", "radius", "spread", "share") if settings.use_drops else ()
+        return ("kind", *FIELDS.get(settings.kind, ()), "use_drops", *drops)
+
+
+class CLPT_PT_camera(Panel):
+    """A real lens."""
+
+    bl_label = "Real Lens"
+    bl_context = "data"
+    names = ("lens",)
+
+    @classmethod
+    def owner(cls, context: bpy.types.Context) -> Any:
+        return context.camera
 
 
 class CLPT_PT_lamp(Panel):
@@ -159,7 +275,8 @@ class CLPT_PT_world(Panel):
     bl_label = "Clear Sky"
     bl_context = "world"
     names = (
-        "use_sky", "elevation", "azimuth", "haze", "altitude", "ground", "strength",
+        "use_sky", "elevation", "azimuth", "turbidity", "haze", "ozone", "altitude", "ground",
+        "strength",
     )  # fmt: skip
 
     @classmethod
@@ -169,8 +286,11 @@ class CLPT_PT_world(Panel):
 
 GROUPS = {
     "Scene": ClptSettings, "Material": ClptMaterial, "Light": ClptLamp, "World": ClptWorld,
+    "Camera": ClptCamera,
 }  # fmt: skip
-PANELS = (CLPT_PT_sampling, CLPT_PT_material, CLPT_PT_lamp, CLPT_PT_world)
+PANELS = (
+    CLPT_PT_sampling, CLPT_PT_film, CLPT_PT_material, CLPT_PT_lamp, CLPT_PT_camera, CLPT_PT_world,
+)  # fmt: skip
 
 
 def register() -> None:

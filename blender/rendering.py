@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import bake
 import live
 import numpy as np
 from worker import Link
@@ -60,6 +61,7 @@ def _render(link: Link, message: dict[str, Any]) -> None:
 
 
 def _scene(message: dict[str, Any]) -> Scene:
+    bake.scene(Path(message["file"]))
     scene = read.load(Path(message["file"]), missing=GREY)
     changes = {name: message[name] for name in ("width", "height", "mode")}
     changes["layers"] = tuple(message["layers"])

@@ -14,9 +14,9 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from . import meshes, volumes
+from . import measured, meshes, preferences, process, volumes
 from .graphs import Json, Site, jenkins, origin
-from .nodes import Tree
+from .nodes import Tree, told
 
 SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 TO_CLPT = Matrix.Diagonal((-1.0, 1.0, -1.0, 1.0))  # cameras and lamps look along +z there
@@ -26,6 +26,13 @@ LINEAR = ("Non-Color", "Linear Rec.709", "Raw", "Linear")  # spaces without a cu
 READ = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".tga", ".bmp", ".webp")  # files that clpt reads
 SILENT = {"CAMERA", "EMPTY", "ARMATURE", "LATTICE", "LIGHT_PROBE", "SPEAKER"}
 
+# Factors from clpt's sky to those of Cycles, by the light on a floor at an elevation of 30 degrees.
+SKIES = {
+    "SINGLE_SCATTERING": 44.0, "MULTIPLE_SCATTERING": 65.0, "PREETHAM": 6.6, "HOSEK_WILKIE": 0.92,
+    "NISHITA": 44.0,
+}  # fmt: skip
+SUN = 98.0
+WORLD_PLACES = (("TEX_COORD", "Generated"), ("TEX_COORD", "Object"), ("NEW_GEOMETRY", "Position"))
 CAMERA = ("", "", ())  # the key of the camera
 
 Key = tuple[str, str, tuple[int, ...]]  # of an instance, at all times
@@ -55,6 +62,7 @@ class Writer:
         self.depsgraph, self.folder, self.set_frame = depsgraph, folder, set_frame
         self.width, self.height = width, height
         self.told: dict[str, None] = {}
+        self.owner = ""  # the data that is read now
         self.tree = Tree(self.image, self.tell)
         self.images: dict[str, Json | None] = {}
         self.numbers = itertools.count()  # of files
@@ -67,6 +75,9 @@ class Writer:
 
     def tell(self, text: str) -> None:
         self.told.setdefault(text)
+        lines = told.setdefault(self.owner, [])
+        if text not in lines:
+            lines.append(text)
 
     def write(self) -> Path:
         """Write all; return the scene file."""
@@ -80,6 +91,7 @@ class Writer:
         lights: list[Json] = []
         parts: dict[Any, list[Json]] = {}
         places: dict[Any, list[tuple[Key, Matrix]]] = {}
+        names: dict[Key, str] = {}
         for instance in self.depsgraph.object_instances:
             source, matrix = instance.object, instance.matrix_world.copy()  # gone after its turn
             if instance.show_particles and not instance.is_instance:
@@ -92,6 +104,7 @@ class Writer:
                 key = (source.data.as_pointer(), *(m.name for m in made))
                 if key not in parts:
                     parts[key] = self._parts(len(parts), source)
+                names[_key(instance)] = source.name
                 places.setdefault(key, []).append((_key(instance), matrix))
             elif source.type == "LIGHT":
                 self._lamp(source, matrix, lights, shapes)
@@ -106,7 +119,8 @@ class Writer:
         }  # fmt: skip
         poses = self._poses(deforming)
         for key, placed in places.items():
-            shapes += self._placed(parts[key], [_moved(row, poses) for row in placed])
+            moved = [{"name": names[row[0]], **_moved(row, poses)} for row in placed]
+            shapes += self._placed(parts[key], moved)
         if poses and self.depsgraph.scene.camera is not None:
             camera |= {"shutter": {"open": 0.0, "close": poses[-1][0]}, **self._moved_camera(poses)}
         return {
@@ -116,6 +130,7 @@ class Writer:
                 "width": self.width,
                 "height": self.height,
                 "alpha": self.depsgraph.scene.render.film_transparent,
+                **measured.film(self.depsgraph.scene.clpt),
             },
             "materials": self.named,
             "media": self.media,
@@ -259,25 +274,39 @@ class Writer:
 
     def _material(self, material: Any, source: Any) -> Made:
         """Return a material as an object has it."""
-        key = "none" if material is None else material.name_full
+        key = "default_surface" if material is None else material.name_full
         own = f"{key} of {source.name_full}"
         found = self.materials.get(own if key in self.personal else key)
         if found is not None:
             return found
         tree = self.tree
         tree.used, tree.object, tree.personal = set(), source, False
+        self.owner = "" if material is None else material.name_full
+        told[self.owner] = []
         described, radiance = tree.material(material)
         if tree.personal:
             self.personal.add(key)
         key, interior = own if tree.personal else key, ""
         nodes = None if material is None else material.node_tree
         output = None if nodes is None else nodes.get_output_node("CYCLES")
-        medium = None if output is None else volumes.medium(tree, output)
+        if material is not None and material.clpt.use_drops:
+            medium = self._drops(material.clpt)
+        else:
+            medium = None if output is None else volumes.medium(tree, output)
+        self.owner = ""
         if medium is not None:
             self.media[key], interior = medium, key
         self.named[key] = described
         self.materials[key] = made = Made(key, radiance, frozenset(tree.used), interior)
         return made
+
+    def _drops(self, settings: Any) -> Json | None:
+        try:
+            python = preferences.python() or process.interpreter()
+            return measured.drops(settings, python)
+        except (ValueError, OSError, process.ProcessError) as error:
+            self.tell(str(error))
+            return None
 
     def _part(self, file: str, slots: list[Any], slot: int, source: Any) -> Json:
         made = self._material(slots[min(slot, len(slots) - 1)] if slots else None, source)
@@ -330,8 +359,7 @@ class Writer:
         color = [c * lamp.energy * 2.0**lamp.exposure for c in lamp.color]
         if lamp.use_temperature:
             color = [c * t for c, t in zip(color, lamp.temperature_color, strict=True)]
-        if lamp.node_tree is not None and lamp.use_nodes:
-            self.tell("nodes of lamps are not read")
+        color = self._lamp_nodes(lamp, color)
         rigid = Matrix.LocRotScale(*matrix.decompose()[:2], (1.0, 1.0, 1.0))
         place = [list(row) for row in rigid @ TO_CLPT]
         if lamp.type == "SUN":
@@ -368,12 +396,33 @@ class Writer:
         else:
             self._area(lamp, color, matrix, shapes)
 
+    def _lamp_nodes(self, lamp: Any, color: list[float]) -> list[float]:
+        """Return a lamp's color with what its nodes emit, which is one color."""
+        output = None
+        if lamp.node_tree is not None and lamp.use_nodes:
+            output = lamp.node_tree.get_output_node("CYCLES")
+        if output is None:
+            return color
+        self.owner = lamp.name_full
+        told[self.owner] = []
+        shader = self.tree.linked(Site(output, (), ""), "Surface")
+        glow = [0.0] * 3 if shader is None or shader[1] is None else shader[1]
+        if isinstance(glow, dict):
+            self.tell("patterns of lamps are not read: it is white")
+            glow = [1.0] * 3
+        self.owner = ""
+        return [c * g for c, g in zip(color, glow, strict=True)]
+
     def _emitted(self, lamp: Any, color: list[float], factor: float) -> Any:
         """Return what a lamp emits: its color, or its standard spectrum of the same luminance."""
         if not lamp.clpt.spectrum:
             return [c * factor for c in color]
         luminance = 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2]
-        return {"type": "illuminant", "name": lamp.clpt.spectrum, "scale": luminance * factor}
+        try:
+            return measured.lamp(lamp.clpt.spectrum, luminance * factor)
+        except ValueError as error:
+            self.tell(str(error))
+            return [c * factor for c in color]
 
     def _surface(self, lamp: Any, color: list[float], area: float) -> Json:
         """Return the emission of a lamp's surface [m^2]; it is even, and of its front."""
@@ -403,40 +452,77 @@ class Writer:
             return [{"type": "constant", "radiance": list(world.color)}]
         output = world.node_tree.get_output_node("CYCLES")
         site = None if output is None else origin((), output.inputs["Surface"])[0]
-        if site is None or site.node.type not in ("BACKGROUND", "EMISSION"):
-            if site is not None:
-                self.tell(f"{site.node.bl_label} of the world is not read: it is dark")
+        if site is None:
             return []
-        self.tree.surface = False
-        strength = self.tree.single(site, "Strength", 1.0)
-        texture, _ = origin(site.groups, site.node.inputs["Color"])
-        kind = "" if texture is None else texture.node.type
-        if kind == "TEX_ENVIRONMENT" and texture.node.image is not None:
-            return [self._dome(texture, strength)]
-        radiance = self.tree.light(site, "Color", "Strength")
-        self.tree.surface = True
+        self.owner, self.tree.surface = world.name_full, False
+        told[self.owner] = []
+        try:
+            return self._surroundings(site)
+        finally:
+            self.owner, self.tree.surface = "", True
+
+    def _surroundings(self, site: Site) -> list[Json]:
+        """Return the lights of a world's shader: an image or a sky as it is, else a graph."""
+        if site.node.type in ("BACKGROUND", "EMISSION"):
+            strength = self.tree.number(site, "Strength", 1.0)
+            texture, _ = origin(site.groups, site.node.inputs["Color"])
+            kind = "" if texture is None else texture.node.type
+            if kind == "TEX_SKY" and isinstance(strength, float):
+                return [self._sky_texture(texture.node, strength)]
+            if kind == "TEX_ENVIRONMENT" and isinstance(strength, float):
+                dome = self._dome(texture, strength)
+                if dome is not None:
+                    return [dome]
+        radiance = self.tree.shader(site)[1]
         if isinstance(radiance, dict):
-            self.tell("a pattern of the world is not read; its color stands for it")
-            radiance = [c * strength for c in list(site.node.inputs["Color"].default_value)[:3]]
+            return [{"type": "envmap", "image": radiance, "to_world": DOME}]
         return [] if radiance is None else [{"type": "constant", "radiance": radiance}]
+
+    def _sky_texture(self, node: Any, strength: float) -> Json:
+        """Return clpt's own sky for a Sky Texture; the scale is by the light on a floor."""
+        self.tell("Sky Texture becomes clpt's own sky, whose colors differ")
+        scale = strength * SKIES[node.sky_type]
+        made = {"type": "sky", "sky_scale": scale, "sun_scale": 0.0, "to_world": DOME}
+        if node.sky_type in ("PREETHAM", "HOSEK_WILKIE"):
+            x, y, z = node.sun_direction
+            elevation, azimuth = math.atan2(z, math.hypot(x, y)), math.atan2(y, x)
+            made["aerosol"] = max(0.04608 * node.turbidity - 0.04586, 0.0) / 0.55**1.3
+        else:
+            elevation, azimuth = node.sun_elevation, 0.5 * math.pi - node.sun_rotation
+            made |= {
+                "aerosol": min(0.1 * node.aerosol_density, 2.0), "altitude": node.altitude,
+                "ozone": min(300.0 * node.ozone_density, 1000.0),
+                "sun_scale": strength * SUN * node.sun_intensity if node.sun_disc else 0.0,
+            }  # fmt: skip
+        degrees = math.degrees(max(elevation, math.radians(-12.0))), math.degrees(azimuth)
+        return {**made, "sun_elevation": degrees[0], "sun_azimuth": degrees[1]}
 
     def _sky(self, sky: Any) -> Json:
         return {
             "type": "sky", "sun_elevation": math.degrees(sky.elevation),
             "sun_azimuth": math.degrees(sky.azimuth), "aerosol": sky.haze,
-            "altitude": sky.altitude, "ground": list(sky.ground), "sky_scale": sky.strength,
-            "sun_scale": sky.strength, "to_world": DOME,
+            "altitude": sky.altitude, "ozone": sky.ozone, "ground": list(sky.ground),
+            "sky_scale": sky.strength, "sun_scale": sky.strength, "to_world": DOME,
         }  # fmt: skip
 
-    def _dome(self, texture: Site, strength: float) -> Json:
-        bitmap = self.image(texture.node) or {"image": ""}
-        turn, (source, _) = (
-            Matrix.Identity(4),
-            origin(texture.groups, texture.node.inputs["Vector"]),
-        )
+    def _dome(self, texture: Site, strength: float) -> Json | None:
+        """Return an image that is turned about z alone; None for other coordinates."""
+        node = texture.node
+        bitmap = None if node.image is None else self.image(node)
+        turn, (source, _) = Matrix.Identity(4), origin(texture.groups, node.inputs["Vector"])
         if source is not None and source.node.type == "MAPPING":
-            angles = list(source.node.inputs["Rotation"].default_value)
+            mapping = source.node
+            angles, scale, move = (
+                list(mapping.inputs[key].default_value) for key in ("Rotation", "Scale", "Location")
+            )
+            free = any(s.is_linked for s in mapping.inputs if s.name != "Vector")
+            if free or any(angles[:2]) or any(move) or scale != [1.0] * 3:
+                return None
             turn = Matrix.Rotation(angles[2], 4, "Z")
+            source = origin(source.groups, mapping.inputs["Vector"])[0]
+        own = source is None or (source.node.type, source.output) in WORLD_PLACES
+        if bitmap is None or not own or node.projection != "EQUIRECTANGULAR":
+            return None
         place = turn.inverted() @ Matrix(DOME)
         return {
             "type": "envmap", "image": bitmap["image"], "scale": strength,
@@ -469,6 +555,9 @@ class Writer:
                 "offset_x": 0.5 * window[0][2], "offset_y": -0.5 * window[1][2],
             }  # fmt: skip
             described |= lens(camera, matrix)
+            if camera.clpt.lens:
+                focus = described.get("focus_distance", camera.dof.focus_distance or 10.0)
+                described = measured.lens(camera.clpt, camera, focus)
         return {**described, "to_world": [list(row) for row in place]}
 
 

@@ -646,6 +646,19 @@ def _image(tree: Any, at: Site) -> Value:
     return tree.g.look({**bitmap, **placed}, width)
 
 
+def _environment(tree: Any, at: Site) -> Value:
+    g, node = tree.g, at.node
+    bitmap = None if node.image is None else tree.image(node)
+    if bitmap is None:
+        return g.value([1.0, 0.0, 1.0])
+    v = tree.vector(at, "generated")
+    if node.projection != "EQUIRECTANGULAR":
+        tree.tell("Mirror Ball of an image is read as equirectangular")
+    flat = g("magnitude", g("combine2", v[0], v[1]))
+    along, up = 0.5 - g("atan2", v[1], v[0]) / TURN, g("atan2", v[2], flat) / math.pi + 0.5
+    return g.look({**bitmap, "wrap": "repeat"}, 3, g("combine2", along, up))
+
+
 def _affine(at: Site) -> np.ndarray | None:
     """Return how Mapping nodes of numbers place the first uv; None for other coordinates."""
     matrix, groups, socket = np.eye(3), at.groups, at.node.inputs["Vector"]
@@ -678,8 +691,9 @@ def _constant(tree: Any, at: Site) -> Value:
 
 
 def _light_path(tree: Any, at: Site) -> Value:
-    shown = 1.0 if at.output in ("Is Camera Ray", "Is Singular Ray") else 0.0
-    return tree.told(at, "Light Path is that of a ray from the camera", shown)
+    of_camera = tree.tree.surface and at.output in ("Is Camera Ray", "Is Singular Ray")
+    kind = "a ray from the camera" if tree.tree.surface else "light, also for the camera"
+    return tree.told(at, f"Light Path is that of {kind}", float(of_camera))
 
 
 def _fresnel(tree: Any, at: Site) -> Value:
@@ -724,8 +738,8 @@ def _planck(kelvin: float) -> list[float]:
     return _rgb(nm, 1.0 / (nm**5 * np.expm1(1.4387769e7 / (nm * max(kelvin, 200.0)))))
 
 
-def _rgb(nm: np.ndarray, power: np.ndarray) -> list[float]:
-    """Return linear Rec. 709 of a spectrum; the observer by Wyman, Sloan and Shirley 2013."""
+def observer(nm: np.ndarray) -> np.ndarray:
+    """Return how the eye sees wavelengths (3, n): Wyman, Sloan and Shirley 2013."""
 
     def lobe(size: float, peak: float, low: float, high: float) -> np.ndarray:
         return size * np.exp(-0.5 * ((nm - peak) / np.where(nm < peak, low, high)) ** 2)
@@ -734,7 +748,12 @@ def _rgb(nm: np.ndarray, power: np.ndarray) -> list[float]:
     x += lobe(-0.065, 501.1, 20.4, 26.2)
     y = lobe(0.821, 568.8, 46.9, 40.5) + lobe(0.286, 530.9, 16.3, 31.1)
     z = lobe(1.217, 437.0, 11.8, 36.0) + lobe(0.681, 459.0, 26.0, 13.8)
-    xyz = np.array([x, y, z]) @ power
+    return np.array([x, y, z])
+
+
+def _rgb(nm: np.ndarray, power: np.ndarray) -> list[float]:
+    """Return the linear Rec. 709 of a spectrum, of luminance 1."""
+    xyz = observer(nm) @ power
     to_rgb = [[3.2404542, -1.5371385, -0.4985314], [-0.969266, 1.8760108, 0.041556],
               [0.0556434, -0.2040259, 1.0572252]]  # fmt: skip
     return (np.array(to_rgb) @ (xyz / xyz[1])).tolist()
@@ -780,7 +799,8 @@ TEXTURES: dict[str, Read] = {
     "MIX_RGB": _mix, "NEW_GEOMETRY": _geometry, "NORMAL": _normal, "OBJECT_INFO": _object_info,
     "RGB": _constant, "RGBTOBW": lambda tree, at: tree.g.gray(tree.input(at, 0)),
     "SEPARATE_COLOR": _separate, "SEPXYZ": _separate, "TEX_BRICK": _bricks,
-    "TEX_CHECKER": _checker, "TEX_COORD": _coordinates, "TEX_GRADIENT": _gradient,
+    "TEX_CHECKER": _checker, "TEX_COORD": _coordinates, "TEX_ENVIRONMENT": _environment,
+    "TEX_GRADIENT": _gradient,
     "TEX_IMAGE": _image, "TEX_MAGIC": _magic, "TEX_NOISE": _noise, "TEX_VORONOI": _voronoi,
     "TEX_WAVE": _waves, "TEX_WHITE_NOISE": _white, "UVMAP": _uv_map, "VALTORGB": _ramp,
     "VALUE": _constant, "VECTOR_ROTATE": _rotate, "VECT_MATH": _vector_math,
@@ -797,5 +817,7 @@ TEXTURES: dict[str, Read] = {
     "LIGHT_FALLOFF": _passed(0, "Light Falloff is quadratic"),
     "SHADERTORGB": _zero("Shader to RGB is of EEVEE alone", 0.5),
     "SCRIPT": _zero("Open Shading Language is not read", 0.5),
+    "TEX_IES": _zero("IES Texture counts as 1", 1.0),
+    "TEX_SKY": _zero("Sky Texture beside others is grey", 0.3),
     "TEX_GABOR": _zero("Gabor Texture is grey", 0.5),
 }  # fmt: skip

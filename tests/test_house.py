@@ -28,7 +28,7 @@ BOUNDS = {
     "rooms in circles of imports": 0,
     "stays of a scene from render() to the tables": 37,
     "rooms of these stays": 20,
-    "lines of Python": 99_930,
+    "lines of Python": 101_050,
     "lines of OpenCL": 23_800,
     "words of README.md": 1_200,
     "docstrings that begin with What, Of, How, Those, The same": 0,

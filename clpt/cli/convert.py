@@ -40,8 +40,8 @@ def convert(
     .jpg, .webp, .hdr, .pfm or .npy. A spectral .exr becomes its colours.
 
     A SOURCE that is a scene or a folder with a scene, such as old.xml of Mitsuba 0.6, becomes a
-    scene of today: TARGET is a .json, or a folder for a scene.json; or USD, .usda, .usdc or .usdz.
-    What USD cannot say is told, a line each.
+    scene of today: TARGET is a .json, or a folder for a scene.json; or USD, .usda, .usdc or .usdz;
+    or glTF, .glb or .gltf. What these cannot say is told, a line each.
     """
     if (target is None) == (output is None):
         raise click.UsageError("give TARGET once: as an argument, or by -o")

@@ -190,7 +190,7 @@ def save(scene: Scene, path: str | Path, /) -> list[str]:
 
     path: of a new .json, such that `load` gives the same content back, or of a folder that gets a
     scene.json; or of a .usda, .usdc, .usd or .usdz, with materials as OpenPBR and colors in place
-    of spectra (docs/usd.md). An existing file is replaced.
+    of spectra (docs/usd.md); or of a .glb or .gltf (docs/gltf.md). An existing file is replaced.
 
     The arrays of shapes and images lie in files beside a .json, which begin with its name: meshes
     as .ply, curves as .txt, spheres as .npz, images as .npy, .png or .exr, transforms of many
@@ -211,10 +211,10 @@ def save(scene: Scene, path: str | Path, /) -> list[str]:
     if kind == "native":
         importlib.import_module("clpt.formats.native").save(scene, path)
         return []
-    if kind == "usd":
-        lost: list[str] = importlib.import_module("clpt.formats.usd").save(scene, path)
+    if kind in ("usd", "gltf"):
+        lost: list[str] = importlib.import_module(f"clpt.formats.{kind}").save(scene, path)
         return lost
-    message = f"a scene is saved as .json, .usda, .usdc or .usdz, not {path.suffix!r}"
+    message = f"a scene is saved as .json, .glb, .gltf, .usda, .usdc or .usdz, not {path.suffix!r}"
     raise SceneError(message, file=path)
 
 

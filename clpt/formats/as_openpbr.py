@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from clpt import spectra
-from clpt.arrays import Floats
+from clpt.arrays import Floats, Floats32
 from clpt.scene import insides
 from clpt.scene import materials as m
 from clpt.scene.params import fields_of, params
 from clpt.scene.roles import REAL
-from clpt.scene.textures import Bitmap, Mix
+from clpt.scene.textures import Bitmap, Checkerboard, Mix
 from clpt.scene.values import IndexLike, SpectrumLike, Texture, Textured, TexturedNumber
 from clpt.spectra import RGBUnbounded, Spectrum, cie
 from clpt.spectra.spectrum import Role
@@ -96,16 +96,16 @@ def _blend(material: m.Blend, warn: Warn) -> Surface:
     warn("a blend of materials becomes a blend of their parameters, with the first's index")
     before, after = fields_of(first.base), fields_of(second.base)
     values = {
-        name: _between(before[name], after[name], material.weight)
+        name: between(before[name], after[name], material.weight)
         for name, param in params(m.Openpbr).items()
         if param.textured
     }
     base = dataclasses.replace(first.base, name=material.name, **values)
-    opacity = _between(first.opacity, second.opacity, material.weight)
+    opacity = between(first.opacity, second.opacity, material.weight)
     return dataclasses.replace(first, base=base, opacity=opacity)
 
 
-def _between(first: Textured, second: Textured, weight: TexturedNumber) -> Any:
+def between(first: Textured, second: Textured, weight: TexturedNumber) -> Any:
     """Return a parameter of a blend. weight: the share of the second."""
     if first is second:
         return first
@@ -123,6 +123,24 @@ def rgb(value: SpectrumLike | Textured, role: Role) -> Floats:
     if isinstance(value, Spectrum):
         return value.to_rgb(role)
     return np.broadcast_to(np.asarray(value, np.float64), 3)
+
+
+def split(color: Floats) -> tuple[float, Floats]:
+    """Return the greatest part of a color (3,), and the color over it; black stays black."""
+    strength = float(color.max())
+    return strength, color / strength if strength > 0.0 else color
+
+
+def two_by_two(texture: Checkerboard) -> Bitmap:
+    """Return a checkerboard of constants as an image of 2 x 2 pixels."""
+    colors = [
+        np.full(3, 0.5) if isinstance(value, Texture) else rgb(value, "reflectance")
+        for value in (texture.color0, texture.color1)
+    ]
+    pixels: Floats32 = np.array([[colors[1], colors[0]], [colors[0], colors[1]]], np.float32)
+    return Bitmap(
+        image=pixels, raw=True, filter="nearest", mapping=texture.mapping, to_uv=texture.to_uv
+    )
 
 
 def _curve(index: IndexLike) -> Floats:

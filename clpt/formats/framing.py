@@ -15,6 +15,8 @@ from clpt.formats.meshes import mesh
 from clpt.scene import Scene, cameras, integrators, lights, materials, media, shapes
 from clpt.scene.studio import Up
 
+DARK = lights.Constant(radiance=0.0)  # in place of the studio's lights where shapes alone shine
+
 
 def load_mesh(path: Path, missing: Missing = "error") -> Scene:
     """Read a bare mesh and put it into the studio, whatever its size and position.
@@ -36,12 +38,18 @@ def show(
     camera: cameras.Camera | None = None,
     own_lights: Sequence[lights.Light] = (),
     up: Up = "y",
+    lit: bool = False,
 ) -> Scene:
-    """Return a scene of the shapes of a file; `Scene.studio` adds missing cameras and lights."""
+    """Return a scene of the shapes of a file; `Scene.studio` adds missing cameras and lights.
+
+    lit: whether the shapes light the scene, so that no lights are missing.
+    """
+    known = own_lights or ([DARK] if lit else [])
     try:
-        scene = Scene.studio(contents, camera=camera, lights=own_lights, up=up, name=file.stem)
+        scene = Scene.studio(contents, camera=camera, lights=known, up=up, name=file.stem)
     except SceneError as error:
         raise SceneError(error.message, file=file) from None
+    scene.lights = [light for light in scene.lights if light is not DARK]
     scene.extra["format"] = file.suffix.lower()[1:]
     return scene
 

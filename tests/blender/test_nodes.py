@@ -312,3 +312,62 @@ def test_a_node_is_that_of_cycles(case: Any, tmp_path: Path) -> None:
     share = 0.05 if case[0] in LEAPS else 0.0
     assert not told
     assert np.mean(off > LOOSE.get(case[0], EXACT)) <= share, (case, off.max())
+
+
+def documented() -> dict[str, str]:
+    """Return what becomes of each node, by its label, as the page says it."""
+    text = (Path(__file__).resolve().parents[2] / "docs" / "blender.md").read_text("utf-8")
+    table = text.split("## Every node")[1].split("| --- | --- |")[1].split("\n\n")[0]
+    found = {}
+    for line in table.strip().splitlines():
+        names, text = (cell.strip() for cell in line.strip("|").split(" | "))
+        found.update({name.strip(): text for name in names.split(", ")})
+    return found
+
+
+def kinds() -> dict[str, tuple[str, str]]:
+    """Return the type and the identifier of each node of Cycles' trees, by its label."""
+    tree = bpy.data.materials.new("all").node_tree
+    found = {}
+    for name in dir(bpy.types):
+        if name.startswith("ShaderNode") and name not in ("ShaderNode", "ShaderNodeTree"):
+            try:
+                node = tree.nodes.new(name)
+            except RuntimeError:  # a base of others
+                continue
+            found[node.bl_label] = node.type, name
+    return found
+
+
+def test_the_page_has_every_node() -> None:
+    """Each is compiled, folded or told: what is called the same or near is read by a function."""
+    page, known = documented(), kinds()
+    assert set(known) - {"Reroute"} <= set(page)
+    read = {*textures.TEXTURES, *nodes.SHADERS, "BUMP", "NORMAL_MAP", "GROUP", "TEX_SKY"}
+    read |= {"VOLUME_ABSORPTION", "VOLUME_SCATTER", "PRINCIPLED_VOLUME", "VOLUME_COEFFICIENTS"}
+    for label, (kind, _) in known.items():
+        if page.get(label) != "told" and "Output" not in label:
+            assert kind in read, label
+
+
+@pytest.mark.parametrize("label", [k for k, text in documented().items() if text == "told"])
+def test_what_the_page_calls_told_is_told(label: str) -> None:
+    """As a color, as a surface, or as a normal of one."""
+    known = kinds()
+    if label not in known or "Displacement" in label:
+        pytest.skip("of another version of Blender, or not an input of a shader")
+    material = bpy.data.materials.new("told")
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    node, end = tree.nodes.new(known[label][1]), tree.nodes.new("ShaderNodeOutputMaterial")
+    glow = tree.nodes.new("ShaderNodeEmission")
+    if not node.outputs:
+        pytest.skip("without a script it has no outputs")
+    shader = node.outputs[0].type == "SHADER"
+    tree.links.new(node.outputs[0], end.inputs["Surface"] if shader else glow.inputs["Color"])
+    if not shader:
+        tree.links.new(glow.outputs[0], end.inputs["Surface"])
+    told: list[str] = []
+    nodes.Tree(lambda node: None, told.append).material(material)
+    assert told

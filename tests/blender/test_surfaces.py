@@ -305,3 +305,67 @@ def test_a_scene_of_nothing_and_what_was_deleted(tmp_path: Path) -> None:
     bpy.ops.render.render()
     bpy.data.objects.remove(box)
     assert pictures(tmp_path, 4)[0].max() == 0.0
+
+
+@pytest.mark.parametrize("how", ["gradient", "image", "mixed", "light path"])
+def test_surroundings_that_nodes_compute(how: str, tmp_path: Path) -> None:
+    """A wide view of the world, and a matte ball in it."""
+    world = bpy.data.worlds.new("world")
+    bpy.context.scene.world = world
+    world.use_nodes = True
+    tree = world.node_tree
+    first = tree.nodes["Background"]
+    where = tree.nodes.new("ShaderNodeTexCoord")
+    if how in ("gradient", "mixed"):
+        noise = tree.nodes.new("ShaderNodeTexNoise")
+        noise.inputs["Scale"].default_value = 2.0
+        tree.links.new(where.outputs["Generated"], noise.inputs["Vector"])
+        tree.links.new(noise.outputs["Color"], first.inputs["Color"])
+    if how == "image":
+        image, hue = (
+            tree.nodes.new("ShaderNodeTexEnvironment"),
+            tree.nodes.new("ShaderNodeHueSaturation"),
+        )
+        image.image = painted()
+        hue.inputs["Hue"].default_value, hue.inputs["Saturation"].default_value = 0.6, 1.4
+        tree.links.new(image.outputs["Color"], hue.inputs["Color"])
+        tree.links.new(hue.outputs["Color"], first.inputs["Color"])
+    if how in ("mixed", "light path"):
+        second, mix = tree.nodes.new("ShaderNodeBackground"), tree.nodes.new("ShaderNodeMixShader")
+        second.inputs["Color"].default_value = (0.9, 0.4, 0.2, 1.0)
+        tree.links.new(first.outputs[0], mix.inputs[1])
+        tree.links.new(second.outputs[0], mix.inputs[2])
+        tree.links.new(mix.outputs[0], tree.nodes["World Output"].inputs["Surface"])
+        mix.inputs[0].default_value = 0.3
+        if how == "light path":
+            path = tree.nodes.new("ShaderNodeLightPath")
+            tree.links.new(path.outputs["Is Camera Ray"], mix.inputs[0])
+    bpy.context.scene.camera.data.angle = 1.8
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=1.3)
+    ours, cycles = pictures(tmp_path, 64)
+    if how == "light path":  # what the camera alone sees is not there, and told
+        ours, cycles = (shown[18:22, 18:22] for shown in (ours, cycles))
+        assert ours.mean() == pytest.approx(cycles.mean(), rel=0.02)
+    else:
+        assert_alike([ours, cycles])
+
+
+@pytest.mark.parametrize("kind", ["SINGLE_SCATTERING", "MULTIPLE_SCATTERING", "HOSEK_WILKIE"])
+def test_sky_textures_light_a_floor(kind: str, tmp_path: Path) -> None:
+    """Another model: the light on a floor within 20 %, and the sun where Cycles has it."""
+    world = bpy.data.worlds.new("world")
+    bpy.context.scene.world = world
+    world.use_nodes = True
+    sky = world.node_tree.nodes.new("ShaderNodeTexSky")
+    sky.sky_type, sky.sun_elevation, sky.sun_rotation = kind, 0.5, 2.0
+    sky.sun_direction = (0.8, -0.36, 0.48)
+    world.node_tree.links.new(sky.outputs[0], world.node_tree.nodes["Background"].inputs["Color"])
+    bpy.ops.mesh.primitive_plane_add(size=20.0)
+    bpy.ops.mesh.primitive_cube_add(size=1.0)
+    ours, cycles = pictures(tmp_path, 128)
+    assert ours.mean() == pytest.approx(cycles.mean(), rel=0.2)
+    if kind != "HOSEK_WILKIE":  # it has no disc: the shadow of the box
+        dark = [
+            shown.mean(axis=2) < 0.5 * np.median(shown.mean(axis=2)) for shown in (ours, cycles)
+        ]
+        assert (dark[0] & dark[1]).sum() > 0.7 * (dark[0] | dark[1]).sum() > 0.0

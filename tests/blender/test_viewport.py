@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+
+from clpt import images
 
 bpy: Any = pytest.importorskip("bpy")
 blender: Any = pytest.importorskip("blender")
@@ -155,3 +159,158 @@ def test_it_shows_the_scene_and_follows_changes(window: Window) -> None:
         bpy.data.objects.remove(each)
     assert window.picture(64)[..., :3].std() < 1e-3
     assert not [line for line in window.lines if line and not line.startswith("sample")]
+
+
+def final(folder: Any, samples: int = 256) -> np.ndarray:
+    """Return the final picture (h, w, 3), the bottom row first."""
+    scene = bpy.context.scene
+    scene.render.engine, scene.clpt.samples, scene.clpt.mode = "CLPT", samples, "rgb"
+    scene.render.resolution_x, scene.render.resolution_y = SIZE
+    scene.render.resolution_percentage = 100
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
+    scene.render.filepath = str(folder / "final.exr")
+    bpy.ops.render.render(write_still=True)
+    return np.asarray(images.read(scene.render.filepath))[::-1, :, :3]
+
+
+@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
+def test_through_the_camera_it_is_the_final_picture(
+    window: Window, kind: str, tmp_path: Path
+) -> None:
+    """The matrices of a region that shows just the camera's frame, with shifts."""
+    camera = bpy.context.scene.camera
+    camera.data.type, camera.data.shift_x, camera.data.shift_y = kind, 0.1, -0.05
+    bpy.context.scene.clpt.viewport_samples = 256
+    wanted = final(tmp_path)
+    view = window.region_data
+    view.view_perspective, view.is_perspective = "CAMERA", kind == "PERSP"
+    view.view_matrix = camera.matrix_world.inverted()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    view.window_matrix = camera.calc_matrix_camera(depsgraph, x=SIZE[0], y=SIZE[1])
+    window.open()
+    shown = window.picture(256)[..., :3]
+    assert shown.mean() == pytest.approx(wanted.mean(), rel=5e-3)
+    assert np.median(np.abs(shown - wanted)) < 0.02 * wanted.mean()
+
+
+def test_places_and_colors_are_no_loads(window: Window) -> None:
+    """Files of geometry are written once, and again only for what changes."""
+    written = []
+    write = viewports.scenes.meshes.write
+
+    def counted(mesh: Any, *where: Any) -> Any:
+        written.append(mesh.name)
+        return write(mesh, *where)
+
+    viewports.scenes.meshes.write = counted
+    try:
+        window.open()
+        bpy.ops.mesh.primitive_monkey_add(location=(2.0, 0.0, 0.0))
+        monkey = bpy.context.object
+        window.picture()
+        assert sorted(written) == ["Cube", "Suzanne"]
+        for step in range(5):
+            monkey.location.x += 0.1
+            bpy.data.objects["Light"].location.z -= 0.1
+            bpy.data.materials["Material"].diffuse_color[0] = 0.1 * step
+            bpy.context.scene.camera.location.x += 0.1
+            window.picture()
+        assert len(written) == 2
+        monkey.data.vertices[0].co.x += 0.1
+        monkey.data.update()
+        window.picture()
+        assert written[2:] == ["Suzanne"]
+        assert len(list(window.viewport.folder.glob("mesh*"))) == 2
+    finally:
+        viewports.scenes.meshes.write = write
+
+
+def test_undo_brings_back_what_was(window: Window) -> None:
+    bpy.context.preferences.edit.use_global_undo = True
+    window.open()
+    first = window.picture(64)
+    bpy.ops.ed.undo_push(message="before")
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    bpy.ops.ed.undo_push(message="after")
+    without = window.picture(64)
+    assert np.abs(without - first).mean() > 0.01
+    bpy.ops.ed.undo()
+    bpy.context.view_layer.update()
+    if "Cube" not in bpy.data.objects:
+        pytest.skip("this Blender does not undo without a window")
+    engine.ClptEngine.view_update(
+        window.engine, window.context, bpy.context.evaluated_depsgraph_get()
+    )
+    assert np.allclose(window.picture(64), first, atol=1e-5)
+
+
+def test_a_killed_process_is_a_line_and_the_next_change_starts_another(window: Window) -> None:
+    window.open()
+    first = window.picture(64)
+    window.viewport.process.child.kill()
+    window.until(lambda: window.viewport.process is None)
+    assert any("clpt has ended" in line for line in window.lines)
+    window.look((7.0, -7.0, 5.1), (0.0, 0.0, 0.0))
+    window.draw()
+    bpy.data.objects["Light"].location.x += 0.0
+    bpy.context.view_layer.update()
+    window.look((7.0, -7.0, 5.0), (0.0, 0.0, 0.0))
+    assert np.allclose(window.picture(64), first, atol=1e-5)
+
+
+def test_a_closed_viewport_ends_its_process(window: Window) -> None:
+    window.open()
+    window.picture()
+    viewport, child = window.viewport, window.viewport.process.child
+
+    class Freed:
+        @property
+        def is_preview(self) -> bool:
+            raise ReferenceError("StructRNA of type CLPT has been removed")
+
+    viewport.engine = Freed()
+    assert viewport.listen() is None
+    assert child.poll() is not None and not viewport.folder.exists()
+
+
+def test_thousand_updates_keep_the_memory(window: Window) -> None:
+    """Views, places, colors, lamps and geometry in turn: both processes grow by less than 30 MB."""
+    window.open()
+    window.picture(1)
+    random = np.random.default_rng(5)
+    cube, lamp = bpy.data.objects["Cube"], bpy.data.objects["Light"]
+    paint = bpy.data.materials["Material"].node_tree.nodes["Principled BSDF"]
+    child = window.viewport.process.child.pid
+    sizes = []
+    for step in range(1000):
+        a, b, c = random.uniform(-1.0, 1.0, 3)
+        match step % 5:
+            case 0:
+                window.look((7.0 + a, -7.0 + b, 5.0 + c), (0.0, 0.0, 0.0))
+            case 1:
+                cube.location = a, b, c
+            case 2:
+                paint.inputs["Base Color"].default_value = (abs(a), abs(b), abs(c), 1.0)
+            case 3:
+                lamp.location.x = 4.0 + a
+            case 4:
+                cube.data.vertices[0].co.z = 1.0 + a
+                cube.data.update()
+        window.draw()
+        if step % 5 == 0 or random.random() < 0.3:
+            window.until(lambda: window.viewport.shown == window.viewport.serial)
+        if step in (300, 999):
+            sizes.append([resident(process) for process in (os.getpid(), child)])
+    window.picture(64)
+    grown = np.subtract(sizes[1], sizes[0])
+    assert (grown < 30e6).all(), grown
+    assert window.viewport.process.child.pid == child
+
+
+def resident(process: int) -> int:
+    """Return the memory of a process [bytes]."""
+    statm = Path(f"/proc/{process}/statm")
+    if not statm.exists():
+        pytest.skip("no /proc")
+    return int(statm.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")

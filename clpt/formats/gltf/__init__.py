@@ -1,4 +1,4 @@
-"""glTF 2.0: `load(path)` returns the Scene that a .gltf or .glb file describes."""
+"""glTF 2.0: `load(path)` returns the Scene of a .gltf or .glb; `save` writes it."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from clpt.formats.gltf import (
     animation,
     cameras_lights,
     checks,
+    export,
     geometry,
     materials,
     meshes,
@@ -36,8 +37,9 @@ SUPPORTED = (
     "FB_ngon_encoding",  # says which triangles make a polygon: the picture is the same
 )  # fmt: skip
 VARIANTS = materials.VARIANTS
+save = export.save
 
-__all__ = ["load", "read_mesh"]
+__all__ = ["load", "read_mesh", "save"]
 
 
 def load(path: Path, missing: Missing = "error", /, **variables: Any) -> Scene:
@@ -75,6 +77,7 @@ def _load(path: Path, missing: Missing, variables: dict[str, Any]) -> Scene:
         camera=chosen[0] if chosen else None,
         own_lights=cameras_lights.lights_of(graph),
         file=path,
+        lit=export.is_lit(document.root.value),
     )
     scene.warnings = document.warnings
     scene.extra["cameras"] = cameras_lights.camera_descriptions(graph)

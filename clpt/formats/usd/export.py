@@ -12,14 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdRender, UsdShade, UsdUtils, Vt
 
 from clpt import images, transforms
-from clpt.arrays import Floats, Floats32, on_host
+from clpt.arrays import Floats, on_host
 from clpt.errors import SceneError
 from clpt.files import output_files
-from clpt.formats.as_openpbr import rgb
+from clpt.formats import as_meshes
+from clpt.formats.as_openpbr import rgb, split
 from clpt.formats.gltf.cameras_lights import FROM_GLTF
-from clpt.formats.usd.export_materials import MaterialWriter, split, unused
+from clpt.formats.usd.export_materials import MaterialWriter, unused
 from clpt.formats.usd.lights import TURNED
-from clpt.geometry import analytic, lamps, triangles
+from clpt.geometry import lamps
 from clpt.scene import Scene, lights
 from clpt.scene import shapes as kinds
 from clpt.scene.cameras import Orthographic, Perspective, ThinLens
@@ -30,7 +31,6 @@ from clpt.scene.viewpoint import upright
 
 RATE = 24.0  # time codes in a second
 WIDTH = 0.36  # of a camera's aperture, in tenths of a metre: 36 mm
-CORNERS = 256  # of a disk
 BALL = 0.01  # radius of what stands for a point that shines [m]
 CURVES = {"bspline": "bspline", "bezier": "bezier", "catmull_rom": "catmullRom"}
 STEPS = 16  # samples from a key of motion to the next: OpenUSD does not turn between them
@@ -105,6 +105,8 @@ class _Writer:
     def shape(self, shape: Shape, parent: str) -> None:
         """Write a shape below a prim, with its place, its motion and its material."""
         path = unused(self.stage, parent, shape.name or shape.kind)
+        if shape.priority:
+            self.warn("which body fills a place where bodies overlap")
         if shape.exterior is not None and shape.exterior is not shape.interior:
             self.warn("media in front of shapes")
         if shape.group is not None:
@@ -171,12 +173,7 @@ class _Writer:
 
     def mesh(self, shape: Shape, path: str) -> UsdGeom.Mesh:
         mesh = UsdGeom.Mesh.Define(self.stage, path)
-        if isinstance(shape, kinds.Cylinder):
-            shape = analytic.tessellate(shape)
-        if isinstance(shape, kinds.Disk):
-            vertices, faces, normals, uvs = _disk()
-        else:
-            vertices, faces, normals, uvs = triangles.local(shape)
+        vertices, faces, normals, uvs = as_meshes.local(shape)
         mesh.CreateSubdivisionSchemeAttr("none")
         mesh.CreatePointsAttr(_rows(vertices, Vt.Vec3fArray))
         mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 3, np.int32)))
@@ -334,8 +331,9 @@ class _Writer:
             focal = 0.1 * prim.GetFocalLengthAttr().Get()
             prim.CreateFStopAttr(0.5 * focal / camera.aperture_radius)
             prim.CreateFocusDistanceAttr(float(camera.focus_distance))
-        if isinstance(film.display_exposure, (int, float)) and film.display_exposure:
-            prim.CreateExposureAttr(float(film.display_exposure))
+        stops = film.display_exposure + math.log2(max(film.exposure, 1e-30))
+        if stops:
+            prim.CreateExposureAttr(stops)
         shutter = camera.shutter
         if shutter is not None and shutter.close > shutter.open:
             prim.CreateShutterOpenAttr(shutter.open * RATE)
@@ -363,20 +361,3 @@ def _facing(direction: Floats) -> NDArray[Any]:
     """Return a rotation (4, 4) that takes -z to a direction."""
     up = np.eye(3)[int(np.argmin(np.abs(direction)))]
     return transforms.look_at(np.zeros(3), direction, up) @ TURNED
-
-
-def _disk() -> tuple[Floats32, NDArray[np.uint32], Floats32 | None, Floats32 | None]:
-    """Return the unit disk as triangles, whose area is that of the disk."""
-    angle = 2.0 * np.pi * np.arange(CORNERS) / CORNERS
-    radius = math.sqrt(np.pi / (0.5 * CORNERS * math.sin(2.0 * np.pi / CORNERS)))
-    rim = radius * np.stack([np.cos(angle), np.sin(angle), np.zeros(CORNERS)], axis=1)
-    vertices = np.vstack([rim, np.repeat([[0.0, 0.0, 0.0]], CORNERS, axis=0)])
-    i = np.arange(CORNERS)
-    faces = np.stack([CORNERS + i, i, (i + 1) % CORNERS], axis=1)
-    uvs = np.vstack(
-        [
-            np.stack([np.ones(CORNERS), i / CORNERS], 1),
-            np.stack([np.zeros(CORNERS), (i + 0.5) / CORNERS], 1),
-        ]
-    )
-    return vertices.astype(np.float32), faces.astype(np.uint32), None, uvs.astype(np.float32)

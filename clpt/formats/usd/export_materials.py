@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from pxr import Gf, Sdf, Tf, Usd, UsdShade
 
 from clpt import images
-from clpt.arrays import Floats, Floats32
+from clpt.arrays import Floats
 from clpt.files import output_files
 from clpt.formats import as_openpbr
-from clpt.formats.as_openpbr import Surface, dispersion, rgb
+from clpt.formats.as_openpbr import Surface, dispersion, rgb, split, two_by_two
 from clpt.formats.usd.export_graphs import OF_USD, GraphWriter, Lost
 from clpt.scene import materials
 from clpt.scene.lights import Area
@@ -226,7 +226,7 @@ class Network:
     def _texture(self, texture: Texture, wide: bool) -> UsdShade.Shader:
         form = "color3" if wide else "float"
         if isinstance(texture, Checkerboard):
-            texture = _two_by_two(texture)
+            texture = two_by_two(texture)
         if isinstance(texture, Bitmap):
             return self._image(texture, form)
         if isinstance(texture, Graph):
@@ -339,24 +339,6 @@ def _connect(
 
 def _color(shader: UsdShade.Shader, name: str, color: ArrayLike) -> None:
     shader.CreateInput(name, TYPES.Color3f).Set(Gf.Vec3f(*np.asarray(color, float).tolist()))
-
-
-def _two_by_two(texture: Checkerboard) -> Bitmap:
-    """Return a checkerboard of constants as an image of 2 x 2 pixels."""
-    colors = [
-        np.full(3, 0.5) if isinstance(value, Texture) else rgb(value, "reflectance")
-        for value in (texture.color0, texture.color1)
-    ]
-    pixels: Floats32 = np.array([[colors[1], colors[0]], [colors[0], colors[1]]], np.float32)
-    return Bitmap(
-        image=pixels, raw=True, filter="nearest", mapping=texture.mapping, to_uv=texture.to_uv
-    )
-
-
-def split(color: Floats) -> tuple[float, Floats]:
-    """Return the greatest part of a color (3,), and the color over it; black stays black."""
-    strength = float(color.max())
-    return strength, color / strength if strength > 0.0 else color
 
 
 def _emit(network: Network, shader: UsdShade.Shader, emission: Area) -> None:

@@ -19,10 +19,9 @@ from clpt.formats.gltf import animation
 from clpt.formats.usd import cameras, gprims, lights
 from clpt.formats.usd.document import Document
 from clpt.scene import Scene
-from clpt.scene.lights import Constant, Light
+from clpt.scene.lights import Light
 
 VARIABLES = ("camera", "time", "shutter", "variant", "subdivision")
-DARK = Constant(radiance=0.0)  # in place of the studio's lights where shapes alone shine
 MOST_LEVELS = 6  # of subdivision
 PLACED = re.compile(r"In <(.*?)>: (.*?)(?: introduced by | \(|\n|$)", re.DOTALL)
 
@@ -190,10 +189,10 @@ def _scene(document: Document, variables: dict[str, Any]) -> Scene:
     if not shapes:
         document.warn("holds no shapes", "/")
     view = None if chosen is None else cameras.camera(document, chosen, settings)
-    glowing = [] if own_lights else [shape for shape in shapes if shape.emission is not None]
-    known = own_lights or ([DARK] if glowing else [])
-    scene = framing.show(shapes, file=document.file, camera=view, own_lights=known, up=document.up)
-    scene.lights = [light for light in scene.lights if light is not DARK]
+    scene = framing.show(
+        shapes, file=document.file, camera=view, own_lights=own_lights, up=document.up,
+        lit=any(shape.emission is not None for shape in shapes),
+    )  # fmt: skip
     scene.extra["cameras"] = [str(prim.GetPath()) for prim in world.cameras]
     scene.extra["shutter"] = (0.0, 0.0)
     size = settings.size

@@ -144,6 +144,10 @@ class Graph(Texture):
                 values.append(step.computed(inputs))
         return value(self.result)
 
+    def values_at(self, look: Look, uv: Floats) -> Floats:
+        """Return the value at uv (m, k, 2), (m, k, channels); images are not averaged."""
+        return self.evaluated(_OnSurface(self, look, uv, np.zeros(len(uv)), {}))
+
     def mean(self, look: Look) -> float:
         axis = (np.arange(SIDE) + 0.5) / SIDE
         uv = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(1, -1, 2)

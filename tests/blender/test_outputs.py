@@ -1,0 +1,198 @@
+"""Parts of pictures, mattes, layers, previews, frames, and colors on screens (needs bpy)."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clpt import images
+from clpt.images import exr_files
+
+bpy: Any = pytest.importorskip("bpy")
+blender: Any = pytest.importorskip("blender")
+engine: Any = pytest.importorskip("blender.engine")
+
+pytestmark = pytest.mark.slow
+SIZE = 47, 35
+
+
+@pytest.fixture(autouse=True, scope="module")
+def registered() -> Iterator[None]:
+    blender.register()
+    yield
+    blender.unregister()
+
+
+@pytest.fixture(autouse=True)
+def first_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLPT_PYTHON", sys.executable)
+    bpy.ops.wm.read_factory_settings()
+
+
+def rendered(name: str, folder: Path, samples: int = 64, form: str = "OPEN_EXR") -> Path:
+    """Render with an engine; return the file."""
+    scene = bpy.context.scene
+    scene.render.engine = name
+    scene.cycles.samples, scene.cycles.use_denoising = samples, False
+    scene.clpt.samples, scene.clpt.mode = samples, "rgb"
+    scene.render.resolution_x, scene.render.resolution_y = SIZE
+    scene.render.resolution_percentage = 100
+    kind = "MULTI_LAYER_IMAGE" if form == "OPEN_EXR_MULTILAYER" else "IMAGE"
+    if hasattr(scene.render.image_settings, "media_type"):  # since Blender 5.0
+        scene.render.image_settings.media_type = kind
+    scene.render.image_settings.file_format = form
+    scene.render.image_settings.color_depth = "8" if form == "PNG" else "32"
+    scene.render.filepath = str(folder / f"{name}{scene.render.file_extension}")
+    bpy.ops.render.render(write_still=True)
+    return Path(scene.render.filepath)
+
+
+def channels(file: Path) -> dict[str, np.ndarray]:
+    """Return all channels of a file of several layers, by their names."""
+    parts = range(len(images.part_names(file)))
+    return {
+        name: values
+        for part in parts
+        for name, values in exr_files.read_channels(file, part=part).items()
+    }
+
+
+@pytest.mark.parametrize("crop", [False, True])
+def test_a_border_is_that_of_cycles(crop: bool, tmp_path: Path) -> None:
+    frames = bpy.context.scene.render
+    frames.use_border, frames.use_crop_to_border = True, crop
+    frames.border_min_x, frames.border_max_x = 0.21, 0.73
+    frames.border_min_y, frames.border_max_y = 0.33, 0.87
+    ours, cycles = (np.asarray(images.read(rendered(n, tmp_path))) for n in ("CLPT", "CYCLES"))
+    assert ours.shape == cycles.shape
+    lit = [shown[..., :3].sum(axis=2) > 0.0 for shown in (ours, cycles)]
+    assert np.array_equal(*lit)
+    assert ours.mean() == pytest.approx(cycles.mean(), rel=0.02)
+
+
+def test_mattes_are_those_of_cycles(tmp_path: Path) -> None:
+    """The same names' hashes, and shares of pixels within noise; instances have their own names."""
+    bpy.ops.mesh.primitive_uv_sphere_add(location=(1.5, -1.5, 0.5))
+    copy = bpy.context.object.copy()
+    copy.location, copy.name = (-1.5, 1.0, 0.5), "another"
+    bpy.context.scene.collection.objects.link(copy)
+    layer = bpy.context.scene.view_layers[0]
+    layer.use_pass_cryptomatte_object = layer.use_pass_cryptomatte_material = True
+    layer.pass_cryptomatte_depth = 4
+    found = []
+    for name in ("CLPT", "CYCLES"):
+        shown = channels(rendered(name, tmp_path, 64, "OPEN_EXR_MULTILAYER"))
+        mattes = [channel for channel in shown if "Crypto" in channel]
+        found.append(sorted(mattes))
+        for kind in ("CryptoObject", "CryptoMaterial"):
+            pairs = [
+                [shown[f"ViewLayer.{kind}{level:02d}.{letter}"] for letter in two]
+                for level in range(2)
+                for two in ("rg", "ba")
+            ]
+            ids = np.stack([pair[0] for pair in pairs]).view(np.uint32)
+            shares = np.stack([pair[1] for pair in pairs])
+            covered = {int(i): float(shares[ids == i].sum()) for i in np.unique(ids[shares > 0.0])}
+            found.append(covered)
+    assert found[0] == found[3]
+    for ours, cycles in (found[1:3], found[4:6]), (found[4:6], found[1:3]):
+        for mine, theirs in zip(ours, cycles, strict=True):
+            assert {i for i, share in mine.items() if share > 5.0} <= set(theirs)
+            for i, share in mine.items():
+                assert share == pytest.approx(theirs.get(i, 0.0), rel=0.05, abs=3.0)
+    assert len(found[1]) >= 3
+
+
+def test_a_limit_of_noise_ends_the_render(tmp_path: Path) -> None:
+    whole = np.asarray(images.read(rendered("CLPT", tmp_path)))
+    bpy.context.scene.clpt.noise = 0.1
+    began = time.monotonic()
+    limited = np.asarray(images.read(rendered("CLPT", tmp_path, 1 << 20)))
+    assert time.monotonic() - began < 600.0
+    assert limited.mean() == pytest.approx(whole.mean(), rel=0.05)
+
+
+def test_view_layers_have_pictures_of_their_own(tmp_path: Path) -> None:
+    """The second layer shows no cube; each has its passes."""
+    scene = bpy.context.scene
+    second = scene.view_layers.new("second")
+    second.use_pass_z = True
+    cubes = bpy.data.collections.new("cubes")
+    scene.collection.children.link(cubes)
+    cube = bpy.data.objects["Cube"]
+    cube.users_collection[0].objects.unlink(cube)
+    cubes.objects.link(cube)
+    second.layer_collection.children["cubes"].exclude = True
+    shown = channels(rendered("CLPT", tmp_path, 8, "OPEN_EXR_MULTILAYER"))
+    middle = SIZE[1] // 2, SIZE[0] // 2
+    first, other = (shown[f"{name}.Combined.R"] for name in ("ViewLayer", "second"))
+    assert first.std() > 0.01 and other.std() < 0.01
+    assert first.shape == other.shape == SIZE[::-1]
+    assert shown["second.Depth.Z"][middle] > 1e9
+
+
+def test_frames_of_an_animation(tmp_path: Path) -> None:
+    """A cube that leaves: each frame is a picture of its own time."""
+    cube, scene = bpy.data.objects["Cube"], bpy.context.scene
+    for frame, height in ((1, 0.0), (3, 20.0)):
+        cube.location.z = height
+        cube.keyframe_insert("location", frame=frame)
+    scene.frame_start, scene.frame_end = 1, 3
+    rendered("CLPT", tmp_path, 8)
+    scene.render.filepath = str(tmp_path / "frame")
+    bpy.ops.render.render(animation=True)
+    shown = [np.asarray(images.read(file))[..., :3] for file in sorted(tmp_path.glob("frame*.exr"))]
+    assert len(shown) == 3
+    assert shown[0].std() > 2.0 * shown[2].std()
+
+
+def test_screens_get_the_view_transform_of_blender(tmp_path: Path) -> None:
+    """AgX, Filmic and Standard: a .png is what Blender makes of our linear values, to 1/255."""
+    scene = bpy.context.scene
+    for transform in ("AgX", "Filmic", "Standard"):
+        scene.view_settings.view_transform = transform
+        scene.render.dither_intensity = 0.0
+        linear = rendered("CLPT", tmp_path, 8)
+        screen = np.asarray(images.read(rendered("CLPT", tmp_path, 8, "PNG")))
+        again = bpy.data.images.load(str(linear))
+        again.save_render(str(tmp_path / "again.png"), scene=scene)
+        wanted = np.asarray(images.read(tmp_path / "again.png"))
+        to_bytes = [
+            np.round(255.0 * images.to_srgb8(a).astype(float) / 255.0) for a in (screen, wanted)
+        ]
+        assert np.abs(to_bytes[0] - to_bytes[1]).max() <= 1.0, transform
+        bpy.data.images.remove(again)
+
+
+def test_previews_of_materials(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blender asks for a picture of its ball; it is of the material's color."""
+    rendered_once, shown = threading.Event(), []
+    show, render = engine.ClptEngine._show, engine.ClptEngine.render
+
+    def note(self: Any, layers: dict[str, bytes], size: tuple[int, int], *more: Any) -> None:
+        shown.append(np.frombuffer(layers[""], np.float32).reshape(size[1], size[0], 4))
+        show(self, layers, size, *more)
+
+    def until_the_end(self: Any, depsgraph: Any) -> None:
+        render(self, depsgraph)
+        rendered_once.set()
+
+    monkeypatch.setattr(engine.ClptEngine, "_show", note)
+    monkeypatch.setattr(engine.ClptEngine, "render", until_the_end)
+    bpy.context.scene.render.engine = "CLPT"
+    material = bpy.data.materials["Material"]
+    color = material.node_tree.nodes["Principled BSDF"].inputs["Base Color"]
+    color.default_value = (0.8, 0.02, 0.02, 1.0)
+    with bpy.context.temp_override(id=material):
+        bpy.ops.ed.lib_id_generate_preview()
+    assert rendered_once.wait(120.0)
+    ball = shown[-1]
+    middle = ball[ball.shape[0] // 2, ball.shape[1] // 2]
+    assert middle[0] > 3.0 * middle[2] > 0.0
