@@ -149,9 +149,14 @@ class Tree:
         return read(self, at)
 
     def color(self, at: Site, key: str) -> Any:
-        """Return a color input: three numbers or a texture."""
-        expression = Expression(self)
-        return _positive(expression.g.finished(expression.input(at, key), wide=True))
+        """Return a color input: three numbers in [0, 1] or a texture."""
+        color = self.made(lambda e: e.input(at, key), wide=True)
+        return [min(max(c, 0.0), 1.0) for c in color] if isinstance(color, list) else color
+
+    def share(self, at: Site, key: str, default: float) -> Any:
+        """Return a number in [0, 1] or a texture."""
+        value = self.number(at, key, default)
+        return min(max(value, 0.0), 1.0) if isinstance(value, float) else value
 
     def number(self, at: Site, key: str, default: float = 0.0) -> Any:
         """Return an input that is a number or a texture; `default` where a node lacks it."""
@@ -207,28 +212,27 @@ class Tree:
         return material
 
 
-def _positive(value: Any) -> Any:
-    return [max(part, 0.0) for part in value] if isinstance(value, list) else value
-
-
 def _principled(tree: Tree, at: Site) -> tuple[Json, Any]:
     color, through = tree.color(at, "Base Color"), tree.number(at, "Transmission Weight")
+    coat = tree.number(at, "Coat Weight")
+    coat_ior = min(max(tree.single(at, "Coat IOR", 1.5), 1.0), 3.0)
+    index = tree.single(at, "IOR", 1.5)
+    if coat != 0.0 and through == 0.0:  # Cycles' base meets air, that of OpenPBR its coat
+        index *= 1.0 + (coat_ior - 1.0) * (coat if isinstance(coat, float) else 1.0)
     values: Json = {
         "base_weight": 1.0,
         "base_color": color,
+        "specular_ior": min(max(index, 1.0), 4.0),
         "base_metalness": tree.number(at, "Metallic"),
         "base_diffuse_roughness": tree.number(at, "Diffuse Roughness"),
         "specular_weight": tree.made(lambda e: e.input(at, "Specular IOR Level") * 2.0),
         "specular_color": tree.color(at, "Specular Tint"),
-        "specular_roughness": tree.number(at, "Roughness", 0.5),
-        "specular_ior": min(max(tree.single(at, "IOR", 1.5), 1.0), 4.0),
-        "specular_roughness_anisotropy": tree.number(at, "Anisotropic"),
-        "anisotropy_rotation": tree.made(lambda e: e.input(at, "Anisotropic Rotation") * 360.0),
+        **_stretched(tree, at, "Anisotropic", "Anisotropic Rotation"),
         "transmission_weight": through,
-        "coat_weight": tree.number(at, "Coat Weight"),
+        "coat_weight": coat,
         "coat_roughness": tree.number(at, "Coat Roughness"),
         "coat_color": tree.color(at, "Coat Tint"),
-        "coat_ior": min(max(tree.single(at, "Coat IOR", 1.5), 1.0), 3.0),
+        "coat_ior": coat_ior,
         "coat_darkening": 0.0,
         "fuzz_weight": tree.number(at, "Sheen Weight"),
         "fuzz_roughness": tree.number(at, "Sheen Roughness", 0.5),
@@ -245,7 +249,7 @@ def _principled(tree: Tree, at: Site) -> tuple[Json, Any]:
             "thin_film_thickness": tree.made(lambda e: e.input(at, "Thin Film Thickness") * 1e-3),
         }  # fmt: skip
     material = tree.bent(at, {"type": "openpbr", **_plain(values)})
-    alpha = tree.number(at, "Alpha", 1.0)
+    alpha = tree.share(at, "Alpha", 1.0)
     if alpha != 1.0:
         material = {"type": "mask", "material": material, "opacity": alpha}
     return _both(material, through), tree.light(at, "Emission Color", "Emission Strength")
@@ -281,17 +285,30 @@ def _open(tree: Tree, at: Site, **values: Any) -> tuple[Json, Any]:
     return _both(tree.bent(at, {**plain, **_plain(values)})), None
 
 
+def _stretched(tree: Tree, at: Site, key: str, turn: str) -> Json:
+    """Return facets of OpenPBR. Cycles' alphas are r^2 by a number and over it."""
+    rough, amount = tree.number(at, "Roughness", 0.5), tree.number(at, key)
+    angle = tree.made(lambda e: e.input(at, turn) * 360.0)
+    if isinstance(rough, float) and isinstance(amount, float) and amount != 0.0:
+        glossy = at.node.type == "BSDF_GLOSSY"  # whose stretch is along the bitangent
+        ratio = (1.0 - min(abs(amount), 0.95)) ** 2 if glossy else 1.0 - 0.9 * min(amount, 1.0)
+        rough = min(rough * ((1.0 + ratio**2) / (2.0 * ratio)) ** 0.25, 1.0)
+        amount = 1.0 - ratio
+        angle = angle + 90.0 if glossy and isinstance(angle, float) else angle
+    return {
+        "specular_roughness": rough, "specular_roughness_anisotropy": amount,
+        "anisotropy_rotation": angle,
+    }  # fmt: skip
+
+
 def _glossy(tree: Tree, at: Site) -> tuple[Json, Any]:
     return _open(
         tree, at, base_metalness=1.0, base_color=tree.color(at, "Color"), specular_weight=1.0,
-        specular_roughness=tree.number(at, "Roughness", 0.5),
-        specular_roughness_anisotropy=tree.number(at, "Anisotropy"),
-        anisotropy_rotation=tree.made(lambda e: e.input(at, "Rotation") * 360.0),
+        **_stretched(tree, at, "Anisotropy", "Rotation"),
     )  # fmt: skip
 
 
 def _metallic(tree: Tree, at: Site) -> tuple[Json, Any]:
-    rough = tree.number(at, "Roughness", 0.5)
     if at.node.fresnel_type == "PHYSICAL_CONDUCTOR":
         alpha = tree.made(lambda e: e.input(at, "Roughness") * e.input(at, "Roughness"))
         metal = {
@@ -302,14 +319,13 @@ def _metallic(tree: Tree, at: Site) -> tuple[Json, Any]:
         return _both(tree.bent(at, metal)), None
     return _open(
         tree, at, base_metalness=1.0, base_color=tree.color(at, "Base Color"), specular_weight=1.0,
-        specular_color=tree.color(at, "Edge Tint"), specular_roughness=rough,
-        specular_roughness_anisotropy=tree.number(at, "Anisotropy"),
-        anisotropy_rotation=tree.made(lambda e: e.input(at, "Rotation") * 360.0),
+        specular_color=tree.color(at, "Edge Tint"),
+        **_stretched(tree, at, "Anisotropy", "Rotation"),
     )  # fmt: skip
 
 
 def _wide(alpha: Any) -> Any:
-    return max(alpha, 1e-4) if isinstance(alpha, float) else alpha
+    return min(max(alpha, 1e-4), 1.0) if isinstance(alpha, float) else alpha
 
 
 def _glass(tree: Tree, at: Site) -> tuple[Json, Any]:
@@ -387,8 +403,9 @@ def _toon(tree: Tree, at: Site) -> tuple[Json, Any]:
 
 
 def _holdout(tree: Tree, at: Site) -> tuple[Json, Any]:
-    tree.tell(f"{at.node.bl_label} is read as nothing at all")
-    return {"type": "null"}, None
+    portal = at.node.type == "BSDF_RAY_PORTAL"
+    tree.tell(f"{at.node.bl_label} is {'not there' if portal else 'black, and not transparent'}")
+    return {"type": "null"} if portal else {"type": "diffuse", "reflectance": 0.0}, None
 
 
 def _mix(tree: Tree, at: Site) -> tuple[Json, Any]:
@@ -402,10 +419,23 @@ def _mix(tree: Tree, at: Site) -> tuple[Json, Any]:
     coated = None if factor is None else _coated(tree, at, factor)
     if coated is not None:
         return coated
-    share = tree.number(at, "Fac", 0.5)
+    share = tree.share(at, "Fac", 0.5)
     if share in (0.0, 1.0):
         return parts[int(share)]
-    return _blended(tree, *parts, share)
+    made, light = _blended(tree, *parts, share)
+    gone = [part["type"] == "null" for part, _ in parts]
+    if any(gone) and not all(gone):
+        there = parts[int(gone[0])][0]
+        opacity = share if gone[0] else tree.made(lambda e: 1.0 - e.input(at, "Fac").clamped())
+        made = _masked(there, opacity)
+    return made, light
+
+
+def _masked(material: Json, opacity: Any) -> Json:
+    """Return a material that is there by a share; masks lie within two sides."""
+    if material["type"] == "two_sided" and "back" not in material:
+        return _both(_masked(material["front"], opacity))
+    return {"type": "mask", "material": material, "opacity": opacity}
 
 
 def _coated(tree: Tree, at: Site, factor: Site) -> tuple[Json, Any] | None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib.util
 import time
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ def _render(link: Link, message: dict[str, Any]) -> None:
     """Render a file until its samples are there, its noise is low, or Blender says stop."""
     scene = _scene(message)
     total, noise = int(message["samples"]), message.get("noise") or None
-    denoise = "oidn" if message.get("denoise") else None
+    denoise = _denoiser() if message.get("denoise") else None
     shown = time.monotonic()
     with clpt.Renderer(scene, denoise=denoise, cancel_seconds=0.1) as renderer:
         link.send({"samples": 0, "warnings": [*scene.warnings, *renderer.warnings]})
@@ -51,13 +52,18 @@ def _render(link: Link, message: dict[str, Any]) -> None:
                 shown = time.monotonic()
         while not link.inbox.empty():
             link.inbox.get()  # the order to stop
-        image = renderer.denoised() if denoise else renderer.image()
+        image = renderer.denoised() if denoise and renderer.samples else renderer.image()
         layers = renderer.layers() if message["layers"] else {}
         link.send(
             {"samples": renderer.samples, "done": True},
             pixels(image),
             *(_upward(layers[name], WIDTHS.get(name, 0)) for name in message["layers"]),
         )
+
+
+def _denoiser() -> str:
+    """Return Open Image Denoise where it is installed, else clpt's own denoiser."""
+    return "statistical" if importlib.util.find_spec("pyoidn") is None else "oidn"
 
 
 def _scene(message: dict[str, Any]) -> Scene:

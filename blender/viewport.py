@@ -116,6 +116,8 @@ class Viewport:
 
     def update(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Take what has changed in Blender's scene."""
+        if self.process is None:
+            self._start()  # it loads clpt while the scene is read
         if self.writer is None:
             self.writer = LiveWriter(depsgraph, self.folder)
         settings = depsgraph.scene.clpt
@@ -129,8 +131,8 @@ class Viewport:
         if self.scene is not None:
             changes["scene"] = self.scene
         changes |= {name: value for name, value in view.items() if self.view.get(name) != value}
-        if changes and (self.process is not None or self.scene is not None):
-            self._send(changes if self.process is not None else changes | view)
+        if changes and self.process is not None:
+            self._send(changes)
             self.scene, self.view = None, view
         self.listen()
         if self.picture is not None:
@@ -165,13 +167,19 @@ class Viewport:
         self.process, self.picture, self.texture = None, None, None
         self.end()
 
+    def _start(self) -> None:
+        self.view = {}
+        try:
+            self.process = process.take(preferences.python())
+            self.process.send({"live": {"folder": str(self.folder)}})
+            bpy.app.timers.register(_listening(self), first_interval=LISTENS_EVERY)
+        except process.ProcessError as error:
+            self._fail(str(error))
+
     def _send(self, changes: Json) -> None:
         self.serial += 1
         try:
-            if self.process is None:
-                self.process = process.take(preferences.python())
-                self.process.send({"live": {"folder": str(self.folder)}})
-                bpy.app.timers.register(_listening(self), first_interval=LISTENS_EVERY)
+            assert self.process is not None
             self.process.send({**changes, "serial": self.serial})
         except process.ProcessError as error:
             self._fail(str(error))

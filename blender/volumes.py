@@ -88,11 +88,11 @@ def _add(tree: Tree, at: Site, sums: Sums, phases: list[Json], *, grid: bool) ->
 
 
 def _color(tree: Tree, at: Site, key: str) -> np.ndarray:
-    color = tree.color(at, key)
+    color = tree.made(lambda e: e.input(at, key), wide=True)
     if isinstance(color, dict):
         tree.tell(f"{key} of {at.node.bl_label} cannot vary")
         color = NOTHING if key.startswith("Emission") else [0.5] * 3
-    return np.array(color, np.float64)
+    return np.maximum(np.array(color, np.float64), 0.0)
 
 
 def _phase(tree: Tree, at: Site) -> Json:

@@ -7,6 +7,7 @@ import json
 import os
 import sys
 import threading
+from contextlib import suppress
 from multiprocessing.connection import Client, Connection
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -51,13 +52,15 @@ def main() -> None:
     key = sys.stdin.buffer.read()
     with Client(("127.0.0.1", int(sys.argv[1])), authkey=key) as connection:
         link = Link(connection)
+        with suppress(Exception):  # told below; after the connection, while Blender reads its scene
+            import rendering
         while True:
             try:
                 message = link.inbox.get(timeout=IDLE)
             except Empty:
                 return
             try:
-                import rendering  # after the connection: Blender hears of a clpt that is missing
+                import rendering
 
                 rendering.answer(link, message)
             except Exception as error:  # whatever happens, Blender is told

@@ -32,7 +32,7 @@ def pip(*words: str) -> bool:
     return subprocess.run(command, check=False).returncode == 0
 
 
-def wheels(platform: str) -> tuple[list[Path], list[str]]:
+def wheels(platform: str, extras: str = "") -> tuple[list[Path], list[str]]:
     """Return the wheels for a platform, and the names of packages that are missing."""
     folder = WHEELS / platform
     folder.mkdir(parents=True, exist_ok=True)
@@ -41,11 +41,12 @@ def wheels(platform: str) -> tuple[list[Path], list[str]]:
     built = pip("wheel", "--no-deps", "--wheel-dir", str(folder), str(ROOT))
     tags = [word for tag in TAGS[platform] for word in ("--platform", tag)]
     where = ["--dest", str(folder), "--find-links", str(folder), "--only-binary", ":all:"]
-    own = [str(file) for file in folder.glob("clpt-*.whl")]
+    own = [f"{file}{extras}" for file in folder.glob("clpt-*.whl")]
     loaded = built and pip("download", *own, *where, *tags, "--python-version", PYTHON)
     found = {plain(file.name.split("-")[0]): file for file in sorted(folder.glob("*.whl"))}
     missing = [] if loaded else [name for name in needed() if name not in found]
-    return [file for name, file in found.items() if name not in BROUGHT], missing
+    left_out = BROUGHT if extras else (*BROUGHT, "pyoidn")
+    return [file for name, file in found.items() if name not in left_out], missing
 
 
 def needed() -> list[str]:
@@ -59,13 +60,16 @@ def plain(name: str) -> str:
     return name.replace("_", "-").lower()
 
 
-def write(out: Path, platforms: list[str]) -> list[str]:
-    """Write the extension; return the names of packages that are missing."""
+def write(out: Path, platforms: list[str], extras: str = "") -> list[str]:
+    """Write the extension; return the names of packages that are missing.
+
+    extras: of clpt, in brackets.
+    """
     manifest = (ROOT / "blender" / "blender_manifest.toml").read_text("utf-8")
     files: dict[str, Path] = {}
     missing: list[str] = []
     for platform in platforms:
-        there, lacks = wheels(platform)
+        there, lacks = wheels(platform, extras)
         files |= {f"wheels/{file.name}": file for file in there}
         missing += [name for name in lacks if name not in missing]
     listed = "".join(f'  "./{name}",\n' for name in sorted(files))
@@ -86,9 +90,10 @@ def main() -> None:
     """Write the .zip, and say what it lacks."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--platform", action="append", choices=TAGS, help="by default linux-x64")
+    parser.add_argument("--denoise", action="store_true", help="with Open Image Denoise, 88 MB")
     parser.add_argument("--out", type=Path, default=ROOT / "clpt_blender.zip")
     given = parser.parse_args()
-    missing = write(given.out, given.platform or ["linux-x64"])
+    missing = write(given.out, given.platform or ["linux-x64"], "[denoise]" * given.denoise)
     print(f"{given.out}: {given.out.stat().st_size / 1e6:.1f} MB")
     if missing:
         print(

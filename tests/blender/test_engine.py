@@ -216,7 +216,8 @@ def test_passes_are_those_of_cycles(tmp_path: Path) -> None:
     layer = bpy.context.scene.view_layers[0]
     for option in ("use_pass_z", "use_pass_normal", "use_pass_position"):
         setattr(layer, option, True)
-    bpy.context.scene.render.image_settings.media_type = "MULTI_LAYER_IMAGE"
+    if bpy.app.version >= (5, 0, 0):
+        bpy.context.scene.render.image_settings.media_type = "MULTI_LAYER_IMAGE"
     shown = {}
     for engine in ("CLPT", "CYCLES"):
         scene = bpy.context.scene

@@ -80,5 +80,6 @@ def test_a_million_triangles(tmp_path: Path, record_property: Any) -> None:
     written = time.perf_counter() - began
     (part,) = shape_files.read_meshes(tmp_path / file, "error").meshes
     read = time.perf_counter() - began - written
-    assert len(part.faces) == 2 * 708**2 and len(part.vertices) == 709**2
+    assert len(part.faces) == 2 * 708**2
+    assert 709**2 <= len(part.vertices) < 1.05 * 709**2  # UVs of Blender 4.5 differ in a last bit
     record_property("seconds", {"written": written, "read": read})
