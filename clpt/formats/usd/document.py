@@ -190,12 +190,12 @@ def _prims(document: Document, root: Usd.Prim, defined: bool) -> Iterator[Usd.Pr
     anywhere = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
     iterator = iter(Usd.PrimRange(root, Usd.PrimDefaultPredicate if defined else anywhere))
     for prim in iterator:
-        visibility = prim.GetAttribute("visibility")
-        if visibility and visibility.Get(document.time) == "invisible":
+        said = prim.GetAuthoredPropertyNames()  # most prims say neither
+        if "visibility" in said and document.value(prim, "visibility") == "invisible":
             iterator.PruneChildren()
             if prim.GetTypeName() != "Camera":
                 continue
-        elif prim.GetAttribute("purpose").Get() in HIDDEN:
+        elif "purpose" in said and prim.GetAttribute("purpose").Get() in HIDDEN:
             iterator.PruneChildren()
             continue
         elif prim.GetTypeName() == "PointInstancer":
