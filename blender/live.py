@@ -169,7 +169,8 @@ class Follower:
             if self.renderer is None or former is None or former.film is not film:
                 self.close()
                 self.scene = scene
-                self.renderer = clpt.Renderer(small, beside=beside, cancel_seconds=CANCEL_SECONDS)
+                options = {"cancel_seconds": CANCEL_SECONDS, "programs": "shared"}
+                self.renderer = clpt.Renderer(small, beside=beside, **options)
             else:
                 self.renderer.update(**(_edits(former, scene) or {"scene": small}))
         except BaseException:

@@ -87,6 +87,14 @@ class Document(Once):
         budget.check(size, f"{name} of {prim.GetPath()}", self.file)
         return rows(value, width, kind)
 
+    def points(self, prim: Usd.Prim, kind: type = np.float32) -> Any:
+        """Return a prim's points (n, 3); None for none, and with a warning for one not finite."""
+        points = self.array(prim, "points", 3, kind)
+        if points is None or np.isfinite(points).all():
+            return points
+        self.warn("left out, as a point of it is not finite", prim.GetPath())
+        return None
+
     def placement(self, prim: Usd.Prim) -> Matrix:
         """Return a prim's transform to the world, or of a prototype's prim to the prototype."""
         return self.placements([prim])[0]
@@ -154,7 +162,7 @@ GPRIMS = frozenset(
 )  # fmt: skip
 UNREAD = frozenset(
     ("NurbsPatch", "NurbsCurves", "HermiteCurves", "TetMesh", "LightFilter", "PluginLightFilter",
-     "ParticleField3DGaussianSplat", "ParticleField")
+     "ParticleField3DGaussianSplat", "ParticleField", "Skeleton")
 )  # fmt: skip
 HIDDEN = ("proxy", "guide")  # purposes that no picture shows
 

@@ -29,6 +29,7 @@ LEAVES: tuple[type[mt.Material], ...] = (
     mt.Principled,
 )
 SEEN_THROUGH: tuple[type[mt.Material], ...] = (mt.ThinDielectric, mt.Null)
+SURFACES: tuple[type[mt.Material], ...] = (mt.GltfSurface, mt.Openpbr)  # those of whole scenes
 LIGHTS = ("constant", "disk", "envmap", "rectangle", "sphere", "triangle")
 TEXTURES = (
     ("bitmap", "real"),
@@ -38,7 +39,8 @@ TEXTURES = (
     ("packed_bitmap", "reflectance"),
 )
 MIXTURES = 2  # masks in blends, or blends in masks
-LOBES = ("absorption", "clearcoat", "metallic", "spec_tint")  # those that 0 leaves out
+# Lobes that 0 leaves out
+LOBES = ("absorption", "base_metalness", "clearcoat", "coat_weight", "metallic", "spec_tint")
 INNER: Sources = frozenset({
     ("emission", "value", "constant"),
     ("emission", "value", "table"),
@@ -59,7 +61,8 @@ def leaves(own: tuple[type[mt.Material], ...]) -> tuple[type[mt.Material], ...]:
 def widened(own: Features) -> Features:
     """Return the features of a shared program for the features of a scene."""
     lights, textures, materials = own.lights, own.textures, own.materials
-    usual = [cls for cls in (*LEAVES, *SEEN_THROUGH) if cls in materials.leaves]
+    every = (*LEAVES, *SEEN_THROUGH, *SURFACES)
+    usual = [cls for cls in every if cls in materials.leaves]
     transmitting = (cls.kind for cls in usual if cls().transmits)
     return replace(
         own,

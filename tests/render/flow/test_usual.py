@@ -64,7 +64,14 @@ def texts(shown: Scene) -> str:
     return repr(sorted(found.items()))
 
 
-@pytest.mark.parametrize("kinds", [MATERIALS, SEEN_THROUGH])
+SURFACES: Mapping[str, mt.Material] = {
+    "plain": mt.Openpbr(),
+    "metal": mt.Openpbr(base_metalness=1.0),
+    "coated": mt.Openpbr(base_color=textures.Bitmap(image=IMAGE), coat_weight=0.5),
+}
+
+
+@pytest.mark.parametrize("kinds", [MATERIALS, SEEN_THROUGH, SURFACES])
 def test_scenes_of_the_usual_materials_have_one_program(kinds):
     assert len({texts(scene(material, light_paths=0)) for material in kinds.values()}) == 1
 
@@ -92,6 +99,7 @@ def blocks(shown: Scene, kind: str) -> np.ndarray:
 CASES = {
     **{name: scene(material, light_paths=0) for name, material in MATERIALS.items()},
     **{name: scene(material, light_paths=0) for name, material in SEEN_THROUGH.items()},
+    **{name: scene(material, light_paths=0) for name, material in SURFACES.items()},
     **{name: scene(mt.Diffuse(), light(), light_paths=0) for name, light in LIGHTS.items()},
     "light paths": scene(mt.Diffuse(), light_paths=1),
     "caustic": scene(mt.Dielectric(), light_paths=1),
