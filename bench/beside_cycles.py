@@ -32,7 +32,6 @@ from rich.table import Table
 
 import clpt
 from bench import machine
-from bench.efficiency import APART, WAYS, relative_mse, watched, way_option
 from bench.hard_light.scenes import (
     GLASS,
     SCENES,
@@ -48,6 +47,8 @@ from bench.hard_light.scenes import (
     sides,
 )  # fmt: skip
 from bench.meshes import write_ply
+from bench.peer_figures import relative_mse
+from bench.peers import APART, WAYS, watched, way_option
 from clpt import transforms
 from clpt.geometry.winding import triangles_of
 from clpt.scene import materials

@@ -12,13 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from bench import gpu_page
+from bench.peer_figures import gain, rate
 
 RESULTS = Path(__file__).parent / "results"
 POCL = "Portable Computing Language"  # its platform's name
 WHICH = (
     "scene", "mode", "renderer", "sampler", "threads", "layout", "rays", "query", "effect",
     "figure", "triangles", "builder", "bent", "as_file", "size", "benchmark_version", "way",
-    "runtime",
+    "runtime", "film", "contender",
 )  # fmt: skip
 
 HEAD = """# What was measured
@@ -142,34 +143,33 @@ def figures(rows: Sequence[Row]) -> str:
     return table(headings, map(cells, rows))
 
 
-def efficiency(rows: Sequence[Row]) -> str:
-    """Scenes as their files are, clpt's figure before Mitsuba's; seconds of processor time."""
-    best = best_ways(rows)
-
-    def cells(pair: Sequence[Row]) -> list[str]:
-        row, *others = pair
-        pairs = ("msamples", "relmse", "busy", "first_warm", "peak_mib")
-        return [
-            *(str(row[name]) for name in ("scene", "mode", "threads")),
-            runtime_of(row),
-            "the file's" if row["as_file"] else "box",
-            "the file's" if sampler_of(row) == "file" else "multijitter",
-            row.get("way", "file"),
-            *(f"**{row[name]:.2f}**" for name in ("efficiency_ratio", "rate_ratio")),
-            ", ".join(f"{row['way']} {row['efficiency_ratio']:.2f}" for row in others),
-            *(" / ".join(f"{v:g}" for v in row.get(name, ())) for name in pairs),
-        ]
-
-    headings = ["scene", "mode", "threads", "runtime", "filter", "Mitsuba's sampler"]
-    headings += ["clpt's best way"]
-    headings += ["efficiency : Mitsuba", "rate : Mitsuba", "efficiency of other ways"]
-    headings += ["Msamples/s", "relMSE", "cores busy", "first sample with caches", "peak [MiB]"]
-    return table(headings, map(cells, best)) + "\n" + geometric_means([row for row, *_ in best])
-
-
-def sampler_of(row: Row) -> str:
-    """Return whether Mitsuba had the file's sampler or its best sampler, for all rows."""
-    return str(row.get("sampler", "file" if row["as_file"] else "best"))
+def peers(rows: Sequence[Row]) -> str:
+    """Scenes of others as their files are: clpt's efficiency over each contender, and its error."""
+    parts = []
+    for (film, mode, runtime, as_file), every in peer_films(rows).items():
+        names = list(dict.fromkeys(str(r["contender"]) for group in every.values() for r in group))
+        body, gains = [], {name: [] for name in names}
+        for scene, group in every.items():
+            by_name = {str(row["contender"]): row for row in group}
+            own = by_name["file"]
+            cells = [scene, f"{rate(own):.2f}", f"{np.mean(own['relmse']):.4f}"]
+            for name in names:
+                if name not in by_name:
+                    cells.append("")
+                    continue
+                ratio, error = gain(own, by_name[name])
+                gains[name].append(ratio)
+                cells.append("" if name == "file" else f"{ratio:.2f} ± {error:.2f}")
+            body.append(cells)
+        means = (
+            "" if name == "file" else f"{np.exp(np.mean(np.log(gains[name]))):.2f}"
+            for name in names
+        )
+        body.append(["geometric mean", "", "", *means])
+        heads = ["scene", "Msamples/s", "relMSE", *names]
+        filtered = "the file's filter" if as_file else "box filter"
+        parts.append(f"{film}, {mode}, {runtime}, {filtered}:\n\n" + table(heads, body))
+    return "\n".join(parts)
 
 
 def runtime_of(row: Row) -> str:
@@ -177,20 +177,13 @@ def runtime_of(row: Row) -> str:
     return str(row.get("runtime", POCL))
 
 
-def best_ways(rows: Sequence[Row]) -> list[list[Row]]:
-    """The newest rows of the newest film of each comparison, the most efficient way first."""
-    groups: dict[tuple[object, ...], dict[str, Row]] = {}
-    for row in sorted(rows, key=lambda row: str(row["date"])):
-        about = (row[name] for name in ("mode", "as_file", "threads", "scene"))
-        film = str(row["size"]), "way" in row
-        group = groups.setdefault((*about, runtime_of(row), sampler_of(row)), {})
-        if any((str(old["size"]), "way" in old) != film for old in group.values()):
-            group.clear()
-        group[str(row.get("way"))] = row
-    ordered = sorted(groups.items(), key=lambda item: tuple(map(str, item[0])))
-    return [
-        sorted(group.values(), key=lambda row: -row["efficiency_ratio"]) for _, group in ordered
-    ]
+def peer_films(rows: Sequence[Row]) -> dict[tuple[object, ...], dict[str, list[Row]]]:
+    """The rows of `bench.peers` by film, mode, runtime and filter, and then by scene."""
+    films: dict[tuple[object, ...], dict[str, list[Row]]] = {}
+    for row in rows:
+        film = (row["film"], row["mode"], runtime_of(row), row["as_file"])
+        films.setdefault(film, {}).setdefault(str(row["scene"]), []).append(row)
+    return films
 
 
 def hard_light(rows: Sequence[Row]) -> str:
@@ -231,22 +224,6 @@ def media(rows: Sequence[Row]) -> str:
 
     headings = ["scene", "mode", "renderer", "samples", "Msamples/s", "relMSE", "efficiency"]
     return table([*headings, "over the best of Mitsuba's", "bias"], map(cells, rows))
-
-
-def geometric_means(rows: Sequence[Row]) -> str:
-    """Efficiency over all scenes, by mode, threads, runtime, filter and Mitsuba's sampler."""
-    groups: dict[tuple[object, ...], list[float]] = {}
-    for row in rows:
-        which = (row["mode"], row["threads"], runtime_of(row), row["as_file"], sampler_of(row))
-        groups.setdefault(which, []).append(float(row["efficiency_ratio"]))
-    lines = [
-        f"- {mode}, {threads} thread(s), {runtime}, {'the file' if as_file else 'box'}'s filter, "
-        f"Mitsuba's {'best sampler' if sampler == 'best' else 'sampler by the file'}: "
-        f"geometric mean {np.exp(np.mean(np.log(ratios))):.2f}, least {min(ratios):.2f}, "
-        f"of {len(ratios)} scenes"
-        for (mode, threads, runtime, as_file, sampler), ratios in groups.items()
-    ]
-    return "\n".join(["Efficiency over Mitsuba's:", "", *lines, ""])
 
 
 def sizes(rows: Sequence[Row]) -> str:
@@ -294,7 +271,9 @@ def shares(rows: Sequence[Row]) -> str:
 TABLES: dict[str, Callable[[Sequence[Row]], str]] = {
     **dict.fromkeys(("bandwidth", "rays", "stages", "shading", "build", "start"), figures),
     "renders": renders,
-    "efficiency": efficiency,
+    "peers": peers,
+    "sharing": plain,
+    "efficiency": plain,
     "hard_light": hard_light,
     "media": media,
     "voxels": plain,

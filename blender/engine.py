@@ -54,7 +54,7 @@ class ClptEngine(bpy.types.RenderEngine):
         """Take what has changed in the scene that a viewport shows."""
         if self.viewport is None:
             self.viewport = Viewport(self)
-        self.viewport.update(depsgraph)
+        self.viewport.update(context, depsgraph)
 
     def view_draw(self, context: Any, depsgraph: bpy.types.Depsgraph) -> None:
         """Draw the picture of a viewport."""

@@ -169,7 +169,8 @@ class Follower:
             if self.renderer is None or former is None or former.film is not film:
                 self.close()
                 self.scene = scene
-                self.renderer = clpt.Renderer(small, beside=beside, cancel_seconds=CANCEL_SECONDS)
+                options = {"cancel_seconds": CANCEL_SECONDS, "programs": "shared"}
+                self.renderer = clpt.Renderer(small, beside=beside, **options)
             else:
                 self.renderer.update(**(_edits(former, scene) or {"scene": small}))
         except BaseException:
@@ -245,7 +246,7 @@ class Live:
         self.whole, self.moving = Follower(1), Follower(4)
         self.described: dict[str, Any] = {}
         self.scene: Scene | None = None
-        self.film, self.size = Film(), [1, 1]
+        self.film, self.film_key, self.size = Film(), "", [1, 1]
         self.serial = 0  # of the newest message that changes the picture
         self.is_new = self.moves = False
         self.sent = self.cost = 0.0
@@ -300,14 +301,8 @@ class Live:
         self.size = changes.get("size", self.size)
         if self.described.get("camera") is None or "shapes" not in self.described:
             return
-        width, height = self.size
-        film = Film(
-            width=width, height=height, mode=self.settings["mode"],
-            alpha=self.described["film"]["alpha"],
-        )  # fmt: skip
-        if fields_of(film) != fields_of(self.film):
-            self.film = film
         try:
+            self.film = self._film()
             if self.scene is None or "scene" in changes:
                 self.scene = self.parts.scene(self.described, self.film)
             else:
@@ -317,6 +312,17 @@ class Live:
             self._fail(error)
             return
         self.moves, self.is_new = True, False
+
+    def _film(self) -> Film:
+        """Return the film; the same object as before where nothing of it differs."""
+        key = json.dumps([self.described["film"], self.size, self.settings["mode"]])
+        if key == self.film_key:
+            return self.film
+        content = {"version": 2, "camera": self.described["camera"], "film": self.described["film"]}
+        film = read.from_json(content, self.parts.folder).film
+        width, height = self.size
+        self.film_key = key
+        return dataclasses.replace(film, width=width, height=height, mode=self.settings["mode"])
 
     def _fail(self, error: Exception) -> None:
         self.scene = None

@@ -35,7 +35,10 @@ class Process:
             command = [self.python, str(WORKER), str(listener.address[1])]
             try:
                 self.child = subprocess.Popen(
-                    command, stdin=subprocess.PIPE, env=environment(self.python)
+                    command,
+                    stdin=subprocess.PIPE,
+                    env=environment(self.python),
+                    creationflags=subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0,
                 )
             except OSError as error:
                 raise ProcessError(f"{command[0]} does not start: {error.strerror}") from None

@@ -85,6 +85,10 @@ class Writer:
         file.write_text(json.dumps(self.describe()), "utf-8")
         return file
 
+    def shows(self, instance: bpy.types.DepsgraphObjectInstance) -> bool:
+        """Return whether an instance is in the picture."""
+        return instance.show_self
+
     def describe(self) -> Json:
         """Write meshes and images; return the scene that names their files."""
         shapes: list[Json] = []
@@ -96,7 +100,7 @@ class Writer:
             source, matrix = instance.object, instance.matrix_world.copy()  # gone after its turn
             if instance.show_particles and not instance.is_instance:
                 shapes += self._particles(source)
-            if not instance.show_self:
+            if not self.shows(instance):
                 continue
             if source.type in SURFACES or source.type == "CURVES":
                 self.tree.random = _random(instance)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+import traceback
 import weakref
 from pathlib import Path
 from typing import Any, ClassVar
@@ -27,10 +28,12 @@ class LiveWriter(scenes.Writer):
         super().__init__(depsgraph, folder, 1, 1, lambda *_, **__: None)
         self.kept: dict[Key, dict[int, str]] = {}
         self.used: set[Key] = set()
+        self.space: bpy.types.SpaceView3D | None = None
 
-    def again(self, depsgraph: bpy.types.Depsgraph) -> Json:
-        """Return the description of the scene as it is now."""
+    def again(self, depsgraph: bpy.types.Depsgraph, space: Any) -> Json:
+        """Return the description of the scene as it is now, in a 3D view with its local view."""
         self.depsgraph = depsgraph
+        self.space = space if isinstance(space, bpy.types.SpaceView3D) else None
         self.materials, self.named, self.groups, self.media = {}, {}, {}, {}
         self.used = set()
         changed = set()
@@ -54,6 +57,11 @@ class LiveWriter(scenes.Writer):
         for key in keys:
             for file in self.kept.pop(key).values():
                 (self.folder / file).unlink(missing_ok=True)
+
+    def shows(self, instance: bpy.types.DepsgraphObjectInstance) -> bool:
+        source = instance.parent or instance.object
+        local = self.space is None or source.original.visible_in_viewport_get(self.space)
+        return local and super().shows(instance)
 
     def _files(self, number: int, source: Any) -> dict[int, str]:
         key = (source.original.session_uid, source.data.as_pointer(), *self.wanted(source))
@@ -114,14 +122,19 @@ class Viewport:
         self.end = weakref.finalize(self, folder.cleanup)
         self.known.add(self)
 
-    def update(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def update(self, context: Any, depsgraph: bpy.types.Depsgraph) -> None:
         """Take what has changed in Blender's scene."""
         if self.process is None:
             self._start()  # it loads clpt while the scene is read
         if self.writer is None:
             self.writer = LiveWriter(depsgraph, self.folder)
         settings = depsgraph.scene.clpt
-        self.scene = self.writer.again(depsgraph)
+        try:
+            self.scene = self.writer.again(depsgraph, context.space_data)
+        except Exception as error:  # a fault of the add-on is a line, and Blender goes on
+            traceback.print_exc()
+            self._tell(f"{type(error).__name__}: {error}")
+            return
         self.scene["settings"] = {"mode": settings.mode, "samples": settings.viewport_samples}
 
     def draw(self, context: Any) -> None:
@@ -169,6 +182,7 @@ class Viewport:
 
     def _start(self) -> None:
         self.view = {}
+        self.engine.update_stats("clpt", "prepares the picture")
         try:
             self.process = process.take(preferences.python())
             self.process.send({"live": {"folder": str(self.folder)}})
@@ -202,6 +216,9 @@ class Viewport:
         if self.process is not None:
             self.process.stop()
         self.process = None
+        self._tell(text)
+
+    def _tell(self, text: str) -> None:
         self.engine.update_stats("clpt", text)
         self.engine.report({"ERROR"}, f"clpt: {text}")
 

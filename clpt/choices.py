@@ -43,6 +43,9 @@ PICTURE_SIZES = ("quick", "standard", "large")  # of the benchmark
 Quality = Literal["high", "fast"]
 """high: the surface area heuristic down to the leaves, on CPUs large trees improved by reinsertion;
 fast: leaves are cut out of a curve."""
+Programs = Literal["own", "shared"]
+"""own: compiled for the scene; shared: with all scenes of the usual kinds of materials, textures
+and lights."""
 Missing = Literal["error", "grey"]
 """What stands for an image file that is not there: an error, or grey and a warning."""
 

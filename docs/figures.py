@@ -15,13 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from bench.report import POCL, RESULTS, best_ways, runtime_of, sampler_of, table
+from bench.peer_figures import gain
+from bench.report import POCL, RESULTS, peer_films, table
+from bench.report import newest as report_newest
 
 from .pictures import gallery as pictures
 
 ROOT = Path(__file__).resolve().parents[1]
 PLACE = re.compile(r"(<!-- figures: (\w+) -->\n).*?(<!-- end of figures -->)", re.S)
-AVX2, AVX512 = "AMD EPYC avx2", "AMD EPYC avx512f"
+AVX2 = "AMD EPYC avx2"
 KINDS = ("noisy", "`oidn`", "`statistical`")
 NAMES = {"cornell": "Cornell box", "glass": "glass with caustics"}
 
@@ -65,26 +67,22 @@ def shown(value: float) -> str:
 
 
 def efficiency() -> str:
-    """Return clpt's efficiency over Mitsuba's: three scenes, and the mean of all."""
-
-    def ratios(processor: str, mode: str) -> dict[str, float]:
-        """Of each scene, by PoCL and clpt's best way, beside Mitsuba's best sampler."""
-        about = {"bench": "efficiency", "processor": processor, "mode": mode, "threads": 1}
-        own = [r for r in records() if {**about, "as_file": False}.items() <= r.items()]
-        own = [r for r in own if runtime_of(r) == POCL]
-        best = (found[0] for found in best_ways(own) if sampler_of(found[0]) == "best")
-        return {row["scene"]: row["efficiency_ratio"] for row in best}
-
-    columns = [ratios(p, mode) for p in (AVX2, AVX512) for mode in ("rgb", "spectral")]
+    """Return clpt's efficiency over Mitsuba's on scenes of others, each as `clpt render` does."""
+    rows = [row for row in records() if row["bench"] == "peers" and row["mode"] == "rgb"]
+    films = peer_films(report_newest(rows))
+    columns = []
+    for name in ("preview", "final"):
+        every = films.get((name, "rgb", POCL, False), {})
+        by_name = {scene: {r["contender"]: r for r in group} for scene, group in every.items()}
+        columns.append({s: gain(r["file"], r["mitsuba"])[0] for s, r in by_name.items()})
+    scenes = sorted({scene for column in columns for scene in column})
     body = [
-        [NAMES.get(s, s), *(f"{found[s]:.1f}" for found in columns)]
-        for s in ("cornell", "atrium", "glass")
+        [scene.replace("_", " "), *(f"{c[scene]:.1f}" if scene in c else "" for c in columns)]
+        for scene in scenes
     ]
-    means = ["geometric mean of all scenes"]
-    for found in columns:
-        means.append(f"{np.exp(np.mean(np.log([*found.values()]))):.1f} (of {len(found)})")
-    heads = ["clpt : Mitsuba 3", "AVX2, RGB", "AVX2, spectral", "AVX-512, RGB", "AVX-512, spectral"]
-    return table(heads, [*body, means])
+    means = [f"{np.exp(np.mean(np.log([*c.values()]))):.1f}" if c else "" for c in columns]
+    body.append(["geometric mean", *means])
+    return table(["clpt : Mitsuba 3", "preview", "final"], body)
 
 
 def samplers() -> str:
@@ -151,10 +149,10 @@ def denoisers() -> str:
     body = []
     for scene in names("denoising", "scene"):
         cells = [f"`{scene}`"]
-        for gain in ("gain", "bands_gain"):
+        for figure in ("gain", "bands_gain"):
             for spp in (16, 64):
                 figures = [f"{kind}, {spp} spp" for kind in ("oidn", "statistical")]
-                own = [newest("denoising", scene=scene, figure=f)[gain] for f in figures]
+                own = [newest("denoising", scene=scene, figure=f)[figure] for f in figures]
                 cells.append(" : ".join(f"{value:.3g}" for value in own))
         body.append(cells)
     heads = ["gain, `oidn` : `statistical`", "16 samples", "64 samples", "bands, 16", "bands, 64"]

@@ -53,6 +53,7 @@ def test_what_is_no_scene(function: Any, scene: Any, message: str) -> None:
         ({"queue": 1}, TypeError, r"a pyopencl\.CommandQueue, not int; .* device=1"),
         ({"layout": "wide9"}, UnknownKindError, "unknown layout 'wide9'; did you mean 'wide8'"),
         ({"cancel_seconds": 0}, SceneError, "seconds above 0"),
+        ({"programs": "all"}, UnknownKindError, "unknown programs 'all'"),
         ({"tree_quality": "best"}, UnknownKindError, "unknown quality 'best'"),
         ({"queued": "no"}, SceneError, "queued: must be true or false, not 'no'"),
         ({"slots": 0}, SceneError, "slots: must be a whole number above zero, not 0"),

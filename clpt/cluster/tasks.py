@@ -40,7 +40,16 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 VERSION = 3  # of the protocol between client and worker
-OPTIONS = ("halves", "layout", "queued", "looped", "slots", "texture_budget", "tree_quality")
+OPTIONS = (
+    "halves",
+    "layout",
+    "queued",
+    "looped",
+    "slots",
+    "texture_budget",
+    "tree_quality",
+    "programs",
+)
 MOST_OPEN = 2  # open jobs of a worker, each with device memory
 COUNTED = ("samples", "rays", "rejected", "full")  # counts in a reply
 ENDS = np.dtype("<u4")  # dtype of a packed selection's ends

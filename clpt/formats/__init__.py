@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import difflib
+import gc
 import importlib
 import itertools
 import os
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -79,7 +80,7 @@ def load(
     """
     path = locate(path)
     try:
-        with budgets.opened(budget) as account:
+        with budgets.opened(budget) as account, _uncollected():
             scene = _load(path, kinds, progress, missing_textures, variables)
         scene.account = account
         scene.warnings[:] = [one_line(text, LONGEST_WARNING) for text in scene.warnings]
@@ -92,6 +93,18 @@ def load(
         raise SceneError("what it holds is nested too deeply", file=path) from None
     except MemoryError:
         raise SceneError("reading it takes more memory than there is", file=path) from None
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Keep Python from looking for circles of dead objects: a load makes many, and none dies."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
 
 
 def prepare(path: str | Path, /) -> None:

@@ -11,6 +11,7 @@ import pyopencl as cl
 
 from clpt import bvh
 from clpt.arrays import check_unmasked, flag, is_number, whole
+from clpt.choices import Programs
 from clpt.denoise import needs, oidn
 from clpt.errors import SceneError, UnknownKindError, nearest
 from clpt.scene import Scene
@@ -42,6 +43,9 @@ class RenderOptions(TypedDict, total=False):
     cancel_seconds: [s] from `cancel` to the end of a `run`, for interactive pictures: launches are
     shorter, and the device is a little slower.
 
+    programs: "own", compiled for the scene, or "shared" with all scenes of the usual kinds. The
+    first of these compiles for longer, the others hardly. Pictures of both have other noise.
+
     An option that is absent or None has a default for the device and the scene.
     """
 
@@ -58,6 +62,7 @@ class RenderOptions(TypedDict, total=False):
     halves: bool
     denoise: str | None
     cancel_seconds: float | None
+    programs: Programs
 
 
 def check_scene(scene: object) -> None:
@@ -87,6 +92,9 @@ def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
     quality = options.get("tree_quality", "high")
     if quality not in get_args(bvh.Quality):
         raise UnknownKindError("quality", str(quality), get_args(bvh.Quality), where="tree_quality")
+    programs = options.get("programs", "own")
+    if programs not in get_args(Programs):
+        raise UnknownKindError("programs", str(programs), get_args(Programs), where="programs")
     for name in ("queued", "looped", "halves", "profiling"):
         if options.get(name) is not None:
             flag(options[name], name)

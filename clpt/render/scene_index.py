@@ -9,7 +9,7 @@ from typing import Any
 from clpt.geometry import instancing, shapes
 from clpt.geometry.instancing import Placed, Prototype
 from clpt.geometry.motion import Motions
-from clpt.render.records import GridFeatures, materials
+from clpt.render.records import GridFeatures, materials, usual
 from clpt.scene import Film, Scene
 from clpt.scene import materials as mt
 from clpt.scene.cameras import Camera
@@ -38,7 +38,7 @@ class SceneIndex:
     triangles. motions: of shapes, lights and the camera. lit_media: why no path can start at some
     light in a medium; "" if paths can. lit_before: whether light paths were ghosts of a lens before
     an edit; None without an edit. candidates: integrators for a trial, the chosen integrator first;
-    empty without a trial.
+    empty without a trial. shared: whether programs are those of many scenes.
     """
 
     camera: Camera
@@ -60,10 +60,13 @@ class SceneIndex:
     lit_media: str = UNKNOWN
     lit_before: bool | None = None
     candidates: tuple[Integrator, ...] = ()
+    shared: bool = False
 
     @classmethod
-    def of(cls, scene: Scene) -> SceneIndex:
+    def of(cls, scene: Scene, shared: bool = False) -> SceneIndex:
         """Return the index of a scene that clpt.render.flow.check accepts.
+
+        shared: whether its programs are to be those of many scenes.
 
         Raises SceneError for an instance that cannot be placed, and for invalid custom materials.
         """
@@ -71,6 +74,8 @@ class SceneIndex:
         motions = Motions.of(scene)
         placed, prototypes = instancing.sort(scene.shapes, warnings, motions.moving)
         distinct = tuple(instancing.distinct(scene.shapes))
+        kinds = _leaf_kinds(distinct)
+        bends = any(map(_bends, {id(s.material): s.material for s in distinct}.values()))
         return cls(
             camera=scene.camera,
             film=scene.film,
@@ -85,12 +90,13 @@ class SceneIndex:
             placed=tuple(placed),
             prototypes=tuple(prototypes),
             leaves=(
-                *_leaf_kinds(distinct),
+                *(usual.leaves(kinds) if shared else kinds),
                 *_phase_kinds(_media(scene.camera, distinct), scene.film.mode),
             ),
-            normal_mapped=any(map(_bends, {id(s.material): s.material for s in distinct}.values())),
+            normal_mapped=bends or shared,
             warnings=tuple(warnings),
             motions=motions,
+            shared=shared,
         )
 
     @property

@@ -77,12 +77,18 @@ class Tries:
 
 
 def decided(
-    on: device.Device, tuning: Tuning, scene: Scene, lowered: Lowered, texture_budget: int | None
+    on: device.Device,
+    tuning: Tuning,
+    scene: Scene,
+    lowered: Lowered,
+    texture_budget: int | None,
+    *,
+    shared: bool = False,
 ) -> Lowered:
     """Return a scene lowered for the cheapest of its candidates, with the costs in its reason.
 
-    lowered: for the first candidate; texture_budget: as of `lower`. A candidate that must be
-    compiled is tried if the best so far has many rays to trace, and a guide only if that leaves
+    lowered: for the first candidate; texture_budget, shared: as of `lower`. A candidate that must
+    be compiled is tried if the best so far has many rays to trace, and a guide only if that leaves
     noise.
 
     Raises as `Wavefront.create` does.
@@ -91,7 +97,7 @@ def decided(
     tries.add(lowered)
     for way in lowered.candidates[1:]:
         if is_worth(way, tries.rays) and (not way.guiding or tries.noise > QUIET):
-            tries.add(lower(scene, texture_budget, replace(lowered, integrator=way)))
+            tries.add(lower(scene, texture_budget, replace(lowered, integrator=way), shared=shared))
     costs, best = tries.costs, tries.ways[tries.best]
     named = zip(tries.ways, costs, strict=True)
     text = ", ".join(f"{name_of(way.integrator)} {figure:.2f}" for way, figure in named)

@@ -66,6 +66,7 @@ class Light(Kind):
     falloff = True  # irradiance falls with the distance
     two_sided = False
     visible = True
+    directed = False
 
     motion: Keys | None = host(
         None, "moves it after its place, or None; an area light moves with its shape", form="keys"
@@ -227,6 +228,17 @@ class Area(PoweredLamp):
         True,
         "False: rays do not see the light, as they do not see a point; surfaces still receive it",
     )
+    directed: bool = flag(
+        False,
+        "True: mappings of its radiance, such as spherical, see the direction in which light "
+        "leaves, a unit vector in the world, in the place of the position",
+    )
+
+    def check(self) -> None:
+        """Raise SceneError for the power of a light whose radiance depends on its direction."""
+        super().check()
+        if self.directed and (self.power is not None or self.lumens is not None):
+            raise SceneError("a directed light takes a radiance, no power or lumens", where="area")
 
     def extent(self, area: float) -> float:
         """Return pi times the area that emits [m^2 sr]."""

@@ -32,6 +32,7 @@ def framing_camera(
     from_: Sequence[float] = FROM,
     top: Sequence[float] = (0.0, 1.0, 0.0),
     distance: float = 1.0,
+    bounds: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
 ) -> Perspective:
     """Return a camera that looks at the middle of shapes; together they fill its shorter side.
 
@@ -40,7 +41,7 @@ def framing_camera(
     distance that frames all shapes.
     Raises SceneError for shapes too large to be framed.
     """
-    centre, radius = middle(*world_bounds(scene_shapes), where="the scene")
+    centre, radius = middle(*(bounds or world_bounds(scene_shapes)), where="the scene")
     upward = transforms.transform_vectors(up, top)
     view = transforms.look_at(direction(from_, up), np.zeros(3), upward)[:3, :3]
     all_seen = 1.5 * radius
@@ -210,7 +211,7 @@ def parts(
     counts = {"shapes": len(extra_shapes), "lights": len(extra_lights)}
     added = {"camera": camera is None, **counts, "up": up}
     return {
-        "camera": camera or framing_camera(scene_shapes, turn),
+        "camera": camera or framing_camera(scene_shapes, turn, bounds=(low, high)),
         "shapes": [*scene_shapes, *extra_shapes],
         "lights": [*own_lights, *extra_lights],
         "film": integrators.Film(filter=integrators.Gaussian()),

@@ -7,7 +7,9 @@ inline Spectrum whitted_emission(Scene scene, mask active, Vertex v, Spectrum ra
     mask lit = active & (v.s.light >= 0) & light_shows(scene, v.s.light, v.front);
     if (any(lit)) {
         integer light = sel_i(lit, v.s.light, (integer)(0));
-        Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(v.s), v.lambdas);
+        LightRow lamp = light_at(scene, light);
+        TexturePoint point = area_lookup(lamp, surface_texture_point(v.s), neg3(v.d));
+        Spectrum le = emission_load(scene, lamp.radiance, point, v.lambdas);
         radiance = spectrum_sel(lit, spectrum_add(radiance, spectrum_mul(v.beta, le)), radiance);
     }
     return radiance;

@@ -72,6 +72,17 @@ inline LightSample area_unseen(LightSample s, LightRow l)
 /* Twin, where rays see all lights on shapes. */
 inline LightSample area_unseen(LightSample s, LightRow l) { return s; }
 
+/* Step directed: the point that an emission looks up; to the mappings of a directed light d, along which its light
+ * leaves, stands for the place. */
+inline TexturePoint area_lookup(LightRow l, TexturePoint point, vec3 d)
+{
+    point.p = sel3(light_mode(l, EMISSION_DIRECTED), d, point.p);
+    return point;
+}
+
+/* Twin, where the light of no shape depends on its direction. */
+#define area_lookup(l, point, d) (point)
+
 /* Step shows: whether the side of a shape that a ray met emits; front: it met the front. */
 inline mask light_shows(Scene scene, integer row, mask front)
 {

@@ -17,14 +17,14 @@
 #include "generated/surface_point.cl"
 
 /* A ray from a surface: diffuse from the front (a cosine density, so power = pi A L), or, where `along`, along the
- * normal alone, with `value` as radiant exitance (power = A E). */
-inline LightRay surface_emit(SurfacePoint q, mask along, Spectrum value, vec2 v)
+ * normal alone, with `value` as radiant exitance (power = A E). d: its direction. */
+inline LightRay surface_emit(SurfacePoint q, mask along, Spectrum value, vec3 d)
 {
     LightRay r;
     r.o = q.p;
     r.n = q.n;
     r.size = sqrt(q.area);
-    r.d = sel3(along, q.n, to_world(frame_of(q.n), cosine_hemisphere(v)));
+    r.d = d;
     r.power = spectrum_scale(value, q.area * sel(along, (real)(1.0f), (real)(PI)));
     r.seen = spectrum_sel(along, spectrum_of(0.0f), spectrum_scale(value, q.area));
     r.away = 0;
@@ -95,8 +95,10 @@ inline LightRay area_emit(Scene scene, integer row, LightRow l, LightView view, 
     SurfacePoint q = surface_point_moved(view, area_surface_point(scene, row, l, u, &point));
     q = surface_point_turned(q, l, v);
     point.p = q.p;
-    Spectrum value = emission_load(scene, l.radiance, point, lambdas);
-    LightRay s = area_ray_unseen(surface_emit(q, light_mode(l, EMISSION_ALONG), value, *v), l);
+    mask along = light_mode(l, EMISSION_ALONG);
+    vec3 d = sel3(along, q.n, to_world(frame_of(q.n), cosine_hemisphere(*v)));
+    Spectrum value = emission_load(scene, l.radiance, area_lookup(l, point, d), lambdas);
+    LightRay s = area_ray_unseen(surface_emit(q, along, value, d), l);
     return light_ray_sel(l.shape >= 0, s, r);
 }
 
@@ -119,14 +121,14 @@ inline real area_sides_pdf(LightRow l) { return sel(light_mode(l, EMISSION_BOTH)
 inline SurfacePoint surface_point_turned(SurfacePoint q, LightRow l, vec2 *v) { return q; }
 #define area_sides_pdf(l) ((real)(1.0f))
 
-/* Step unseen: the camera does not see the origin of a light path on a light that no ray sees. */
+/* Step unseen: the camera does not see where a light path begins on a light that no ray sees, nor on a directed one. */
 inline LightRay area_ray_unseen(LightRay r, LightRow l)
 {
-    r.seen = spectrum_sel(light_mode(l, EMISSION_UNSEEN), spectrum_of(0.0f), r.seen);
+    r.seen = spectrum_sel(light_mode(l, EMISSION_UNSEEN | EMISSION_DIRECTED), spectrum_of(0.0f), r.seen);
     return r;
 }
 
-/* Twin, where rays see all lights on shapes. */
+/* Twin, where rays see all lights on shapes, and these are even. */
 inline LightRay area_ray_unseen(LightRay r, LightRow l) { return r; }
 
 /* Step densities: densities of the light in a row for transport/mis_ratio.cl. The generated `emit_case` and `nee_case`

@@ -18,7 +18,7 @@
 inline mask hemisphere_given(vec3 hemisphere) { return dot3(hemisphere, hemisphere) > 0.5f; }
 
 /* LightRow.emission_mode of a light on a shape: 0 diffuse from the front, or bits: EMISSION_ALONG the normal alone
- * (particle_tracer), EMISSION_BOTH sides, EMISSION_UNSEEN by rays. */
+ * (particle_tracer), EMISSION_BOTH sides, EMISSION_UNSEEN by rays, EMISSION_DIRECTED: its textures see directions. */
 #define light_mode(l, bit) (((l).emission_mode & (bit)) != 0)
 
 /* The direction from p to a light at a point, and its distance; *t2: the square of that [m^2]. */

@@ -36,7 +36,7 @@ inline LightSample area_light_sample(Scene scene, integer row, LightRow l, Light
     TexturePoint point = texture_point_nowhere();
     ShapeSample q = area_turned(area_moved(view, area_point(scene, row, l, view, u, &point)), l);
     point.p = madd3(q.wi, q.t, p);
-    Spectrum radiance = emission_load(scene, l.radiance, point, lambdas);
+    Spectrum radiance = emission_load(scene, l.radiance, area_lookup(l, point, neg3(q.wi)), lambdas);
     return light_sample_sel(l.shape >= 0, area_sample(q, point.p, radiance), s);
 }
 

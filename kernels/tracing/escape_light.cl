@@ -41,7 +41,8 @@ inline Spectrum escape_light(TRACE_ARGS, Scene scene, Slab path, uint at, vec3 o
         out = out & (s.light >= 0) & light_shows(scene, sel_i(out, s.light, (integer)(0)), front);
         if (any(out)) {
             LightRow lamp = light_at(scene, sel_i(out, s.light, (integer)(0)));
-            Spectrum le = emission_load(scene, lamp.radiance, surface_texture_point(s), lambdas);
+            TexturePoint point = area_lookup(lamp, surface_texture_point(s), neg3(onward));
+            Spectrum le = emission_load(scene, lamp.radiance, point, lambdas);
             light = spectrum_sel(out, spectrum_mul(value, le), light);
         }
     }

@@ -26,6 +26,16 @@ pytestmark = pytest.mark.slow
 SIZE = 64, 48
 
 
+def view_3d() -> tuple[dict[str, Any], Any]:
+    """Return a 3D view of Blender's first screen: what operators need to know, and its space."""
+    screen = bpy.data.screens["Layout"]
+    area = next(area for area in screen.areas if area.type == "VIEW_3D")
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    window = bpy.context.window_manager.windows[0]
+    space = area.spaces.active
+    return {"window": window, "screen": screen, "area": area, "region": region}, space
+
+
 class Window:
     """What Blender has for a viewport: the engine's object, the context, and when it calls what."""
 
@@ -50,9 +60,8 @@ class Window:
     @property
     def context(self) -> Any:
         return SimpleNamespace(
-            scene=bpy.context.scene, region_data=self.region_data,
+            scene=bpy.context.scene, region_data=self.region_data, space_data=view_3d()[1],
             region=SimpleNamespace(width=self.width, height=self.height),
-            space_data=SimpleNamespace(clip_start=0.1, clip_end=1000.0),
         )  # fmt: skip
 
     def _updated(self, _: Any, depsgraph: Any) -> None:
@@ -158,7 +167,9 @@ def test_it_shows_the_scene_and_follows_changes(window: Window) -> None:
     for each in list(bpy.data.objects):
         bpy.data.objects.remove(each)
     assert window.picture(64)[..., :3].std() < 1e-3
-    assert not [line for line in window.lines if line and not line.startswith("sample")]
+    assert not [
+        line for line in window.lines if line and not line.startswith(("sample", "prepares"))
+    ]
 
 
 def final(folder: Any, samples: int = 256) -> np.ndarray:
@@ -194,6 +205,28 @@ def test_through_the_camera_it_is_the_final_picture(
     assert np.median(np.abs(shown - wanted)) < 0.02 * wanted.mean()
 
 
+def test_the_film_is_that_of_the_scene(window: Window) -> None:
+    """Alpha, another size, and another mode are other films, while the view stays."""
+    window.open()
+    first = window.picture(64)
+    scene = bpy.context.scene
+    scene.render.film_transparent = True
+    window.open()
+    clear = window.picture(64)
+    assert clear[2, 2, 3] == 0.0 and clear[24, 32, 3] == 1.0
+    scene.render.film_transparent = False
+    scene.clpt.white_balance = "A"
+    window.open()
+    balanced = window.picture(64)[..., :3].mean(axis=(0, 1)) / first[..., :3].mean(axis=(0, 1))
+    assert balanced[2] > 1.3 * balanced[0]
+    scene.clpt.white_balance, scene.clpt.mode = "none", "spectral"
+    window.width, window.height = 32, 24
+    window.open()
+    small = window.picture(64)
+    assert small.shape == (24, 32, 4)
+    assert small[..., :3].mean() == pytest.approx(first[..., :3].mean(), rel=0.05)
+
+
 def test_places_and_colors_are_no_loads(window: Window) -> None:
     """Files of geometry are written once, and again only for what changes."""
     written = []
@@ -226,6 +259,22 @@ def test_places_and_colors_are_no_loads(window: Window) -> None:
         viewports.scenes.meshes.write = write
 
 
+def test_a_local_view_shows_its_objects_alone(window: Window) -> None:
+    window.open()
+    first = window.picture(64)
+    where, space = view_3d()
+    with bpy.context.temp_override(**where):
+        bpy.ops.object.select_all(action="DESELECT")
+        bpy.data.objects["Light"].select_set(True)
+        bpy.ops.view3d.localview(frame_selected=False)
+        window.open()
+        assert window.picture(64)[20:28, 28:36, :3].std() < 1e-3
+        bpy.ops.view3d.localview(frame_selected=False)
+        assert space.local_view is None
+        window.open()
+        assert np.allclose(window.picture(64), first, atol=1e-5)
+
+
 def test_undo_brings_back_what_was(window: Window) -> None:
     bpy.context.preferences.edit.use_global_undo = True
     window.open()
@@ -256,6 +305,19 @@ def test_a_killed_process_is_a_line_and_the_next_change_starts_another(window: W
     bpy.data.objects["Light"].location.x += 0.0
     bpy.context.view_layer.update()
     window.look((7.0, -7.0, 5.0), (0.0, 0.0, 0.0))
+    assert np.allclose(window.picture(64), first, atol=1e-5)
+
+
+def test_a_fault_of_the_writer_is_a_line(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+    window.open()
+    first = window.picture(64)
+    monkeypatch.setattr(viewports.LiveWriter, "describe", lambda _: 1 / 0)
+    window.open()
+    assert any("ZeroDivisionError" in line for line in window.lines)
+    monkeypatch.undo()
+    monkeypatch.setattr(viewports.Viewport, "_draw", lambda *_: None)
+    bpy.data.objects["Cube"].location.x = 0.0
+    window.open()
     assert np.allclose(window.picture(64), first, atol=1e-5)
 
 

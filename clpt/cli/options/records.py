@@ -107,7 +107,7 @@ HEADINGS: dict[str, tuple[str, ...]] = {
         "output_space",
     ),
     "Animation": ("frames", "fps", "video"),
-    "Device": ("device", "threads", "layout", "tree_quality", "texture_budget"),
+    "Device": ("device", "threads", "layout", "tree_quality", "programs", "texture_budget"),
     "Cluster": ("cluster", "keys"),
     "Scene file": (
         "variables", "variant", "missing_textures", "strict", "load_memory", "load_seconds",

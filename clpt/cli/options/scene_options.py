@@ -20,6 +20,7 @@ from ...choices import (
     SAMPLERS,
     SPACES,
     Missing,
+    Programs,
     Quality,
 )
 from ...files import budget
@@ -211,6 +212,7 @@ class SceneOptions:
     machine: Machine
     layout: str | None = None
     tree_quality: Quality = "high"
+    programs: Programs = "own"
     texture_budget: int | None = None
 
     @property
@@ -223,7 +225,7 @@ class SceneOptions:
         """The options of trees and textures, by their names in `RenderOptions`."""
         return {
             "layout": self.layout, "tree_quality": self.tree_quality,
-            "texture_budget": self.texture_budget,
+            "texture_budget": self.texture_budget, "programs": self.programs,
         }  # fmt: skip
 
     def scene(self, file: Path, progress: Progress | None = None) -> Scene:
@@ -256,6 +258,11 @@ _OPTIONS = (
     click.option(
         "--tree-quality", type=Choice(get_args(Quality)), default="high",
         help="fast: built sooner, a little slower to trace.",
+    ),
+    click.option(
+        "--programs", type=Choice(get_args(Programs)), default="own",
+        help="shared: with all scenes of the usual kinds. The first of them compiles for longer, "
+        "the others hardly.",
     ),
     click.option(
         "--integrator", metavar="NAME", help=f"One of {', '.join(INTEGRATORS)}."

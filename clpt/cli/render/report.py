@@ -157,8 +157,10 @@ def remarks(
             yield f"{seen.white:.0%} of what is lit is white: {advice}"
         elif seen.black > NEARLY_BLACK and mended > exposure + DARK:
             yield f"{seen.black:.0%} of the picture is black: {advice}"
-    if scene.film.time_bins and (outside := renderer.form.outside(renderer.developed().times())):
-        yield outside
+    if scene.film.time_bins:
+        times = renderer.developed("words", "light_layers").times()
+        if outside := renderer.form.outside(times):
+            yield outside
     yield from _outshone(scene)
 
 

@@ -28,7 +28,7 @@ def curves(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
 
     Raises SceneError for counts that do not fit the points.
     """
-    points = document.array(prim, "points", 3, np.float64)
+    points = document.points(prim, np.float64)
     counts = document.array(prim, "curveVertexCounts", 0, np.int64)
     if points is None or counts is None or not len(points):
         return []
@@ -141,7 +141,7 @@ def _between(ends: Floats, lengths: list[int], basis: str) -> Floats:
 
 def points(document: Document, prim: Usd.Prim, material: UsdShade.Material | None) -> list[Shape]:
     """Return the balls of a Points prim, as one shape, in a list."""
-    centers = document.array(prim, "points", 3)
+    centers = document.points(prim)
     if centers is None or not len(centers):
         return []
     budget.take(8 * centers.nbytes, "points", document.file)

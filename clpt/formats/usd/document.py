@@ -87,6 +87,14 @@ class Document(Once):
         budget.check(size, f"{name} of {prim.GetPath()}", self.file)
         return rows(value, width, kind)
 
+    def points(self, prim: Usd.Prim, kind: type = np.float32) -> Any:
+        """Return a prim's points (n, 3); None for none, and with a warning for one not finite."""
+        points = self.array(prim, "points", 3, kind)
+        if points is None or np.isfinite(points).all():
+            return points
+        self.warn("left out, as a point of it is not finite", prim.GetPath())
+        return None
+
     def placement(self, prim: Usd.Prim) -> Matrix:
         """Return a prim's transform to the world, or of a prototype's prim to the prototype."""
         return self.placements([prim])[0]
@@ -154,7 +162,7 @@ GPRIMS = frozenset(
 )  # fmt: skip
 UNREAD = frozenset(
     ("NurbsPatch", "NurbsCurves", "HermiteCurves", "TetMesh", "LightFilter", "PluginLightFilter",
-     "ParticleField3DGaussianSplat", "ParticleField")
+     "ParticleField3DGaussianSplat", "ParticleField", "Skeleton")
 )  # fmt: skip
 HIDDEN = ("proxy", "guide")  # purposes that no picture shows
 
@@ -190,12 +198,12 @@ def _prims(document: Document, root: Usd.Prim, defined: bool) -> Iterator[Usd.Pr
     anywhere = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
     iterator = iter(Usd.PrimRange(root, Usd.PrimDefaultPredicate if defined else anywhere))
     for prim in iterator:
-        visibility = prim.GetAttribute("visibility")
-        if visibility and visibility.Get(document.time) == "invisible":
+        said = prim.GetAuthoredPropertyNames()  # most prims say neither
+        if "visibility" in said and document.value(prim, "visibility") == "invisible":
             iterator.PruneChildren()
             if prim.GetTypeName() != "Camera":
                 continue
-        elif prim.GetAttribute("purpose").Get() in HIDDEN:
+        elif "purpose" in said and prim.GetAttribute("purpose").Get() in HIDDEN:
             iterator.PruneChildren()
             continue
         elif prim.GetTypeName() == "PointInstancer":

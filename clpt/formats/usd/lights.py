@@ -24,7 +24,7 @@ from clpt.formats.usd.document import Document, file_of
 from clpt.scene.lights import Area, Constant, Directional, Envmap, Goniometric, Light, Point, Spot
 from clpt.scene.materials import Null
 from clpt.scene.shapes import Cylinder, Disk, Rectangle, Shape, Sphere
-from clpt.scene.textures import Bitmap
+from clpt.scene.textures import Bitmap, Product
 from clpt.spectra import RGBIlluminant
 
 TURNED = transforms.rotate([0.0, 1.0, 0.0], 180.0)  # lights shine along -z, clpt's along +z
@@ -172,26 +172,26 @@ def _pole(document: Document, prim: Usd.Prim, placement: Matrix) -> Matrix:
 
 
 def _area(document: Document, prim: Usd.Prim, placement: Matrix) -> Lit:
-    """Return a light with a surface; a sphere that is shaped or has no size becomes a point."""
+    """Return a light with a surface; a sphere without a size becomes a point."""
     kind = str(prim.GetTypeName())
     shape, area = AREAS[kind](document, prim, placement)
     rgb = emitted(document, prim)
     if document.value(prim, "inputs:normalize", False) and area > 0.0:
         rgb = rgb / area
     shaped = _is_shaped(document, prim)
-    if kind == "SphereLight" and (
-        area == 0.0 or shaped or document.value(prim, "treatAsPoint", False)
-    ):
+    if kind == "SphereLight" and (area == 0.0 or document.value(prim, "treatAsPoint", False)):
         # A sphere's intensity is its radiance times the disk that is seen of it.
         facing = area / 4.0 if area > 0.0 else 0.25
         intensity = rgb * facing * document.metres**2
         return Lit([_point(document, prim, placement, intensity)], [])
-    if shaped:
-        document.warn("shaping of a light with this surface is left out", prim.GetPath())
     if area == 0.0:
         document.warn("left out, as it has no area", prim.GetPath())
         return Lit([], [])
-    emission = Area(radiance=_radiance(document, prim, rgb))
+    peak, share = _share(document, prim, placement) if shaped else (1.0, None)
+    radiance = _radiance(document, prim, peak * rgb)
+    if share is not None:
+        radiance = Product(first=radiance, second=share)
+    emission = Area(radiance=radiance, directed=shaped)
     shape = dataclasses.replace(
         shape,
         to_world=document.to_metres @ placement @ np.asarray(shape.to_world),
@@ -200,6 +200,22 @@ def _area(document: Document, prim: Usd.Prim, placement: Matrix) -> Lit:
         name=prim.GetName(),
     )
     return Lit([], [shape])
+
+
+def _share(document: Document, prim: Usd.Prim, placement: Matrix) -> tuple[float, Bitmap]:
+    """Return the greatest factor of a light's shaping, and the share of that by direction."""
+    angle, softness, _ = _cone(document, prim)
+    image = _shaping(document, prim, angle, softness)
+    peak = float(image.max()) or 1.0
+    # From +z of the image's space, which is the light's -z, columns fall to the other pole.
+    columns = np.ascontiguousarray(image[::-1, ::-1].swapaxes(0, 1) / peak, np.float32)
+    axes = transforms.rigid(placement) @ FROM_NADIR
+    to_image = np.eye(4)
+    to_image[:3, :3] = np.stack([-axes[:3, 2], axes[:3, 0], -axes[:3, 1]])
+    return peak, Bitmap(
+        image=columns, raw=True, mapping="spherical", to_texture=to_image, wrap="clamp",
+        wrap_v="repeat",
+    )  # fmt: skip
 
 
 def _radiance(document: Document, prim: Usd.Prim, rgb: Floats) -> Any:
@@ -270,11 +286,8 @@ def _point(document: Document, prim: Usd.Prim, placement: Matrix, rgb: Floats) -
         return Point(position=tuple(to_world[:3, 3]), intensity=intensity)
     turn = transforms.rigid(placement)
     turn[:3, 3] = to_world[:3, 3]
-    angle = min(max(document.number(prim, SHAPED + "cone:angle", 90.0), 1e-3), 180.0)
-    softness = min(max(document.number(prim, SHAPED + "cone:softness", 0.0), 0.0), 1.0)
-    focus = max(document.number(prim, SHAPED + "focus", 0.0), 0.0)
-    profile = _profile(document, prim)
-    if profile is None and focus == 0.0:
+    angle, softness, even = _cone(document, prim)
+    if even:
         beam = min(angle * (1.0 - softness), 0.9999 * angle)
         return Spot(
             to_world=turn @ TURNED,
@@ -283,7 +296,28 @@ def _point(document: Document, prim: Usd.Prim, placement: Matrix, rgb: Floats) -
             beam_width=beam,
             edge="smooth",
         )
-    # Directions as in the image of a goniometric light, counted from -z of the light.
+    image = _shaping(document, prim, angle, softness)
+    bitmap = Bitmap(image=image.astype(np.float32), raw=True, wrap="repeat", wrap_v="clamp")
+    return Goniometric(image=bitmap, intensity=intensity, to_world=turn @ FROM_NADIR)
+
+
+def _cone(document: Document, prim: Usd.Prim) -> tuple[float, float, bool]:
+    """Return the angle of a cone [degrees], its softness, and whether it is even within."""
+    angle = min(max(document.number(prim, SHAPED + "cone:angle", 90.0), 1e-3), 180.0)
+    softness = min(max(document.number(prim, SHAPED + "cone:softness", 0.0), 0.0), 1.0)
+    asset = document.value(prim, SHAPED + "ies:file")
+    focus = document.number(prim, SHAPED + "focus", 0.0)
+    return angle, softness, focus <= 0.0 and not (asset and asset.path)
+
+
+def _shaping(document: Document, prim: Usd.Prim, angle: float, softness: float) -> Floats:
+    """Return the factor on a light by direction, (rows, columns, 1 or 3).
+
+    Directions lie as in the image of a goniometric light, counted from -z of the light. angle,
+    softness: of its cone.
+    """
+    focus = max(document.number(prim, SHAPED + "focus", 0.0), 0.0)
+    profile = _profile(document, prim)
     off_axis = np.pi * (1.0 - (np.arange(ies.ROWS) + 0.5) / ies.ROWS)[:, None]
     smooth = np.clip(
         (np.degrees(off_axis) / angle - 1.0 + softness) / max(softness, 1e-6), 0.0, 1.0
@@ -292,10 +326,7 @@ def _point(document: Document, prim: Usd.Prim, placement: Matrix, rgb: Floats) -
     share = np.abs(np.cos(off_axis)) ** focus
     tint = np.array(document.value(prim, SHAPED + "focusTint", (0.0, 0.0, 0.0)), np.float64)
     image = cone[..., None] * (share[..., None] + (1.0 - share[..., None]) * tint)
-    if profile is not None:
-        image = image * profile
-    bitmap = Bitmap(image=image.astype(np.float32), raw=True, wrap="repeat", wrap_v="clamp")
-    return Goniometric(image=bitmap, intensity=intensity, to_world=turn @ FROM_NADIR)
+    return image if profile is None else image * profile
 
 
 def _profile(document: Document, prim: Usd.Prim) -> Floats | None:

@@ -184,7 +184,7 @@ def _all(document: Document, prim: Usd.Prim, material: UsdShade.Material | None)
 
 def _topology(document: Document, prim: Usd.Prim) -> Topology | None:
     """Return a mesh prim's faces; None for a mesh without any."""
-    points = document.array(prim, "points", 3)
+    points = document.points(prim)
     counts = document.array(prim, "faceVertexCounts", 0, np.int64)
     corners = document.array(prim, "faceVertexIndices", 0, np.int64)
     if points is None or counts is None or corners is None or not len(corners):

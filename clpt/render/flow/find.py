@@ -68,18 +68,19 @@ def analyse(
     former: Integrator | None = None,
     *,
     lit_before: bool | None = None,
+    shared: bool = False,
 ) -> Analysis:
     """Return the facts about a scene; cache: with results of the analysis before.
 
     former: the integrator before an edit, which stays: its film has sums for light paths, or none;
-    lit_before: whether light paths were ghosts of a lens then.
+    lit_before: whether light paths were ghosts of a lens then; shared: see `SceneIndex`.
 
     Raises SceneError for an invalid scene; it names the shape, light or material.
     """
     scene = at_rest(scene)
     check_at_rest(scene, cache)
     scene = plainly_lit(scene)
-    index = replace(SceneIndex.of(scene), lit_before=lit_before)
+    index = replace(SceneIndex.of(scene, shared), lit_before=lit_before)
     geometry = assembled(index, cache)
     sphere = geometry.bounding_sphere()
     look = Look.of(scene.film, cache)
@@ -88,7 +89,6 @@ def analyse(
     index, reason = decided(Lit(index, geometry, look, sources, sphere, lit.extinction), former)
     around, warnings = _at_the_camera(scene, index, cache)
     sealed = sealed_media(index, cache) if index.media else frozenset()
-    aimed = aims(index, geometry, sphere[1])
     return Analysis(
         index=index,
         reason=reason,
@@ -99,9 +99,21 @@ def analyse(
         light_media=lit,
         around=around,
         camera_index=index_around(scene, cache) if index.timed else 1.0,
-        aims=aimed if len(aimed) else escape_lamps(index, sealed, cache),
+        aims=_aims(index, geometry, sphere[1], sealed, cache),
         warnings=(*warnings, *surroundings.warnings_of_holes(index, cache)),
     )
+
+
+def _aims(
+    index: SceneIndex,
+    geometry: Geometry,
+    radius: float,
+    sealed: frozenset[Medium],
+    cache: LoweringCache,
+) -> NDArray[np.float32]:
+    """Return the spheres that light paths, or rays that leave sealed media, aim at."""
+    aimed = aims(index, geometry, radius)
+    return aimed if len(aimed) else escape_lamps(index, sealed, cache)
 
 
 def _media_at_lights(

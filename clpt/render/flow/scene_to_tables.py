@@ -50,6 +50,7 @@ from clpt.render.records import (
     LayerFeatures,
     SpectraFeatures,
     TransportFeatures,
+    usual,
 )
 from clpt.render.records.film import LayerNames
 from clpt.render.records.materials import row_words
@@ -129,12 +130,13 @@ def lower(
     former: Lowered | None = None,
     *,
     anew: bool = False,
+    shared: bool = False,
 ) -> Lowered:
     """Lower a scene.
 
     texture_budget: [bytes] for images, None for no limit. former: of a similar scene, which saves
     time; choices for "auto" stay, unless `anew`. Arrays, lights and images that are the same
-    objects as in the former scene are taken to hold the same values.
+    objects as in the former scene are taken to hold the same values. shared: see `SceneIndex`.
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material; and
     for an image whose file changes meanwhile, and where it takes more than the budget of its load
@@ -146,7 +148,7 @@ def lower(
         integrator, lit_ghosts = former.integrator, former.features.transport.lit_ghosts
     with budget.resumed(scene.account):
         files = ImageFiles.of(named_files(scene), former.files if former else ImageFiles())
-        analysis = analyse(scene, cache, integrator, lit_before=lit_ghosts)
+        analysis = analyse(scene, cache, integrator, lit_before=lit_ghosts, shared=shared)
         lowered = encode(analysis, cache, texture_budget)
         files.check()
     return replace(lowered, files=files)
@@ -214,6 +216,7 @@ class _Tables:
         )
         self.store = self.encoder.store
         filters.encode_filter(film.filter, self.store, self.index.splatting)
+        self.profile = self._append_profile()
         self.materials = self._begin_materials()
         self.geometry = encode_geometry(
             analysis.geometry, self.encoder, self.materials, spheres_move=spheres_move(self.index)
@@ -224,7 +227,6 @@ class _Tables:
         self.lights = self._append_lights(media)
         self.near = self._append_medium_aims()
         self.around = self._append_bodies(media)
-        self.profile = self._append_profile()
         self.density = self.store.size("distributions")
         self.tabulated = self._append_density()
         self.aims = self.store.append_floats("distributions", analysis.aims)
@@ -239,7 +241,7 @@ class _Tables:
         index, analysis, camera = self.index, self.analysis, self.index.camera
         aimed, spectra = len(analysis.aims) > 0, self.encoder.spectra
         textures = self.encoder.textures.features()
-        return Features(
+        own = Features(
             camera=CameraFeatures(
                 kind=camera.kind,
                 disperses=index.spectral and bool(camera.dispersive_glasses),
@@ -263,6 +265,7 @@ class _Tables:
             spectra=SpectraFeatures(index.mode, spectra.samples, spectra.step, self.tabulated),
             materials=self.materials.features(index),
         )
+        return usual.widened(own) if index.shared else own
 
     def _transport_features(self, *, aimed: bool) -> TransportFeatures:
         index = self.index
@@ -314,20 +317,30 @@ class _Tables:
         self.store.append("materials", np.zeros(longest, np.uint32))
         return MaterialWords(self.encoder, index.leaves, index.normal_mapped, self._asks_gloss())
 
+    @property
+    def _tree_from(self) -> int | None:
+        """The least number of lights for a light tree, None without."""
+        if self.index.light_paths:
+            return None
+        return 1 if self.index.shared else TREE_FROM
+
     def _asks_gloss(self) -> bool:
         """Whether the tree over lights asks for the gloss of materials."""
         index = self.index
-        tree = not index.light_paths and has_tree(self.analysis.sources.every, TREE_FROM)
+        tree = self._tree_from is not None and has_tree(
+            self.analysis.sources.every, self._tree_from
+        )
         leaves = (leaf for shape in index.shapes for leaf in mt.parts(shape.material))
-        return tree and any(gloss_word(leaf) for leaf in leaves)
+        return tree and (index.shared or any(gloss_word(leaf) for leaf in leaves))
 
     def _append_lights(self, media: MediumWords) -> LightRows:
         """Append the rows of `lights`, and note in the rows of shapes which lights they are."""
         index, emitters, sources = self.index, self.geometry.emitters, self.analysis.sources
-        tree_from = None if index.light_paths else TREE_FROM
         for medium in index.emitting:
             media.word(medium)
-        lights = light_rows(index.lights, emitters, self.encoder, sources, tree_from, media.lights)
+        lights = light_rows(
+            index.lights, emitters, self.encoder, sources, self._tree_from, media.lights
+        )
         self.store.append("lights", lights.rows.view(np.uint32))
         if lights.tree is not None:
             self.store.append("lights", lights.tree)

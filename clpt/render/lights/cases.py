@@ -18,6 +18,7 @@ from clpt.render.records.lights import (
     BODY,
     BOTH,
     BRICK,
+    DIRECTED,
     INFINITE,
     KINDS,
     LINE,
@@ -94,7 +95,7 @@ def dispatch_text(features: Features, densities: str = "") -> str:
 
 def _numbers(features: Features, present: list[str]) -> list[str]:
     """Return the macros of constants."""
-    modes = {"ALONG": ALONG, "BOTH": BOTH, "UNSEEN": UNSEEN}
+    modes = {"ALONG": ALONG, "BOTH": BOTH, "UNSEEN": UNSEEN, "DIRECTED": DIRECTED}
     words = shapes.RECORDS["triangle"].words
     return [
         *([f"#define TRIANGLE_ROW_WORDS {words}"] * features.motion.emitters),
@@ -121,6 +122,7 @@ def _includes(features: Features) -> list[str]:
         *(("lights/moving.cl#deforming",) * features.motion.emitters),
         either(lights.two_sided, "lights/area.cl#two_sided"),
         either(lights.unseen, "lights/area.cl#unseen"),
+        either(lights.directed, "lights/area.cl#directed"),
         either(lights.two_sided or lights.unseen, "lights/area.cl#shows"),
     ]
 
@@ -281,7 +283,7 @@ def _emission_includes(features: Features) -> list[str]:
         *names,
         either(features.motion.lights, "lights/moving.cl#emission"),
         either(lights.two_sided, "lights/emission.cl#two_sided"),
-        either(lights.unseen, "lights/emission.cl#unseen"),
+        either(lights.unseen or lights.directed, "lights/emission.cl#unseen"),
     ]
 
 

@@ -26,7 +26,16 @@ from clpt.render.lights.check import placement, three, unit, unsheared
 from clpt.render.lights.find import Source, Sources, emissions_of, environment_of, is_whole
 from clpt.render.materials.encoder import Encoder
 from clpt.render.records import lights as light_records
-from clpt.render.records.lights import ALONG, BOTH, FRONT, KINDS, RECORDS, UNSEEN, LightFeatures
+from clpt.render.records.lights import (
+    ALONG,
+    BOTH,
+    DIRECTED,
+    FRONT,
+    KINDS,
+    RECORDS,
+    UNSEEN,
+    LightFeatures,
+)
 from clpt.render.records.tables import content
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.find import Look
@@ -167,6 +176,7 @@ class LightRows:
             visible=infinite or bool(shine.any()),
             two_sided=bool((modes & BOTH).any()),
             unseen=bool((modes & UNSEEN).any()),
+            directed=bool((modes & DIRECTED).any()),
             tree=self.tree is not None,
             few=len(self.rows) <= FEW_LIGHTS,
             gloss=gloss,
@@ -261,6 +271,7 @@ def _emitter_rows(emitter: Emitter, encoder: Encoder) -> np.ndarray:
     along = emission.kind == "directional_area"
     mode = ALONG if along else BOTH if emission.two_sided else FRONT
     rows["emission_mode"] = mode | (0 if emission.visible else UNSEEN)
+    rows["emission_mode"] |= DIRECTED if emission.directed else 0
     return rows
 
 

@@ -101,6 +101,7 @@ class DeviceFilm:
         if texture_budget is None:
             texture_budget = texture_budget_of(device)
         self._texture_budget, self.successors = texture_budget, Successors()
+        self._shared = options.get("programs") == "shared"
         looped = options.get("looped", None if options.get("queue") is None else True)
         self._tuning = Tuning(
             options.get("layout"), options.get("queued"), looped, options.get("cancel_seconds")
@@ -214,10 +215,11 @@ class DeviceFilm:
 
         def make() -> Lowered:
             readable, budget = resolve_device_arrays(scene, self.device.queue), self._texture_budget
-            lowered = lower(readable, budget, former, anew=chooses)
+            shared = self._shared
+            lowered = lower(readable, budget, former, anew=chooses, shared=shared)
             if not lowered.candidates or steered:
                 return lowered
-            return decided(self.device, self._tuning, readable, lowered, budget)
+            return decided(self.device, self._tuning, readable, lowered, budget, shared=shared)
 
         if share is None:
             return make()

@@ -192,7 +192,8 @@ INFINITE = (
     "spectral_sky",
 )
 PLACED = (*(cls.kind for cls in LIGHTS if cls.reach == "placed"), "image_spot")
-FRONT, ALONG, BOTH, UNSEEN = 0, 1, 2, 4  # LightRow.emission_mode, see kernels/lights/area.cl
+# LightRow.emission_mode, see kernels/lights/area.cl
+FRONT, ALONG, BOTH, UNSEEN, DIRECTED = 0, 1, 2, 4, 8
 
 BASES = {
     "spectral_envmap": "envmap",
@@ -261,6 +262,7 @@ class LightFeatures:
     visible: bool = False  # some light is no delta light: a camera may see it
     two_sided: bool = False  # some shape emits from its back too
     unseen: bool = False  # some shape emits, but no ray sees it
+    directed: bool = False  # the light of some shape depends on its direction
     tree: bool = False  # a tree chooses among the lights
     gloss: int = 0  # the gloss stands so many words before a material's row; 0: no gloss
     few: bool = flag("FEW_LIGHTS", True)  # a single random number chooses a light and a point

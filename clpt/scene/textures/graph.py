@@ -90,12 +90,11 @@ class Graph(Texture):
             message = "cannot be textures that combine others: nodes do that"
             raise SceneError(message, where="graph.textures")
         object.__setattr__(self, "textures", tuple(self.textures))
-        _Resolver(self).resolve([*self.nodes])  # also the nodes that the value does not need
+        _ = self._resolved  # raises for nodes that the value does not need, too
 
     @cached_property
     def _resolved(self) -> tuple[list[Step], Operand]:
-        resolver = _Resolver(self)
-        return resolver.steps, resolver.resolve([])
+        return _Resolver(self).resolve()
 
     @property
     def steps(self) -> list[Step]:
@@ -219,18 +218,23 @@ class _Resolver:
         self.steps: list[Step] = []
         self.found: dict[str, Operand] = {}
 
-    def resolve(self, names: list[str]) -> Operand:
-        """Return the output's operand; fill `steps`. names: of more nodes. Raises SceneError."""
-        for name in self._in_order(names):
+    def resolve(self) -> tuple[list[Step], Operand]:
+        """Return the steps of the output, and its operand. Raises SceneError for any node."""
+        needed = 0
+        for name in self._in_order():
             self.found[name] = self._node(name)
-        return self._operand(self.output, "graph.output")
+            needed = len(self.steps) if name == self.output else needed
+        return self.steps[:needed], self._operand(self.output, "graph.output")
 
-    def _in_order(self, names: list[str]) -> list[str]:
-        """Return the names of nodes, each after those that it reads. Raises SceneError."""
+    def _in_order(self) -> list[str]:
+        """Return the names of nodes, each after those that it reads, the output's first.
+
+        Raises SceneError.
+        """
         if self.output not in {*self.nodes, *SOURCES}:
             raise SceneError(f"there is no node {self.output!r}", where="graph.output")
         ordered: dict[str, bool] = {}  # whether what a node reads comes before it already
-        waiting = [*names, *([self.output] if self.output not in SOURCES else [])]
+        waiting = [*self.nodes, *([self.output] if self.output not in SOURCES else [])]
         while waiting:
             name = waiting[-1]
             if ordered.get(name):

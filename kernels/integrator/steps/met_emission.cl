@@ -17,7 +17,9 @@ inline mask add_emission(Scene scene, Slab path, uint at, mask active, Vertex v 
         vec3 from = madd3(v.d, -null_distance, v.o);
         real other = light_pdf(scene, light, from, path_receiver(path, at), v.d, v.t + null_distance, v.s.n);
         real w = met_weight(scene, path, at, v, light, pdf, other);
-        Spectrum le = emission_load(scene, light_at(scene, light).radiance, surface_texture_point(v.s), v.lambdas);
+        LightRow lamp = light_at(scene, light);
+        TexturePoint point = area_lookup(lamp, surface_texture_point(v.s), neg3(v.d));
+        Spectrum le = emission_load(scene, lamp.radiance, point, v.lambdas);
         le = spectrum_scale(spectrum_mul(v.beta, le), w);
         store_path_radiance(path, at, lit, spectrum_add(load_path_radiance(path, at), le));
         light_layers_add(scene, path, at, lit, v.depth, light, length_after(path, at, v.t), le LIGHT_LAYER_PASSED);

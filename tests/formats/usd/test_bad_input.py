@@ -55,6 +55,21 @@ def test_layers_in_a_circle_end(stage: Loader) -> None:
     assert [shape.name for shape in scene.shapes] == ["M"]
 
 
+def test_a_point_that_is_not_finite_leaves_its_prim_out(stage: Loader) -> None:
+    broken = SQUARE.replace("1, 1", "inf, 1")
+    text = "\n".join(f'def Mesh "{name}" {{ {broken} }}' for name in "AB")
+    balls = 'def Points "C" { point3f[] points = [(0, 0, nan)] }'
+    lines = (
+        'def BasisCurves "D" { point3f[] points = [(0, inf, 0), (0, 1, 0)]\n'
+        ' int[] curveVertexCounts = [2]\n uniform token type = "linear" }'
+    )
+    scene = stage(f"{MESH}\n{text}\n{balls}\n{lines}")
+    assert [shape.name for shape in scene.shapes] == ["M"]
+    (warning,) = scene.warnings
+    assert warning.endswith("left out, as a point of it is not finite")
+    assert "/A" in warning and "/B" in warning
+
+
 def test_copies_of_copies_are_refused(stage: Loader) -> None:
     """Ten prototypes, each of ten of the one before: a file of 2 kB would be 10^10 meshes."""
     text = f'class "P0" {{ def Mesh "M" {{ {SQUARE} }} }}\n'

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from pathlib import Path as File
 
 import numpy as np
 import pytest
 
+import clpt
+from clpt import transforms
 from clpt.images import write
-from clpt.scene import Scene
-from clpt.scene.lights import Constant, Directional, Envmap, Goniometric, Point, Spot
-from clpt.scene.shapes import Shape
+from clpt.scene import Film, Scene
+from clpt.scene.cameras import Orthographic
+from clpt.scene.integrators import Path
+from clpt.scene.lights import Area, Constant, Directional, Envmap, Goniometric, Point, Spot
+from clpt.scene.materials import Diffuse
+from clpt.scene.shapes import Rectangle, Shape
 from tests.formats.usd.conftest import SQUARE, Loader
 
 pytest.importorskip("pxr")
@@ -108,6 +113,75 @@ def test_cones_and_profiles(stage: Loader) -> None:
     assert np.allclose(nadir, [0, 0, -1, 0])
 
 
+SIDE = 200  # steps of an integral over a surface
+SURFACES = {  # a lamp's attributes; its points and normals (n, 3), which share its area evenly
+    "RectLight": "float inputs:width = 1\n float inputs:height = 0.5",
+    "DiskLight": "float inputs:radius = 0.5",
+    "SphereLight": "float inputs:radius = 0.5",
+    "CylinderLight": "float inputs:radius = 0.2\n float inputs:length = 1",
+}
+
+
+def surface_of(kind: str) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return points and normals (n, 3) of a lamp of SURFACES, and its area."""
+    u, v = (x.ravel() for x in np.meshgrid(*[(np.arange(SIDE) + 0.5) / SIDE] * 2))
+    turn = 2.0 * np.pi * u
+    flat = np.stack([0 * u, 0 * u, 0 * u - 1.0], 1)
+    if kind == "RectLight":
+        return np.stack([u - 0.5, 0.5 * v - 0.25, 0 * u], 1), flat, 0.5
+    if kind == "DiskLight":
+        r = 0.5 * np.sqrt(v)
+        return np.stack([r * np.cos(turn), r * np.sin(turn), 0 * u], 1), flat, 0.25 * np.pi
+    if kind == "SphereLight":
+        z, r = 2.0 * v - 1.0, np.sqrt(1.0 - (2.0 * v - 1.0) ** 2)
+        n = np.stack([r * np.cos(turn), r * np.sin(turn), z], 1)
+        return 0.5 * n, n, np.pi
+    n = np.stack([0 * u, np.cos(turn), np.sin(turn)], 1)
+    return 0.2 * n + np.stack([v - 0.5, 0 * u, 0 * u], 1), n, 0.4 * np.pi
+
+
+@pytest.mark.parametrize("kind", SURFACES)
+def test_lamps_with_an_area_are_shaped(kind: str, stage: Loader) -> None:
+    """The light on a floor: UsdLux's cone and focus about the lamp's axis, by an integral."""
+    turn = transforms.translate(0.2, 2.0, 0.1) @ transforms.rotate([1.0, 0.0, 0.0], -70.0)
+    rows = ", ".join(str(tuple(row)) for row in turn.T.tolist())
+    text = f"""{MESH} def {kind} "L" (prepend apiSchemas = ["ShapingAPI"]) {{
+        {SURFACES[kind]}
+        float inputs:intensity = 100
+        float inputs:shaping:cone:angle = 50
+        float inputs:shaping:cone:softness = 0.5
+        float inputs:shaping:focus = 3
+        matrix4d xformOp:transform = ({rows})
+        uniform token[] xformOpOrder = ["xformOp:transform"]
+    }}"""
+    read = stage(text)
+    assert not read.warnings and lamp(read).emission.directed
+    floor = Rectangle(to_world=transforms.rotate([1, 0, 0], -90.0), material=Diffuse())
+    view = transforms.look_at([0, 1, 0], [0, 0, 0], [0, 0, 1]) @ transforms.scale([0.1, 0.1, 1.0])
+    scene = Scene(
+        camera=Orthographic(to_world=view), shapes=[lamp(read), floor],
+        film=Film(width=8, height=8, mode="rgb"), integrator=Path(max_depth=2),
+    )  # fmt: skip
+    with clpt.Renderer(scene) as renderer:
+        renderer.run(256)
+        found = np.asarray(renderer.image())[..., :3].mean()
+    points, normals, area = surface_of(kind)
+    points, normals = transforms.transform_points(turn, points), normals @ turn[:3, :3].T
+    distance = np.linalg.norm(points, axis=1)
+    d = -points / distance[:, None]  # to the origin
+    cosine = d @ (turn[:3, :3] @ [0.0, 0.0, -1.0])
+    past = np.clip((np.degrees(np.arccos(cosine)) / 50.0 - 0.5) / 0.5, 0.0, 1.0)
+    share = (1.0 - past * past * (3.0 - 2.0 * past)) * np.abs(cosine) ** 3
+    facing = np.maximum((d * normals).sum(axis=1), 0.0) * -d[:, 1]
+    irradiance = 100.0 * area * (share * facing / distance**2).mean()
+    assert found == pytest.approx(irradiance * 0.5 / np.pi, rel=0.01)
+
+
+def test_a_directed_lamp_has_no_power() -> None:
+    with pytest.raises(clpt.SceneError, match="no power"):
+        Area(directed=True, power=1.0)
+
+
 def test_colors_of_temperatures(stage: Loader) -> None:
     text = (
         MESH
@@ -148,7 +222,7 @@ def test_what_lights_cannot_do_is_told(stage: Loader) -> None:
 
 
 @pytest.mark.parametrize("form", ["latlong", "mirroredBall", "angular"])
-def test_domes_of_other_formats(stage: Loader, tmp_path: Path, form: str) -> None:
+def test_domes_of_other_formats(stage: Loader, tmp_path: File, form: str) -> None:
     """Of an image that is red in its middle, red comes from +z of the dome."""
     pixels = np.zeros((65, 65 if form != "latlong" else 130, 3), np.float32)
     middle = pixels.shape[1] // 2
@@ -171,7 +245,7 @@ def test_domes_of_other_formats(stage: Loader, tmp_path: Path, form: str) -> Non
     assert np.allclose(dome.to_world, np.eye(4))
 
 
-def test_the_pole_of_a_dome(stage: Loader, tmp_path: Path) -> None:
+def test_the_pole_of_a_dome(stage: Loader, tmp_path: File) -> None:
     """Up on a stage whose up axis is z, turned there by its author or not."""
     text = """def DomeLight{} "L" {{
         asset inputs:texture:file = @./sky.exr@
