@@ -144,6 +144,8 @@ def plain(value: object) -> Any:
 
 def is_number(value: object) -> TypeGuard[float]:
     """Return whether a value is a real number, also NaN or infinity; True and False are none."""
+    if type(value) is float:  # of the many numbers of a spectrum
+        return True
     value = plain(value)
     return isinstance(value, Real) and not isinstance(value, (bool, np.generic))
 

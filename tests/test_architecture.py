@@ -45,7 +45,7 @@ MAY_IMPORT = {
     "formats": BASE | {"lenses", "geometry", "scene"},
     "mie": BASE | {"scene"},
     "testing": BASE | {"scene", "device", "render"},
-    "instruments": RENDERS,
+    "instruments": RENDERS | {"geometry"},
     "dataset": RENDERS,
     "view": RENDERS,
     "cluster": RENDERS,

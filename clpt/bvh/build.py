@@ -283,7 +283,6 @@ def build_parts(
     start = time.perf_counter()
     trees, building = [], Building(device)
     for (i, j), rows in zip(pairwise(runs.firsts), chain(runs.keys, repeat(1)), strict=False):
-        building = Building(device, building.stream)
         if rows > 1 and runs.corners is not None:
             _check_reach(runs.corners, "a vertex")
             packed = keyed(building, runs.corners, faces[i:j], tags[i:j], rows, layout, quality)

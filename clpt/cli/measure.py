@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..choices import QUANTITIES
 from ..formats import locate
 from .options.scene_options import loading_options
-from .options.values import Choice, ScenePath
+from .options.values import Choice, ScenePath, Size
 from .process import terminal
+
+if TYPE_CHECKING:
+    from ..scene import Scene
 
 
 @click.command()
 @click.argument("scene", type=ScenePath())
 @click.option(
-    "--at", "points", type=click.Path(path_type=Path), required=True, metavar="FILE.csv",
+    "--at", "points", type=click.Path(path_type=Path), metavar="FILE.csv",
     help="Rows of x, y, z [m], perhaps with nx, ny, nz, the normal, or dx, dy, dz, a direction.",
 )  # fmt: skip
+@click.option(
+    "--texels", metavar="NAME", help="In place of --at: the shape of this name, at its uvs' texels."
+)
+@click.option("--size", type=Size(), help="Of the map of --texels.", default="64x64")
 @click.option("--quantity", type=Choice(QUANTITIES), default="illuminance", show_default=True)
 @click.option(
     "--direction", type=(float, float, float), default=(0.0, 1.0, 0.0), show_default=True,
@@ -39,12 +46,16 @@ from .process import terminal
 )  # fmt: skip
 @click.option("--device", metavar="NAME-OR-INDEX", help="Where to render, see `clpt devices`.")
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="A .csv file, in place of the terminal."
-)
+    "-o", "--output", type=click.Path(path_type=Path),
+    help="A .csv file, in place of the terminal; of --texels also .exr, .npy, .hdr, .pfm, or .png "
+    "in false colors.",
+)  # fmt: skip
 @loading_options
 def measure(
     scene: Path,
-    points: Path,
+    points: Path | None,
+    texels: str | None,
+    size: tuple[int, int],
     direction: tuple[float, float, float],
     output: Path | None,
     variables: dict[str, Any],
@@ -56,22 +67,43 @@ def measure(
     scalar_illuminance, photon_flux_density, tristimulus, and by `clpt[measure]` cct, cri and rf.
     Along rays: radiance, spectral_radiance, luminance.
     """
+    if (points is None) == (texels is None):
+        raise click.UsageError("Give --at FILE.csv or --texels NAME.")
     locate(scene)
-    locate(points)
     from .. import formats, instruments
     from ..files import output_files
     from ..instruments import tables
 
     if output is not None:
         output_files.check_writable(output)
-    at, directions = tables.read_points(points)
-    loaded = formats.load(scene, **variables)
-    measured = instruments.measure(
-        loaded, how.pop("quantity"), at, direction if directions is None else directions, **how
-    )
-    text = tables.written(at, measured)
-    if output is None:
-        terminal.write(text.rstrip("\n"))
+    if points is None:
+        text = _of_texels(formats.load(scene, **variables), str(texels), size, output, how)
     else:
+        at, directions = tables.read_points(locate(points))
+        toward = direction if directions is None else directions
+        loaded = formats.load(scene, **variables)
+        text = tables.written(at, instruments.measure(loaded, at=at, directions=toward, **how))
+    if output is None:
+        return terminal.write(text.rstrip("\n"))
+    if text:
         output_files.write_text(output, text)
-        terminal.say(str(output))
+    return terminal.say(str(output))
+
+
+def _of_texels(
+    scene: Scene, name: str, size: tuple[int, int], output: Path | None, how: dict[str, Any]
+) -> str:
+    """Measure a shape; write an image, or return a table."""
+    from .. import instruments
+    from ..images.picture_files import check_output
+    from ..instruments import tables
+
+    in_image = output is not None and output.suffix.lower() != ".csv"
+    if output is not None and in_image:
+        check_output(output)
+    surface = instruments.texels(scene, name, size)
+    measured = instruments.bake(scene, name, size=size, **how)
+    if output is not None and in_image:
+        tables.write_map(output, measured)
+        return ""
+    return tables.written(surface.points, measured.at(surface.covered))

@@ -25,8 +25,11 @@ from clpt.dataset.truth import Truth, ground_truth, truth_scene
 from clpt.dataset.writers import WRITERS, Writer
 from clpt.errors import ClptError, SceneError, UnknownKindError
 from clpt.files import output_files
+from clpt.render.flow.scene_to_tables import lower
 from clpt.render.options import RenderOptions
+from clpt.render.records import Features
 from clpt.render.renderer import Renderer
+from clpt.render.wavefront.strategy import UNTUNED, Strategy, choose
 from clpt.scene import Scene
 from clpt.scene.fingerprint import fingerprint
 
@@ -79,19 +82,16 @@ def pictures(
     number and the error of a picture that fails, then the others follow; None: it is raised.
     options: see `PictureOptions` and `clpt.Renderer`.
     """
-    seed = options.pop("seed", 0)
-    with _Renderers(options) as renderers:
+    with Renderers(options) as renderers:
         for index in indices:
-            begin = time.perf_counter()
             try:
-                scene = _scene(make_scene, seed, index)
-                image, truth = renderers.render(scene)
+                picture = renderers.picture(make_scene, index)
             except Exception as error:
                 if on_failure is None:
                     raise
                 on_failure(index, error)
-                continue
-            yield Picture(index, image, scene, truth, time.perf_counter() - begin)
+            else:
+                yield picture
 
 
 def warm(make_scene: MakeScene, indices: Iterable[int], **options: Unpack[PictureOptions]) -> int:
@@ -101,11 +101,10 @@ def warm(make_scene: MakeScene, indices: Iterable[int], **options: Unpack[Pictur
     function fails are passed over. Arguments: as of `pictures`. Returns the number of programs that
     were compiled; the others were in the caches.
     """
-    seed = options.pop("seed", 0)
-    with _Renderers(options) as renderers:
+    with Renderers(options) as renderers:
         for index in indices:
             try:
-                renderers.prepare(_scene(make_scene, seed, index))
+                renderers.prepare(_scene(make_scene, renderers.seed, index))
             except Exception as error:
                 log.warning("picture %d would fail: %s", index, error)
         return renderers.compiled
@@ -120,24 +119,36 @@ def _scene(make_scene: MakeScene, seed: int, index: int) -> Scene:
     return scene
 
 
-class _Renderers:
+class Renderers:
     """Two renderers that get scene after scene: of the light, and of the truth."""
 
     def __init__(self, options: PictureOptions):
-        self.spp, self.truth = options.pop("spp", 16), options.pop("truth", "visible")
-        self.device, self.options = options.pop("device", None), cast(RenderOptions, options)
+        own: dict[str, Any] = {**DEFAULTS, "device": None, **options}
+        self.spp, self.seed, self.truth = own.pop("spp"), own.pop("seed"), own.pop("truth")
+        self.device, self.options = own.pop("device"), cast(RenderOptions, own)
         if self.truth not in TRUTHS:
             raise UnknownKindError("truth", self.truth, TRUTHS)
         self.open: list[Renderer] = []
+        self.needs: set[tuple[tuple[Features, Strategy], ...]] = set()  # of scenes that came
 
-    def __enter__(self) -> _Renderers:
+    def __enter__(self) -> Renderers:
         return self
 
     def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
         for renderer in self.open:
             renderer.close()
 
-    def render(self, scene: Scene) -> tuple[Floats32, Truth | None]:
+    def picture(self, make_scene: MakeScene, index: int) -> Picture:
+        """Render a picture. Raises what make_scene raises, and as `clpt.Renderer` does."""
+        begin = time.perf_counter()
+        scene = _scene(make_scene, self.seed, index)
+        image, truth = self._render(scene)
+        return Picture(index, image, scene, truth, time.perf_counter() - begin)
+
+    def _render(self, scene: Scene) -> tuple[Floats32, Truth | None]:
         """Return a scene's picture (h, w, 3), and its ground truth."""
         self._bring(scene)
         self.open[0].run(self.spp)
@@ -148,13 +159,27 @@ class _Renderers:
         return image, ground_truth(scene, self._for_truth(scene), silhouettes=alone)
 
     def prepare(self, scene: Scene) -> None:
-        """Compile what `render` needs."""
+        """Compile what `render` needs, where no scene before needed the same."""
+        parts = [scene] if self.truth == "none" else [scene, truth_scene(scene)]
+        if self.open and not self._is_new(parts):
+            return
         self._bring(scene)
         self.open[0].prepare()
         if self.truth != "none":
             renderer = self._for_truth(scene)
-            renderer.update(scene=truth_scene(scene))
+            renderer.update(scene=parts[1])
             renderer.prepare()
+
+    def _is_new(self, parts: list[Scene]) -> bool:
+        """Return whether scenes may need other programs than those before."""
+        device = self.open[0].device
+        tables = [lower(scene) for scene in parts]
+        if any(lowered.candidates for lowered in tables):  # a trial render decides
+            return True
+        needs = tuple((each.features, choose(device, each, UNTUNED)) for each in tables)
+        before = len(self.needs)
+        self.needs.add(needs)
+        return len(self.needs) > before
 
     @property
     def compiled(self) -> int:

@@ -21,6 +21,7 @@ from clpt.files import output_files
 
 MILLIMETRE = 1000.0  # in a metre
 SHARD = 1000  # pictures of a tar
+MOST_OBJECTS = MOST_DEPTH = 65535  # uint16
 
 
 class Writer(ABC):
@@ -63,6 +64,14 @@ def codes(picture: Picture) -> np.ndarray:
     return np.asarray(images.to_srgb8(picture.image))
 
 
+def numbers(truth: Truth) -> np.ndarray:
+    """Return the instances as uint16 (h, w). Raises SceneError for more objects than it holds."""
+    if len(truth.names) > MOST_OBJECTS:
+        message = f"{len(truth.names)} objects; files with 16 bits hold {MOST_OBJECTS}"
+        raise SceneError(message, where="shapes")
+    return truth.instances.astype(np.uint16)
+
+
 def labels(truth: Truth) -> dict[str, Any]:
     """Return the camera and the objects of a record, as JSON."""
     visibility, amodal = truth.visibility, truth.amodal_boxes
@@ -87,7 +96,7 @@ def layers(picture: Picture) -> dict[str, bytes]:
     if picture.truth is not None:
         files["depth.npy"] = npy(picture.truth.depth.astype(np.float32))
         files["normal.npy"] = npy(picture.truth.normal.astype(np.float16))
-        files["instances.png"] = png(picture.truth.instances.astype(np.uint16))
+        files["instances.png"] = png(numbers(picture.truth))
     return files
 
 
@@ -152,7 +161,7 @@ class Coco(Writer):
         """Write the picture and the instances' masks."""
         truth = _needed(picture)
         name = self.put(f"images/{picture.index:06d}.png", png(codes(picture)))
-        self.put(f"instances/{picture.index:06d}.png", png(truth.instances.astype(np.uint16)))
+        self.put(f"instances/{picture.index:06d}.png", png(numbers(truth)))
         annotations = []
         for i, label in enumerate(labels(truth)["objects"]):
             if truth.visible[i]:
@@ -203,7 +212,8 @@ class Bop(Writer):
         if truth.matrix is None:
             message = f"BOP needs intrinsics, which a {picture.scene.camera.kind} camera has not"
             raise SceneError(message, where="camera")
-        depth = np.clip(np.rint(truth.depth * MILLIMETRE / self.SCALE), 0, 65535)
+        depth = np.rint(truth.depth * MILLIMETRE / self.SCALE)
+        depth[depth > MOST_DEPTH] = 0.0  # missing, as BOP has it
         self.put(f"{self.SCENE}/rgb/{index:06d}.png", png(codes(picture)))
         self.put(f"{self.SCENE}/depth/{index:06d}.png", png(depth.astype(np.uint16)))
         for i in range(len(truth.names)):
@@ -273,7 +283,7 @@ class Hdf5(Writer):
             truth = picture.truth
             parts |= {
                 "depth": truth.depth.astype(np.float32), "normals": truth.normal.astype(np.float16),
-                "instance_segmaps": truth.instances.astype(np.uint16),
+                "instance_segmaps": numbers(truth),
             }  # fmt: skip
         file = io.BytesIO()
         with h5py.File(file, "w") as group:

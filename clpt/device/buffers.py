@@ -65,6 +65,7 @@ class Buffers:
         self.device = device
         self.limit = device.free_memory() if limit is None else limit
         self._live: weakref.WeakSet[CountedBuffer] = weakref.WeakSet()
+        self._most = 0  # that live buffers may take [bytes], counted again when it is too much
 
     @property
     def used(self) -> int:
@@ -129,8 +130,10 @@ class Buffers:
             buffer.release()
 
     def _create(self, name: str, nbytes: int, advice: str, host: NDArray | None) -> cl.Buffer:
-        if nbytes > self.available:
-            raise MemoryBudgetError(name, nbytes, self.available, advice)
+        if nbytes > min(self.limit - self._most, self.device.info.max_alloc):
+            self._most = self.used
+            if nbytes > self.available:
+                raise MemoryBudgetError(name, nbytes, self.available, advice)
         access = cl.mem_flags.READ_WRITE
         if host is not None:
             access |= cl.mem_flags.COPY_HOST_PTR
@@ -141,6 +144,7 @@ class Buffers:
         except cl.Error as error:
             raise refused(name, error, nbytes, self.available, advice) from error
         self._live.add(buffer)
+        self._most += buffer.size
         return buffer
 
 

@@ -32,6 +32,11 @@ _SCALARS = {
     "float": np.float32,
     "double": np.float64,
 }
+_LIMITS = {  # of whole numbers
+    name: (int(np.iinfo(np.dtype(kind).name).min), int(np.iinfo(np.dtype(kind).name).max))
+    for name, kind in _SCALARS.items()
+    if np.dtype(kind).kind in "iu"
+}
 # A null pointer as bytes: PyOpenCL accepts None only from 2026.1.3.
 _NULL = np.uintp(0)
 _VECTOR = re.compile(r"([a-z]+?)(2|3|4|8|16)$")
@@ -64,15 +69,15 @@ class Argument:
         if isinstance(value, (np.void, np.ndarray)):
             return value
         vector = _VECTOR.match(self.type)
-        base = _SCALARS.get(vector[1] if vector else self.type)
+        name = vector[1] if vector else self.type
+        base = _SCALARS.get(name)
         if base is None:  # a struct, an image or a sampler
             return value
-        kind: np.dtype[Any] = np.dtype(base)
-        if kind.kind in "iu":  # NumPy before 2 truncates silently
-            limits = np.iinfo(kind.str)
+        if name in _LIMITS:  # NumPy before 2 truncates silently
+            least, most = _LIMITS[name]
             numbers = value if vector else (value,)
-            if not all(limits.min <= number <= limits.max for number in numbers):
-                raise OverflowError(f"it goes from {limits.min} to {limits.max}")
+            if not all(least <= number <= most for number in numbers):
+                raise OverflowError(f"it goes from {least} to {most}")
         if vector is None:
             return base(value)
         length = int(vector[2])

@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -323,38 +324,43 @@ def free_memory(
                 amounts.append(int(row.split()[1]) * 1024)
     except OSError:
         pass
-    for group in _groups(root, membership):
-        for limit, usage, files in _CGROUPS:
-            try:
-                left = int((group / limit).read_text()) - int((group / usage).read_text())
-                stat = (group / "memory.stat").read_text().splitlines()
-                inactive = dict(row.split() for row in stat).get(files, 0)
-                amounts.append(left + int(inactive))
-            except (OSError, ValueError):  # no cgroup of that version, or the limit is "max"
-                continue
+    try:
+        rows = membership.read_text()
+    except OSError:
+        rows = ""
+    for limit, usage, stat, inactive in _limits(root, rows):
+        try:
+            left = int(limit.read_text()) - int(usage.read_text())
+            known = dict(row.split() for row in stat.read_text().splitlines())
+            amounts.append(left + int(known.get(inactive, 0)))
+        except (OSError, ValueError):  # the limit is "max"
+            continue
     amounts += _of_process()
     return max(0, min(amounts)) if amounts else None
 
 
-def _groups(root: Path, membership: Path) -> set[Path]:
-    """Return the folders of the process's control group and of all that hold it.
+@cache
+def _limits(root: Path, rows: str) -> list[tuple[Path, Path, Path, str]]:
+    """Return the files with limits: of the process's control group and of all that hold it.
 
     A row is ID:CONTROLLERS:PATH, without controllers in version 2. In version 1 those of memory
-    stand in a folder of their own, which has the name of the controllers that share it.
+    stand in a folder of their own, which has the name of the controllers that share it. Each tuple
+    is a row of `_CGROUPS`, with the file that counts its pages.
     """
     groups = {root, root / "memory"}
-    try:
-        rows = membership.read_text().splitlines()
-    except OSError:
-        return groups
-    for row in rows:
+    for row in rows.splitlines():
         _, controllers, path = row.split(":", 2)
         if controllers and "memory" not in controllers.split(","):
             continue
         for tree in {root / controllers, root / "memory"} if controllers else {root}:
             group = tree / path.lstrip("/")
             groups |= {group, *(parent for parent in group.parents if parent.is_relative_to(tree))}
-    return groups
+    return [
+        (group / limit, group / usage, group / "memory.stat", inactive)
+        for group in groups
+        for limit, usage, inactive in _CGROUPS
+        if os.path.exists(group / limit)
+    ]
 
 
 def _of_process() -> list[int]:

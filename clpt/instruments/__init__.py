@@ -1,5 +1,6 @@
 """Instruments: light as numbers with units and standard errors, at points and along rays."""
 
+from clpt.instruments.baking import Texels, bake, texels
 from clpt.instruments.false_color import write_false_color
 from clpt.instruments.glare_rating import Glare, glare
 from clpt.instruments.goniophotometry import Distribution, goniophotometer, write_photometry
@@ -14,6 +15,8 @@ __all__ = [
     "Glare",
     "Measurement",
     "Sensor",
+    "Texels",
+    "bake",
     "correlation",
     "echoes",
     "gate",
@@ -22,6 +25,7 @@ __all__ = [
     "measure",
     "phase_ranges",
     "photometer",
+    "texels",
     "write_false_color",
     "write_photometry",
 ]

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from clpt import device as dev
 from clpt.arrays import Floats, Image, vectors
 from clpt.errors import SceneError, UnknownKindError
 from clpt.instruments.quantities import QUANTITIES, Quantity
-from clpt.render.options import check_scene
+from clpt.render.options import RenderOptions, check_scene
 from clpt.render.renderer import Renderer
 from clpt.scene import Scene, shapes
 from clpt.scene.cameras import Rays
@@ -31,8 +31,6 @@ from clpt.scene.motion import rotation
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
-
-    from clpt.render.options import RenderOptions
 
 REPLICAS = 16  # pixels of an entry, whose scatter is its standard error
 LONGEST_ROW = 4096  # pixels of the film
@@ -63,6 +61,19 @@ class Measurement:
         """The largest standard error of entries with light, over the value."""
         lit = self.values > 0.0
         return float((self.errors[lit] / self.values[lit]).max()) if lit.any() else 0.0
+
+    def at(self, entries: NDArray[np.bool_]) -> Measurement:
+        """Return what some of the entries (...) measure, (n,)."""
+        return dataclasses.replace(self, values=self.values[entries], errors=self.errors[entries])
+
+
+class MeasureOptions(RenderOptions, total=False):
+    """Options of `measure`, whose docstring has their meaning."""
+
+    samples: int
+    error: float | None
+    bands: int
+    device: dev.Device | str | int | None
 
 
 def measure(

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from clpt import images
 from clpt.arrays import Floats
 from clpt.errors import SceneError
 from clpt.files import input_files as text_files
+from clpt.instruments.false_color import write_false_color
 from clpt.instruments.measuring import Measurement
 
 TITLES = (("x", "y", "z"), ("nx", "ny", "nz"), ("dx", "dy", "dz"))
@@ -73,3 +75,18 @@ def written(points: Floats, measured: Measurement) -> str:
     for point, value, error in zip(points, values, errors, strict=True):
         writer.writerow([f"{number:.7g}" for number in (*point, *value, *error)])
     return text.getvalue()
+
+
+def write_map(path: Path, measured: Measurement) -> None:
+    """Write the values (h, w) of a map as an image, its bands as the channels of an .npy.
+
+    A .png has false colors. Texels beyond the surface are 0. Raises SceneError.
+    """
+    values = np.nan_to_num(measured.values).astype(np.float32)
+    if path.suffix.lower() == ".png" and values.ndim == 2:
+        write_false_color(path, measured.values, measured.unit)
+    elif values.ndim == 2 or values.shape[2] == 3 or path.suffix.lower() == ".npy":
+        images.write(path, values, half=False)
+    else:
+        message = f"holds no {values.shape[2]} bands; write an .npy or a .csv"
+        raise SceneError(message, file=path)

@@ -30,6 +30,7 @@ class Scatterer(Kind):
     )
     disperses: ClassVar[bool] = False  # whatever its parameters, directions depend on wavelength
     refracts: ClassVar[bool] = False  # they do so where a parameter of the role index does
+    has_across: ClassVar[bool] = False  # a source has `across`; clpt's kinds need not say so
     fluoresces: ClassVar[bool] = False  # light may leave at another wavelength: it has `shift`
     is_null: ClassVar[bool] = False  # light goes on as if nothing were there, to lights as well
     is_pane: ClassVar[bool] = False  # what it lets through goes straight on: `free_panes`

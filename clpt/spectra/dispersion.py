@@ -142,7 +142,7 @@ def index(value: Spectrum | str) -> Spectrum:
     if isinstance(value, str):
         return glass(value)
     if isinstance(value, Tabulated):
-        return replace(value, outside="hold")
+        return value if value.outside == "hold" else replace(value, outside="hold")
     return RGBUnbounded(value.r, value.g, value.b) if isinstance(value, RGB) else value
 
 

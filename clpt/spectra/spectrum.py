@@ -25,7 +25,7 @@ from clpt.spectra import cie, data, upsampling
 Role = Literal["reflectance", "unbounded", "emission"]
 Outside = Literal["zero", "hold"]
 
-SHORTEST, LONGEST = 200.0, 2000.0  # [nm], the ends of a film's widest range
+SHORTEST, LONGEST = 200.0, 2500.0  # [nm], the ends of a film's widest range
 WIDEST = np.arange(SHORTEST, LONGEST + 0.5)  # that range, whole nanometres
 
 
@@ -202,7 +202,7 @@ class Cauchy(Spectrum):
 def absorption(k: Spectrum) -> Spectrum:
     """Absorption coefficient [1/m] where the extinction coefficient is k: 4 pi k / lambda.
 
-    Born and Wolf, Principles of Optics, 7th ed., 14.1 eq. 19. Whole nanometres, 200 to 2000. Raises
+    Born and Wolf, Principles of Optics, 7th ed., 14.1 eq. 19. Whole nanometres, 200 to 2500. Raises
     SceneError for a table that lies elsewhere.
     """
     if isinstance(k, Tabulated):

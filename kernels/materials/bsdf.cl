@@ -5,8 +5,8 @@
  *   real       <kind>_pdf   (<Kind> m, vec3 wo, vec3 wi);    [1/sr], likewise
  *   Spectrum   <kind>_albedo(<Kind> m);                      the colour a person would name
  *   Spectrum   <kind>_pdfs  (<Kind> m, vec3 wo, vec3 wi);    of `chromatic` kinds: pdf, were each wavelength the hero
- *   real       <kind>_across(<Kind> m);                      of clpt's kinds that refract and are not delta: the index
- *                                                            behind the front over that before it, of the hero
+ *   real       <kind>_across(<Kind> m);                      of kinds that refract and are not delta, or `has_across`:
+ *                                                            the hero's index behind the front over that before
  *
  * wo points to the viewer, wi to the light, both away from the surface, in the local frame whose z is
  * the shading normal, on the front's side: wo.z < 0 is a look at the back. The struct <Kind> is

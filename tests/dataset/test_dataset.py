@@ -19,6 +19,7 @@ import clpt
 from clpt import dataset
 from clpt import transforms as tf
 from clpt.dataset import truth as truths
+from clpt.dataset import writers
 from clpt.errors import SceneError, UnknownKindError
 from clpt.files import output_files
 from clpt.scene import Film, Scene, cameras, lights, materials, shapes
@@ -294,6 +295,39 @@ def test_bop(tmp_path):
         assert np.abs(low - [columns.min(), rows.min()]).max() <= 1.0
         assert np.abs(high - [columns.max(), rows.max()]).max() <= 1.0
         assert facts[i]["px_count_all"] == mask.sum() and facts[i]["px_count_visib"] <= mask.sum()
+
+
+def test_bop_has_no_depth_beyond_its_16_bits(tmp_path):
+    """A wall at 20 m is at no depth, neither at 6.55 m nor at the remainder."""
+
+    def far(index, rng):
+        view = scene(index, rng)
+        back = tf.translate([0, 0, -20.0]) @ tf.scale(50.0)
+        view.shapes[:] = [shapes.Rectangle(to_world=back, name="wall"), *view.shapes[1:]]
+        eye = tf.look_at([0, 0, 1.5], [0, 0, -5.0], [0, 1, 0])
+        return dataclasses.replace(view, camera=cameras.Perspective(to_world=eye))
+
+    run(tmp_path, far, form="bop", count=1)
+    depth = np.asarray(Image.open(tmp_path / "000000/depth/000000.png"))
+    wall = np.asarray(Image.open(tmp_path / "000000/mask_visib/000000_000000.png")) > 0
+    assert wall.any() and (depth[wall] == 0).all()
+
+
+def test_more_objects_than_numbers_are_refused(tmp_path, monkeypatch):
+    """Their numbers would collide in files of 16 bits; the picture fails, and is told."""
+    monkeypatch.setattr(writers, "MOST_OBJECTS", 2)
+    for form in ("folders", "coco"):
+        report = run(tmp_path / form, form=form, count=1)
+        assert report.failures == {0: "shapes: 3 objects; files with 16 bits hold 2"}
+
+
+def test_shapes_of_one_name_are_one_object():
+    view = scene(0, np.random.default_rng(0))
+    alike = [dataclasses.replace(shape, name="pair") for shape in view.shapes[1:3]]
+    truth = dataset.ground_truth(
+        dataclasses.replace(view, shapes=[view.shapes[0], *alike, view.shapes[3]])
+    )
+    assert truth.names == ("pair", "ball") and truth.instances.max() == 2
 
 
 def test_webdataset(tmp_path):

@@ -15,8 +15,8 @@ from clpt.errors import SceneError, UnknownKindError
 from clpt.instruments import QUANTITIES, measure, photometer
 from clpt.scene import Film, Scene, cameras, lights, materials, media, shapes
 from clpt.scene.integrators import Box, Path
-from clpt.spectra import Constant
-from clpt.spectra.emission import UNIT_LUMINANCE
+from clpt.spectra import Blackbody, Constant, Tabulated
+from clpt.spectra.emission import LIGHT, PLANCK, UNIT_LUMINANCE
 
 DOWN = tf.rotate([1, 0, 0], 90)
 EVEN = Constant(1.0)  # W m^-2 sr^-1 nm^-1 at each wavelength
@@ -97,6 +97,23 @@ def test_photons_of_an_even_spectrum():
     agrees(measure(lit, "photon_flux_density", [0, 0, 0], samples=1024), expected)
 
 
+def test_infrared_of_satellites():
+    """Sentinel-2's band 12: a black body over a leaf whose table ends at 2500 nm."""
+    low, high, kelvin = 2100.0, 2280.0, 2856.0
+    leaf = materials.Diffuse(reflectance=Tabulated((400.0, 2000.0, 2500.0), (0.05, 0.4, 0.1)))
+    floor = shapes.Rectangle(to_world=tf.rotate([1, 0, 0], -90) @ tf.scale(50.0), material=leaf)
+    sky = lights.Constant(radiance=Blackbody(kelvin, scale=1e-3))
+    lit = dataclasses.replace(
+        scene(floor, lamps=(sky,)), film=Film(size=(8, 8), lambda_min=low, lambda_max=high)
+    )
+    lambdas = np.linspace(low, high, 1801) * 1e-9
+    planck = 2.0 * PLANCK * LIGHT**2 / lambdas**5 * 1e-9
+    planck /= np.expm1(PLANCK * LIGHT / (lambdas * 1.380649e-23 * kelvin))
+    share = np.interp(lambdas * 1e9, [2000.0, 2500.0], [0.4, 0.1])
+    measured = measure(lit, "radiance", [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], samples=4096)
+    agrees(measured, 1e-3 * (planck * share).mean() * (high - low))
+
+
 def test_rays():
     """Radiance of a lamp, of what is beside it, and through fog; luminance by 683 lm/W."""
     lit = scene(square(3.0), depth=1)
@@ -125,6 +142,18 @@ def test_a_matt_room_of_white_light():
     at = np.array([[0.2, 0.1, 0.3], [-0.5, 0.6, 0.0]])
     agrees(measure(room, "irradiance", at, samples=2048), RANGE * 2.0 * math.pi)
     agrees(measure(room, "scalar_irradiance", at, samples=2048), RANGE * 8.0 * math.pi)
+
+
+def test_points_within_surfaces_and_on_them():
+    """Inside of a body it is dark; a point of a wall sees what is before the wall."""
+    body = shapes.Cube(to_world=tf.scale(0.2), material=materials.Diffuse(reflectance=0.0))
+    at = [[0.0, 0.0, 0.0], [0.0, 0.2, 0.0], [0.2, 0.0, 0.0]]
+    normals = [[0, 1, 0], [0, 1, 0], [-1, 0, 0]]
+    measured = measure(scene(square(), body), "irradiance", at, normals)
+    top = 4.0 * below_corner(0.5 / 0.8, 0.5 / 0.8)
+    assert not measured.values[[0, 2]].any()
+    agrees(measure(scene(square(), body), "irradiance", at[1:2]), RANGE * top)
+    assert not measure(scene(square(), body), "scalar_irradiance", at[:1]).values.any()
 
 
 def test_an_error_that_is_asked_for_ends_it():

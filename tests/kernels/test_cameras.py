@@ -355,7 +355,7 @@ def projected(camera, step, points, away):
     [
         (cls, step)
         for cls in scene.KINDS
-        for step, asked in (("screen", cls.has_axis), ("connect", cls.connects))
+        for step, asked in (("screen", cls.has_screen), ("connect", cls.connects))
         if asked
     ],
 )

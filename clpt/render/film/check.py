@@ -54,11 +54,11 @@ def _check_layers(scene: Scene) -> None:
         names = ", ".join(cls.kind for cls in HAVE_LAYERS)
         message = f"only the integrators {names} have layers, not {how.kind}"
         raise SceneError(message, where="film.layers")
-    if not scene.camera.has_axis:
-        for name, instead in (("z", ": ask for depth"), ("motion", "")):
-            if name in film.layers:
-                message = f"the camera {scene.camera.kind} has no axis for {name}{instead}"
-                raise SceneError(message, where="film.layers")
+    camera = scene.camera
+    for name, possible in (("z", camera.has_axis), ("motion", camera.has_screen)):
+        if name in film.layers and not possible:
+            lacks = "axis for z: ask for depth" if name == "z" else "projection for motion"
+            raise SceneError(f"the camera {camera.kind} has no {lacks}", where="film.layers")
     lights = [name for name in film.layers if LAYERS[name].form == "light"]
     if how.merging and "light_groups" in lights:
         message = "photons do not know their group: leave light_groups out, or vcm.merging"

@@ -93,7 +93,7 @@ def is_guided(features: Features, cls: type[Scatterer]) -> bool:
 
 def refracts_widely(features: Features, cls: type[Scatterer]) -> bool:
     """Whether light by time asks for the index that lights have beyond a material."""
-    widely = cls.refracts and not cls.delta and cls.source is None
+    widely = cls.has_across if cls.source is not None else cls.refracts and not cls.delta
     return widely and features.film.layers.time_bins > 0
 
 

@@ -248,14 +248,22 @@ class _Clusters:
         self._add(np.stack([self.bounds[numbers, :2], self.bounds[numbers, 1:]], 1).reshape(-1, 2))
         return new
 
-    def cover(self, price: float, number: int = 0) -> tuple[float, list[int]]:
-        """Return the cheapest spheres around a cluster; each costs its area and a price."""
-        whole = float(self.spheres[number, 3] ** 2) + price
-        if number in self.parts:
-            near, far = (self.cover(price, part) for part in self.parts[number])
-            if near[0] + far[0] < whole:
-                return near[0] + far[0], near[1] + far[1]
-        return whole, [number]
+    def cover(self, price: float) -> tuple[float, list[int]]:
+        """Return the cheapest spheres around all pieces; each costs its area and a price."""
+        costs = (self.spheres[:, 3] ** 2 + price).tolist()
+        whole = set(range(len(costs)))
+        for number, (near, far) in reversed(self.parts.items()):  # parts follow what they are of
+            if costs[near] + costs[far] < costs[number]:
+                costs[number] = costs[near] + costs[far]
+                whole.discard(number)
+        numbers, waiting = list[int](), [0]
+        while waiting:
+            number = waiting.pop()
+            if number in whole:
+                numbers.append(number)
+            else:
+                waiting += reversed(self.parts[number])
+        return costs[0], numbers
 
 
 def _spheres(pieces: Floats) -> NDArray[np.float64]:

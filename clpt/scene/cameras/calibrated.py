@@ -141,6 +141,8 @@ class Calibrated(Camera):
     "clpt.scene.cameras" counts them.
     """
 
+    has_axis: ClassVar[bool] = True
+
     model: str = choice("opencv", "of the projection", projections.MODELS)
     intrinsics: Sequence[float] = host(
         (320.0, 320.0, 319.5, 239.5), "fx, fy, cx, cy", "pixels", form="numbers"

@@ -82,7 +82,8 @@ class Camera(Kind):
     """
 
     connects: ClassVar[bool] = False  # whether light paths can be joined to the camera
-    has_axis: ClassVar[bool] = False  # whether the layers z and motion have a meaning
+    has_axis: ClassVar[bool] = False  # whether the layer z has a meaning
+    has_screen: ClassVar[bool] = False  # whether the layer motion has: kernels project points
     is_rigid: ClassVar[bool] = True  # whether `to_world` must keep lengths
 
     shorthands: ClassVar[tuple[Shorthand, ...]] = (LOOK_AT,)
@@ -235,6 +236,7 @@ class Perspective(Camera):
 
     connects: ClassVar[bool] = True
     has_axis: ClassVar[bool] = True
+    has_screen: ClassVar[bool] = True
 
     fov: float = real(45.0, "field of view along `fov_axis`", "degrees", 1e-3, 179.999)
     fov_axis: str = choice("x", "the side that `fov` spans", ("x", "y", "smaller", "larger"))
@@ -418,6 +420,7 @@ class Orthographic(Camera):
 
     is_rigid: ClassVar[bool] = False
     has_axis: ClassVar[bool] = True
+    has_screen: ClassVar[bool] = True
 
     near: float = member(1e-2, "nearest distance seen", "m", low=0.0)
     far: float = member(1e4, "farthest distance seen", "m", low=0.0)

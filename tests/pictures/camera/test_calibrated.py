@@ -188,3 +188,18 @@ def test_other_models_agree_with_their_formulas():
 def test_bad_calibrations(arguments, words):
     with pytest.raises(SceneError, match=words):
         clpt.render(room(cameras.Calibrated(**arguments)), spp=1)
+
+
+def test_z_is_along_the_axis():
+    view = room(camera("kannala_brandt", np.random.default_rng(4)))
+    view.film = dataclasses.replace(view.film, layers=("position", "z"))
+    with clpt.Renderer(view) as renderer:
+        renderer.run(1)
+        layers = renderer.layers()
+    pose = np.asarray(view.camera.to_world)
+    along = (layers["position"] - pose[:3, 3]) @ pose[:3, 2]
+    np.testing.assert_allclose(layers["z"][..., 0], along, atol=1e-5)
+    assert along.max() > 1.0 and np.ptp(along) > 0.1
+    moving = dataclasses.replace(view, film=dataclasses.replace(view.film, layers=("motion",)))
+    with pytest.raises(SceneError, match="calibrated has no projection for motion"):
+        clpt.Renderer(moving)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from clpt.scene import Film, Scene, cameras, media
 from clpt.scene import materials as mt
 from clpt.scene.integrators import LIGHT_SPEED, Auto, Direct, Gaussian, ParticleTracer, Path, Vcm
 from clpt.scene.lights import Area, Constant, Directional, Point
+from clpt.scene.params import real
 from clpt.scene.shapes import Cube, Rectangle, Sphere
 
 CAMERA = Path(light_paths=0)
@@ -132,6 +134,55 @@ def test_rough_glass_counts_the_index_of_each_side(kind):
     )
     times, _ = rendered(scene, 1024)
     assert np.nonzero(times[0, 0, :, 0])[0][0] in (104, 105)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Milky(mt.Material):
+    """A boundary that scatters all light evenly to its other side."""
+
+    ior: Any = real(1.5, "index behind the front")
+    has_across = True
+    source = """
+real milky_pdf(Milky m, vec3 wo, vec3 wi)
+{
+    return sel(wo.z * wi.z < 0.0f, fabs(wi.z) * INV_PI, (real)(0.0f));
+}
+Spectrum milky_eval(Milky m, vec3 wo, vec3 wi) { return spectrum_of(milky_pdf(m, wo, wi)); }
+BsdfSample milky_sample(Milky m, vec3 wo, vec3 u)
+{
+    BsdfSample s = bsdf_nothing();
+    vec2 uv = {u.x, u.y};
+    s.wi = cosine_hemisphere(uv);
+    s.wi.z = sel(wo.z > 0.0f, -s.wi.z, s.wi.z);
+    s.weight = spectrum_of((real)(1.0f));
+    s.pdf = milky_pdf(m, wo, s.wi);
+    s.eta = sel(wo.z > 0.0f, m.ior, 1.0f / m.ior);
+    s.lobe = (integer)(LOBE_TRANSMIT);
+    return s;
+}
+Spectrum milky_albedo(Milky m) { return spectrum_of((real)(1.0f)); }
+real milky_across(Milky m) { return m.ior; }
+"""
+
+    @property
+    def transmits(self) -> bool:
+        return True
+
+
+@pytest.mark.slow
+def test_a_material_of_the_caller_tells_its_index():
+    """The first light comes through 1 m of it straight on, at once to the lamp behind or before."""
+    for lamp, first in ((10.0, 1.0 + 1.5 + 8.0), (1.6, 1.0 + 1.5 * 0.6)):
+        scene = Scene(
+            camera=ray(),
+            shapes=[slab(Milky())],
+            lights=[Point(position=(0, 0, lamp), intensity=1.0)],
+            integrator=Path(light_paths=0, max_depth=3),
+            film=timed((0.05, 30.05), 300),
+        )
+        times, _ = rendered(scene, 1024)
+        begin = int(first * 10.0 - 0.5)
+        assert np.nonzero(times[0, 0, :, 0])[0][0] in (begin - 1, begin, begin + 1)
 
 
 def room(**film) -> Scene:

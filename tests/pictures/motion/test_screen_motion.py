@@ -142,5 +142,7 @@ def test_what_stands_still_does_not_move():
 
 
 def test_a_camera_without_an_axis_is_refused():
-    with pytest.raises(SceneError, match=r"film.layers: the camera lens has no axis for motion"):
+    with pytest.raises(
+        SceneError, match=r"film.layers: the camera lens has no projection for motion"
+    ):
         clpt.Renderer(scene(Lens(to_world=LOOK)))
