@@ -240,7 +240,12 @@ class Writer:
         grids = source.data.grids
         grids.load()
         path, slots = Path(bpy.path.abspath(grids.frame_filepath)), _slots(source)
-        output = None if not slots else slots[0].node_tree.get_output_node("CYCLES")
+        if not grids.frame_filepath:  # of geometry nodes, or of a modifier
+            path = self.folder / f"volume{next(self.numbers)}.vdb"
+            grids.save(filepath=str(path))
+        output = None
+        if slots and slots[0] is not None and slots[0].node_tree is not None:
+            output = slots[0].node_tree.get_output_node("CYCLES")
         if not path.is_file() or output is None:
             self.tell(f"the volume {source.name!r} has no file or no material: it is left out")
             return []

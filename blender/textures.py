@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import bpy
 import numpy as np
 
 from .graphs import Graph, Site, Value, hashed, origin, turned
@@ -269,8 +270,15 @@ def _from_hsl(g: Graph, hsl: Value) -> Value:
     return (full - 0.5) * spread + hsl[2]
 
 
+def _mode(node: Any) -> str:
+    """Return what a node's three numbers are; those of Blender 4 have no mode."""
+    if node.type in ("COMBINE_COLOR", "SEPARATE_COLOR"):
+        return str(node.mode)
+    return "HSV" if node.type.endswith("HSV") else "RGB"
+
+
 def _separate(tree: Any, at: Site) -> Value:
-    g, mode = tree.g, "" if at.node.type == "SEPXYZ" else at.node.mode
+    g, mode = tree.g, _mode(at.node)
     value = tree.input(at, 0)
     if mode in ("HSV", "HSL"):
         value = g("rgbtohsv", value) if mode == "HSV" else _hsl(g, value)
@@ -278,7 +286,7 @@ def _separate(tree: Any, at: Site) -> Value:
 
 
 def _combine(tree: Any, at: Site) -> Value:
-    g, mode = tree.g, "" if at.node.type == "COMBXYZ" else at.node.mode
+    g, mode = tree.g, _mode(at.node)
     value = g("combine3", *(tree.input(at, i) for i in range(3)))
     return {"HSV": lambda v: g("hsvtorgb", v), "HSL": lambda v: _from_hsl(g, v)}.get(
         mode, lambda v: v
@@ -476,6 +484,8 @@ def _voronoi(tree: Any, at: Site) -> Value | None:
     node, g = at.node, tree.g
     if node.voronoi_dimensions in ("1D", "4D"):
         return tree.told(at, "Voronoi Texture of one or four dimensions is grey", 0.5)
+    if bpy.app.version < (5, 0):
+        tree.tell("Voronoi Texture has the cells of Blender 5, which lie elsewhere")
     feature = ("F1", "F2", "SMOOTH_F1", "DISTANCE_TO_EDGE", "N_SPHERE_RADIUS").index(node.feature)
     smoothness = (tree.input(at, "Smoothness") * 0.5) if feature == 2 else g.value(0.25)
     settings = {
@@ -793,12 +803,14 @@ def _zero(text: str, value: float = 0.0) -> Read:
 
 TEXTURES: dict[str, Read] = {
     "ATTRIBUTE": _attribute, "BLACKBODY": _blackbody, "BRIGHTCONTRAST": _contrast, "CLAMP": _clamp,
-    "COMBINE_COLOR": _combine, "COMBXYZ": _combine, "CURVE_FLOAT": _curves, "CURVE_RGB": _curves,
+    "COMBINE_COLOR": _combine, "COMBXYZ": _combine, "COMBRGB": _combine,
+    "COMBHSV": _combine, "CURVE_FLOAT": _curves, "CURVE_RGB": _curves,
     "CURVE_VEC": _curves, "GAMMA": _gamma, "HAIR_INFO": _hair, "HUE_SAT": _hue_saturation,
     "INVERT": _invert, "MAPPING": _mapping, "MAP_RANGE": _map_range, "MATH": _math, "MIX": _mix,
     "MIX_RGB": _mix, "NEW_GEOMETRY": _geometry, "NORMAL": _normal, "OBJECT_INFO": _object_info,
     "RGB": _constant, "RGBTOBW": lambda tree, at: tree.g.gray(tree.input(at, 0)),
-    "SEPARATE_COLOR": _separate, "SEPXYZ": _separate, "TEX_BRICK": _bricks,
+    "SEPARATE_COLOR": _separate, "SEPXYZ": _separate, "SEPRGB": _separate, "SEPHSV": _separate,
+    "TEX_BRICK": _bricks,
     "TEX_CHECKER": _checker, "TEX_COORD": _coordinates, "TEX_ENVIRONMENT": _environment,
     "TEX_GRADIENT": _gradient,
     "TEX_IMAGE": _image, "TEX_MAGIC": _magic, "TEX_NOISE": _noise, "TEX_VORONOI": _voronoi,
@@ -819,5 +831,6 @@ TEXTURES: dict[str, Read] = {
     "SCRIPT": _zero("Open Shading Language is not read", 0.5),
     "TEX_IES": _zero("IES Texture counts as 1", 1.0),
     "TEX_SKY": _zero("Sky Texture beside others is grey", 0.3),
+    "TEX_POINTDENSITY": _zero("Point Density counts as 0"),
     "TEX_GABOR": _zero("Gabor Texture is grey", 0.5),
 }  # fmt: skip

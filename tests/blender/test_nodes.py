@@ -305,6 +305,8 @@ def graph_picture(material: Any) -> tuple[np.ndarray, list[str]]:
 
 @pytest.mark.parametrize("case", CASES, ids=[f"{c[0]}-{c[1]}-{i}" for i, c in enumerate(CASES)])
 def test_a_node_is_that_of_cycles(case: Any, tmp_path: Path) -> None:
+    if case[0] == "TexVoronoi" and bpy.app.version < (5, 0):
+        pytest.skip("the cells of Blender 4 lie elsewhere, which is told")
     material = made(case)
     ours, told = graph_picture(material)
     cycles = cycles_picture(tmp_path)
@@ -327,8 +329,9 @@ def documented() -> dict[str, str]:
 
 def kinds() -> dict[str, tuple[str, str]]:
     """Return the type and the identifier of each node of Cycles' trees, by its label."""
-    tree = bpy.data.materials.new("all").node_tree
-    found = {}
+    material = bpy.data.materials.new("all")
+    material.use_nodes = True
+    tree, found = material.node_tree, {}
     for name in dir(bpy.types):
         if name.startswith("ShaderNode") and name not in ("ShaderNode", "ShaderNodeTree"):
             try:

@@ -369,3 +369,67 @@ def test_sky_textures_light_a_floor(kind: str, tmp_path: Path) -> None:
             shown.mean(axis=2) < 0.5 * np.median(shown.mean(axis=2)) for shown in (ours, cycles)
         ]
         assert (dark[0] & dark[1]).sum() > 0.7 * (dark[0] | dark[1]).sum() > 0.0
+
+
+@pytest.mark.parametrize("how", ["file", "modifier"])
+def test_a_grid_of_openvdb(how: str, tmp_path: Path) -> None:
+    """A turned cloud of a file, or in memory; means within 5 %."""
+    bpy.ops.mesh.primitive_torus_add(major_radius=0.8, minor_radius=0.35)
+    ring, scene = bpy.context.object, bpy.context.scene
+    ring.hide_render = True
+    cloud = bpy.data.objects.new("cloud", bpy.data.volumes.new("cloud"))
+    scene.collection.objects.link(cloud)
+    fill = cloud.modifiers.new("fill", "MESH_TO_VOLUME")
+    fill.object, fill.voxel_amount = ring, 32
+    if how == "file":
+        made = cloud.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        made.data.grids.save(filepath=str(tmp_path / "cloud.vdb"))
+        bpy.data.objects.remove(cloud)
+        bpy.ops.object.volume_import(filepath=str(tmp_path / "cloud.vdb"))
+        cloud = bpy.context.object
+    cloud.rotation_euler = (0.3, 0.2, 0.4)
+    smoke = bpy.data.materials.new("smoke")
+    smoke.use_nodes = True
+    tree = smoke.node_tree
+    tree.nodes.clear()
+    end, fog = (tree.nodes.new(f"ShaderNode{k}") for k in ("OutputMaterial", "VolumePrincipled"))
+    fog.inputs["Density"].default_value = 2.0
+    tree.links.new(fog.outputs[0], end.inputs["Volume"])
+    cloud.data.materials.append(smoke)
+    world = bpy.data.worlds.new("world")
+    bpy.context.scene.world = world
+    world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.8, 0.8, 0.9, 1.0)
+    lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "SUN"))
+    lamp.data.energy, lamp.rotation_euler = 5.0, (0.5, 0.3, 0.0)
+    bpy.context.scene.collection.objects.link(lamp)
+    assert_alike(pictures(tmp_path, 256, 32), mean=0.05, off=0.08)
+
+
+def test_a_linked_library(tmp_path: Path) -> None:
+    """A box with a painted image of another file, beside a box of the same names."""
+    image = painted()
+    image.filepath_raw, image.file_format = str(tmp_path / "painted.exr"), "OPEN_EXR"
+    image.save()
+    bpy.data.images.remove(image)
+    image = bpy.data.images.load(str(tmp_path / "painted.exr"))
+    image.colorspace_settings.name = "Linear Rec.709"
+
+    def build(tree: Any) -> Any:
+        node = tree.nodes.new("ShaderNodeTexImage")
+        node.image = image
+        return node.outputs["Color"]
+
+    bpy.ops.mesh.primitive_cube_add(size=1.2)
+    box = bpy.context.object
+    box.data.materials.append(material(build, "paint"))
+    image.filepath = "//painted.exr"
+    library = tmp_path / "library.blend"
+    bpy.data.libraries.write(str(library), {box}, path_remap="RELATIVE_ALL")
+    box.location = (-1.4, 0.5, 0.0)
+    box.data.materials.clear()
+    box.data.materials.append(material(output("NewGeometry", "Position"), "paint"))
+    with bpy.data.libraries.load(str(library), link=True) as (there, here):
+        here.objects = there.objects
+    bpy.context.scene.collection.objects.link(here.objects[0])
+    assert_alike(pictures(tmp_path, 32))
