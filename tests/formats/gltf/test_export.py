@@ -299,8 +299,8 @@ SOURCES = {
 
 
 @pytest.mark.parametrize("name", SOURCES)
-def test_all_formats_are_converted(name: str, tmp_path: Path) -> None:
-    """Each format that is read to each that is written, and again, with the same triangles."""
+def test_formats_are_converted(name: str, tmp_path: Path) -> None:
+    """Scenes of five formats to each that is written, and again, with the same triangles."""
     if name.endswith(".usda"):
         pytest.importorskip("pxr")
     (tmp_path / name).write_text(SOURCES[name])
