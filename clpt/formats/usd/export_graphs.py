@@ -42,6 +42,8 @@ SIGNATURES = {
     "fractal2d": "2TiffT", "fractal3d": "3TiffT", "cellnoise2d": "2f", "cellnoise3d": "3f",
     "worleynoise2d": "2fT", "worleynoise3d": "3fT",
 }  # fmt: skip
+ABSENT = frozenset(("brick", "noise1d", "noise4d", "voronoi2d", "voronoi3d", "whitenoise"))
+"""Kinds of nodes that MaterialX does not have."""
 INSTEAD = {"and": "multiply", "or": "max", "not": "invert"}  # of numbers, not of booleans
 
 
@@ -94,6 +96,8 @@ class GraphWriter:
         inputs = {name: self._operand(operand) for name, operand in step.operands.items()}
         if step.kind == TEXTURE:
             return self._texture(step, inputs)
+        if step.kind in ABSENT:
+            raise Lost(step.kind)
         special = SPECIAL.get(step.kind)
         if special is not None:
             return special(self, step, inputs)

@@ -19,8 +19,10 @@ from tests.kernels.test_graphs import MOVED, NAMES
 pytest.importorskip("pxr")
 pytest.importorskip("MaterialX")
 
+import MaterialX as materialx
+
 from clpt.formats.materialx.graph import Probing
-from clpt.formats.usd.export_graphs import LETTERS, SIGNATURES
+from clpt.formats.usd.export_graphs import ABSENT, LETTERS, SIGNATURES
 
 LOOK = Look(spectral=False, lo=360.0, hi=830.0)
 WIDTHS = {"float": 1, "vector2": 2, "vector3": 3, "color3": 3, "color4": 4}
@@ -30,6 +32,8 @@ def graphs() -> dict[str, Graph]:
     """Graphs of a node each, of numbers and of three channels, whose inputs vary."""
     found = {}
     for kind, declared in NODES.items():
+        if kind in ABSENT:
+            continue
         letters = SIGNATURES.get(kind, "T" * (len(declared.inputs) + 1))
         for wide in (1, 3):
             if kind.startswith("combine") and wide == 3:
@@ -102,6 +106,23 @@ def test_images_and_numbers_of_a_graph(tmp_path: Path) -> None:
     assert all(texture.wrap == "mirror" for texture in found.base_color.textures)
     alpha = found.specular_roughness.textures[-1].pixels(REAL)[..., 0]
     np.testing.assert_allclose(alpha, pixels[..., 3] / 255.0, atol=1e-3)
+
+
+def test_materialx_has_all_other_nodes() -> None:
+    document = materialx.createDocument()
+    folders = materialx.getDefaultDataLibraryFolders(), materialx.getDefaultDataSearchPath()
+    materialx.loadLibraries(*folders, document)
+    declared = {definition.getNodeString() for definition in document.getNodeDefs()}
+    assert {kind for kind in NODES if kind not in declared} == ABSENT
+
+
+def test_nodes_that_materialx_does_not_have_are_lost(tmp_path: Path) -> None:
+    for kind in sorted(ABSENT):
+        varying = next(iter(NODES[kind].inputs))
+        nodes = {"x": {"type": "extract", "in": "position"}, "node": {"type": kind, varying: "x"}}
+        surface = materials.Openpbr(base_color=Graph(nodes=nodes))
+        _, lost = again(with_shape(shapes.Rectangle(material=surface)), tmp_path)
+        assert any(kind in text for text in lost)
 
 
 def test_what_a_stage_cannot_say_is_lost(tmp_path: Path) -> None:
