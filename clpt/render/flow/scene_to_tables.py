@@ -65,6 +65,7 @@ from clpt.scene.integrators import Integrator
 from clpt.scene.params import Kind
 from clpt.scene.shapes import Mesh
 
+MOST_AIM = 0.5  # share of light paths that aim, above which others mostly end at diffuse surfaces
 TREE_FROM = 16  # the least number of lights for a light tree, see bench/lights.py
 INTEGRATORS = {"direct": "path", "vcm": "path"}  # kinds that use the kernels of another kind
 
@@ -279,6 +280,7 @@ class _Tables:
             merged=index.merged,
             guided=index.guided,
             aimed=aimed,
+            ends_dull=aimed and index.integrator.aimed > MOST_AIM,
             lit_ghosts=index.lit_ghosts,
             light_filter=(*index.spread, self.profile) if weighed else (0, 0, 0),
         )

@@ -13,7 +13,6 @@ from clpt.render.geometry.find import Geometry
 from clpt.render.scene_index import SceneIndex
 from clpt.scene import materials as mt
 
-AIMED = 0.7  # share of the light paths that aim
 MOST = 32  # spheres
 SHARP = 0.2  # roughness alpha of microfacets below which a surface counts as specular
 LARGE = 0.5  # of the scene's radius: a single sphere that is larger is no aim
@@ -32,11 +31,13 @@ def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[
     """Return centre, radius and share (k, 5) of the spheres by their size, k from 0 to MOST [m].
 
     They enclose all shapes with a specular material; close shapes share a sphere. The shares of the
-    light paths add up to AIMED: half is spread evenly over the spheres, half by the areas of their
-    disks. k is 0 where no path is aimed: a single large sphere would gain nothing.
+    light paths add up to `aimed` of the integrator: half is spread evenly over the spheres, half by
+    the areas of their disks. k is 0 where no path is aimed: a single large sphere would gain
+    nothing.
     """
     none = np.zeros((0, 5), np.float32)
-    by_shape = sharp_pieces(geometry, index.motions.shapes) if index.balanced else ()
+    wanted = index.balanced and index.integrator.aimed > 0.0
+    by_shape = sharp_pieces(geometry, index.motions.shapes) if wanted else ()
     pieces = [part for part in by_shape if len(part)]
     if not pieces:
         return none
@@ -45,7 +46,7 @@ def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[
     if len(radius) == 1 and radius[0] > LARGE * scene_radius:
         return none
     radius = radius * PAD + ROUNDING * (np.abs(centre).max(axis=1, keepdims=True) + scene_radius)
-    share = AIMED * (0.5 / len(radius) + 0.5 * radius**2 / (radius**2).sum())
+    share = index.integrator.aimed * (0.5 / len(radius) + 0.5 * radius**2 / (radius**2).sum())
     return np.hstack([centre, radius, share]).astype(np.float32)
 
 

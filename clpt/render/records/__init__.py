@@ -165,6 +165,7 @@ class TransportFeatures:
     merged: bool = False  # those leave photons, which paths from the camera gather
     guided: bool = flag("USES_GUIDE")  # directions of the camera's paths are learned
     aimed: bool = False  # some light paths start toward what is sharp
+    ends_dull: bool = False  # most of them do: the others mostly end at a first diffuse surface
     lit_ghosts: bool = False  # light paths are ghosts of the lens, and no more
     light_filter: tuple[int, int, int] = (0, 0, 0)  # of weighed light paths: taps, reach, profile
 
@@ -240,9 +241,10 @@ class Features:
     def dull_paths_end(self) -> bool:
         """Whether roulette ends light paths at a first diffuse surface.
 
-        Other light paths are aimed at specular shapes.
+        Most other light paths are aimed at specular shapes.
         """
-        return self.transport.aimed and self.transport.balanced and not self.media.present
+        transport = self.transport
+        return transport.ends_dull and transport.balanced and not self.media.present
 
     @property
     def hemispheres(self) -> bool:

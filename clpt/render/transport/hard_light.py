@@ -36,6 +36,7 @@ FEWEST = 3  # edges of a path from a light over two surfaces to the camera: the 
 MOSTLY = 0.5  # share of small lights in the power of all lights, for more light paths than FEW
 FEW = 0.125  # light paths for each sample, if small lights have less than MOSTLY
 SOME = 0.25  # the same if small lights have more; `vcm` has 1, as its photons are light paths
+STREWN, STREWN_AIMED = 0.25, 0.2  # number and share that aims where caustics are hardly seen
 FOGGY = 0.25, 0.5  # FEW and SOME for lights in media that scatter
 MANY = 8  # the same for lights in bulbs, which paths from the camera hardly find
 DIRECTIONS = 128  # from a light, for the share of specular surfaces around it
@@ -86,7 +87,12 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
         keeps = former.has_photons and wanted.asks_photons
         guiding = former.guiding and not wanted.guiding
         guide_paths = former.guide_paths if guiding else 0
-        plain = Path(light_paths=former.light_paths, guiding=guiding, guide_paths=guide_paths)
+        plain = Path(
+            light_paths=former.light_paths,
+            aimed=former.aimed,
+            guiding=guiding,
+            guide_paths=guide_paths,
+        )
         chosen = former if keeps else plain
         reason = "as before the scene was edited"
     if index.timed:
@@ -156,14 +162,16 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     number = SOME
     if sum(share for _, place, share in small if _is_enclosed(geometry, place)) >= MOSTLY:
         number, reason = MANY, f"{reason}, in a bulb"
+    if number != MANY and not _sees_clear(index, geometry):
+        strewn = Path(light_paths=STREWN, aimed=STREWN_AIMED)
+        return strewn, f"{reason}; the camera sees little glass and few mirrors"
     if not integrator.asks_photons:
         return Path(light_paths=number), reason
     if index.adaptive:
         return Path(light_paths=number), f"{reason}; noise is not measured with photons"
     if index.has_media or index.shifts:
         return Path(light_paths=number), reason
-    if not _sees_clear(index, geometry):
-        number = number if number == MANY else FEW
+    if number == MANY and not _sees_clear(index, geometry):
         return Path(light_paths=number), f"{reason}; the camera sees little glass and few mirrors"
     if index.motions:
         return Path(light_paths=number), f"{reason}; photons of a pass are all at one time"

@@ -30,6 +30,7 @@ class Integrator(Kind):
     guide_paths = 0
     light_tracing = True
     merging = False
+    aimed = 0.7  # share of the light paths that start toward specular surfaces
     has_photons: ClassVar[bool] = False  # a pass may leave photons: no variance tells their blur
     from_lights_alone: ClassVar[bool] = False  # all paths start at lights
     asks_photons: ClassVar[bool] = False  # the scene may decide for photons too
@@ -62,7 +63,12 @@ class Integrator(Kind):
                 raise SceneError(f"must be {least}, not {depth!r}", where=f"{self.kind}.{name}")
 
 
-LIGHT_FINDING = {"light_paths", "guiding", "guide_paths"}  # parameters of how light is found
+LIGHT_FINDING = {
+    "light_paths",
+    "aimed",
+    "guiding",
+    "guide_paths",
+}  # parameters of how light is found
 LONG = 64  # least depth of paths where panes of thin glass on the way do not matter
 
 
@@ -95,6 +101,13 @@ class Path(Integrator):
         AUTO,
         "paths from lights for each sample, weighed against it; 0: none; auto: as suits the scene",
         form="number_or_auto",
+    )
+    aimed: float = real(
+        0.7,
+        "share of the light paths that start toward specular surfaces, for caustics; above a half "
+        "the others mostly end at diffuse surfaces; light_paths auto chooses it, too",
+        low=0.0,
+        high=0.95,
     )
     free_panes: bool = flag(
         True, "thin glass is as a null surface where light goes straight through it: no depth"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from clpt import transforms as tf
 from clpt.render.flow.scene_to_tables import lower
-from clpt.render.lights.aims import AIMED, CELLS, MOST, is_sharp
+from clpt.render.lights.aims import CELLS, MOST, is_sharp
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
@@ -32,6 +32,8 @@ from clpt.scene.textures import Checkerboard
 
 GLASS = m.Dielectric()
 GROUND = Rectangle(to_world=tf.rotate([1, 0, 0], -90) @ tf.scale(50.0), material=m.Diffuse())
+
+AIMED = 0.7  # by default
 
 
 def scene_of(*shapes: Shape) -> Scene:
