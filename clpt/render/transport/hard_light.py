@@ -162,17 +162,16 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     number = SOME
     if sum(share for _, place, share in small if _is_enclosed(geometry, place)) >= MOSTLY:
         number, reason = MANY, f"{reason}, in a bulb"
-    if number != MANY and not _sees_clear(index, geometry):
+    if not _sees_clear(index, geometry):
         strewn = Path(light_paths=STREWN, aimed=STREWN_AIMED)
-        return strewn, f"{reason}; the camera sees little glass and few mirrors"
+        chosen = Path(light_paths=MANY) if number == MANY else strewn
+        return chosen, f"{reason}; the camera sees little glass and few mirrors"
     if not integrator.asks_photons:
         return Path(light_paths=number), reason
     if index.adaptive:
         return Path(light_paths=number), f"{reason}; noise is not measured with photons"
     if index.has_media or index.shifts:
         return Path(light_paths=number), reason
-    if number == MANY and not _sees_clear(index, geometry):
-        return Path(light_paths=number), f"{reason}; the camera sees little glass and few mirrors"
     if index.motions:
         return Path(light_paths=number), f"{reason}; photons of a pass are all at one time"
     whole = max(1, int(number))
