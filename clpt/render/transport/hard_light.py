@@ -166,12 +166,10 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
         strewn = Path(light_paths=STREWN, aimed=STREWN_AIMED)
         chosen = Path(light_paths=MANY) if number == MANY else strewn
         return chosen, f"{reason}; the camera sees little glass and few mirrors"
-    if not integrator.asks_photons:
+    if not integrator.asks_photons or index.has_media or index.shifts:
         return Path(light_paths=number), reason
     if index.adaptive:
         return Path(light_paths=number), f"{reason}; noise is not measured with photons"
-    if index.has_media or index.shifts:
-        return Path(light_paths=number), reason
     if index.motions:
         return Path(light_paths=number), f"{reason}; photons of a pass are all at one time"
     whole = max(1, int(number))
