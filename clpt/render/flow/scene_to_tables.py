@@ -279,8 +279,7 @@ class _Tables:
             joined=index.joined and (index.light_paths or weighed),
             merged=index.merged,
             guided=index.guided,
-            aimed=aimed,
-            ends_dull=aimed and index.integrator.aimed > MOST_AIM,
+            aimed=aimed * (2 if index.integrator.aimed > MOST_AIM else 1),
             lit_ghosts=index.lit_ghosts,
             light_filter=(*index.spread, self.profile) if weighed else (0, 0, 0),
         )

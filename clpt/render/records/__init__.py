@@ -164,8 +164,7 @@ class TransportFeatures:
     joined: bool = flag("JOINS_CAMERA")  # those are joined to the camera
     merged: bool = False  # those leave photons, which paths from the camera gather
     guided: bool = flag("USES_GUIDE")  # directions of the camera's paths are learned
-    aimed: bool = False  # some light paths start toward what is sharp
-    ends_dull: bool = False  # most of them do: the others mostly end at a first diffuse surface
+    aimed: int = 0  # light paths that start toward what is sharp: 0 none, 1 some, 2 most
     lit_ghosts: bool = False  # light paths are ghosts of the lens, and no more
     light_filter: tuple[int, int, int] = (0, 0, 0)  # of weighed light paths: taps, reach, profile
 
@@ -243,8 +242,8 @@ class Features:
 
         Most other light paths are aimed at specular shapes.
         """
-        transport = self.transport
-        return transport.ends_dull and transport.balanced and not self.media.present
+        mostly_aimed = self.transport.aimed > 1
+        return mostly_aimed and self.transport.balanced and not self.media.present
 
     @property
     def hemispheres(self) -> bool:

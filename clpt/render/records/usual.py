@@ -66,7 +66,7 @@ def widened(own: Features) -> Features:
     transmitting = (cls.kind for cls in usual if cls().transmits)
     return replace(
         own,
-        transport=replace(own.transport, aimed=own.transport.aimed or own.transport.balanced),
+        transport=replace(own.transport, aimed=own.transport.aimed or int(own.transport.balanced)),
         lights=replace(
             lights,
             kinds=tuple(sorted({*lights.kinds, *LIGHTS})),

@@ -257,7 +257,7 @@ def test_photons_are_for_what_is_seen_through_clear_glass(shapes: list[Shape], k
     assert type(made.integrator) is kind
     assert made.settings["light_paths"] == (1 if kind is Vcm else STREWN)
     assert ("sees little" in made.reason) == (kind is Path)
-    assert made.features.transport.ends_dull == (kind is Vcm)
+    assert made.features.dull_paths_end == (kind is Vcm)
 
 
 def test_sides_and_heaps_do_not_count_twice() -> None:
