@@ -234,7 +234,7 @@ def _infinite_text(features: Features) -> list[str]:
 
 def emission_text(features: Features) -> str:
     """Return `light_emit`, a ray from a light, behind the text of the lights' dispatch_text."""
-    present, aimed = kinds_of(features), features.transport.aimed
+    present, aimed = kinds_of(features), features.transport.aimed > 0
     rows = included(*_emission_includes(features))
     if present:
         rows += [_emission_lamps_text(features), *_emission_areas_text(features)]

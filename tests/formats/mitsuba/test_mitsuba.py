@@ -484,7 +484,7 @@ AROUND = {  # Mitsuba 0.6 divides by the index of what is around a metal
     '<rgb name="eta" value="2, 3, 4"/>': (RGBUnbounded(1.0, 1.5, 2.0), 0.5),
     '<spectrum name="k" value="400:2, 700:3"/>': (0.0, Tabulated((400, 700), (1.0, 1.5), "hold")),
     '<spectrum name="k" type="cauchy"><float name="a" value="3"/></spectrum>': (
-        0.0, Tabulated(WIDEST, np.full(1801, 1.5), "hold")
+        0.0, Tabulated(WIDEST, np.full(len(WIDEST), 1.5), "hold")
     ),
     '<string name="material" value="none"/>': (0.0, 0.5),
 }  # fmt: skip

@@ -51,7 +51,7 @@ def spheres_of(*shapes: Shape) -> NDArray[np.float32]:
     """Centre, radius and share (k, 5) of the spheres in the scene of these shapes."""
     lowered = lower(scene_of(*shapes))
     first, number = (int(lowered.settings[name]) for name in ("aims", "aim_count"))
-    assert lowered.features.transport.aimed == (number > 0)
+    assert bool(lowered.features.transport.aimed) == (number > 0)
     return lowered.tables["distributions"][first : first + 5 * number].reshape(-1, 5)
 
 
