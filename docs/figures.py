@@ -70,19 +70,20 @@ def efficiency() -> str:
     """Return clpt's efficiency over Mitsuba's on scenes of others, each as `clpt render` does."""
     rows = [row for row in records() if row["bench"] == "peers" and row["mode"] == "rgb"]
     films = peer_films(report_newest(rows))
-    columns = []
+    columns: dict[str, dict[str, float]] = {}
     for name in ("preview", "final"):
-        every = films.get((name, "rgb", POCL, False), {})
-        by_name = {scene: {r["contender"]: r for r in group} for scene, group in every.items()}
-        columns.append({s: gain(r["file"], r["mitsuba"])[0] for s, r in by_name.items()})
-    scenes = sorted({scene for column in columns for scene in column})
+        for scene, group in films.get((name, "rgb", POCL, False), {}).items():
+            by_name = {row["contender"]: row for row in group}
+            ratio, _ = gain(by_name["file"], by_name["mitsuba"])
+            columns.setdefault(name, {})[scene] = ratio
+    scenes = sorted({scene for column in columns.values() for scene in column})
     body = [
-        [scene.replace("_", " "), *(f"{c[scene]:.1f}" if scene in c else "" for c in columns)]
-        for scene in scenes
+        [s.replace("_", " "), *(f"{c[s]:.1f}" if s in c else "" for c in columns.values())]
+        for s in scenes
     ]
-    means = [f"{np.exp(np.mean(np.log([*c.values()]))):.1f}" if c else "" for c in columns]
-    body.append(["geometric mean", *means])
-    return table(["clpt : Mitsuba 3", "preview", "final"], body)
+    means = (float(np.exp(np.mean(np.log([*c.values()])))) for c in columns.values())
+    body.append(["geometric mean", *(f"{mean:.1f}" for mean in means)])
+    return table(["clpt : Mitsuba 3", *columns], body)
 
 
 def samplers() -> str:

@@ -170,7 +170,7 @@ def test_figures_are_those_of_the_benchmark():
 
 
 # Words that a reader whose English is second has to look up, or to read twice.
-HARD = r"\b(?:but for|tells?|told|calm|dull|whence|thence|ajar|lowered|shines?)\b"
+HARD = r"\b(?:but for|tells?|told|calm|dull|whence|thence|(?<!veach-)ajar|lowered|shines?)\b"
 OURS = {"architecture.md", "glossary.md", "scene_format.md"}  # the code's words, or generated
 
 
