@@ -293,6 +293,9 @@ class Settings:
             contenders = self.contenders(scene, width, mode, Path(temporary))
             records, failures = compare(scene, contenders, spp, times, seeds)
         print(*failures, sep="\n", end="\n" * bool(failures), file=sys.stderr)
+        means = {name: float(np.mean(record.images)) for name, record in records.items()}
+        if max(means.values()) - min(means.values()) > APART * max(means.values()):
+            raise RuntimeError(f"{mode}: the pictures have other means: {means}")
         about = {
             "scene": machine.scene_name(scene),
             "film": film,

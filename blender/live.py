@@ -169,8 +169,9 @@ class Follower:
             if self.renderer is None or former is None or former.film is not film:
                 self.close()
                 self.scene = scene
-                options = {"cancel_seconds": CANCEL_SECONDS, "programs": "shared"}
-                self.renderer = clpt.Renderer(small, beside=beside, **options)
+                self.renderer = clpt.Renderer(
+                    small, beside=beside, cancel_seconds=CANCEL_SECONDS, programs="shared"
+                )
             else:
                 self.renderer.update(**(_edits(former, scene) or {"scene": small}))
         except BaseException:

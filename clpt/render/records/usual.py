@@ -7,7 +7,7 @@ shared program also holds the usual materials, textures and lights. Its pictures
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
 from dataclasses import replace
 
 from clpt.render.records import Features
@@ -62,8 +62,7 @@ def widened(own: Features) -> Features:
     """Return the features of a shared program for the features of a scene."""
     lights, textures, materials = own.lights, own.textures, own.materials
     every = (*LEAVES, *SEEN_THROUGH, *SURFACES)
-    usual = [cls for cls in every if cls in materials.leaves]
-    transmitting = (cls.kind for cls in usual if cls().transmits)
+    usual = tuple(cls for cls in every if cls in materials.leaves)
     return replace(
         own,
         transport=replace(own.transport, aimed=own.transport.aimed or int(own.transport.balanced)),
@@ -79,7 +78,7 @@ def widened(own: Features) -> Features:
         textures=replace(textures, roles=tuple(sorted({*textures.roles, *TEXTURES}))),
         materials=replace(
             materials,
-            transmitting=tuple(sorted({*materials.transmitting, *transmitting})),
+            transmitting=tuple(sorted({*materials.transmitting, *_transmitting(usual)})),
             shining=tuple(cls.kind for cls in materials.leaves if cls in usual),
             mixtures=max(materials.mixtures, MIXTURES),
             sources=materials.sources | _sources(usual) | INNER,
@@ -87,7 +86,13 @@ def widened(own: Features) -> Features:
     )
 
 
-def _sources(kinds: Sequence[type[mt.Material]]) -> Sources:
+@functools.cache
+def _transmitting(kinds: tuple[type[mt.Material], ...]) -> tuple[str, ...]:
+    return tuple(cls.kind for cls in kinds if cls().transmits)
+
+
+@functools.cache
+def _sources(kinds: tuple[type[mt.Material], ...]) -> Sources:
     return frozenset(
         (cls.kind, name, source)
         for cls in kinds
