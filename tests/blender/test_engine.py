@@ -15,15 +15,8 @@ from clpt.images import exr_files
 bpy: Any = pytest.importorskip("bpy")
 blender: Any = pytest.importorskip("blender")
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("registered")]
 SIZE = 48, 36
-
-
-@pytest.fixture(autouse=True, scope="module")
-def registered() -> Any:
-    blender.register()
-    yield
-    blender.unregister()
 
 
 @pytest.fixture(autouse=True)

@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -22,21 +21,8 @@ blender: Any = pytest.importorskip("blender")
 engine: Any = pytest.importorskip("blender.engine")
 panels: Any = pytest.importorskip("blender.panels")
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("registered", "first_scene")]
 SIZE = 47, 35
-
-
-@pytest.fixture(autouse=True, scope="module")
-def registered() -> Iterator[None]:
-    blender.register()
-    yield
-    blender.unregister()
-
-
-@pytest.fixture(autouse=True)
-def first_scene(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("CLPT_PYTHON", sys.executable)
-    bpy.ops.wm.read_factory_settings()
 
 
 def rendered(name: str, folder: Path, samples: int = 64, form: str = "OPEN_EXR") -> Path:

@@ -2,38 +2,24 @@
 
 from __future__ import annotations
 
-import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from clpt import images
+from tests.blender.finals import final
 
 bpy: Any = pytest.importorskip("bpy")
 blender: Any = pytest.importorskip("blender")
 engine: Any = pytest.importorskip("blender.engine")
 process: Any = pytest.importorskip("blender.process")
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("registered", "first_scene")]
 SIZE = 32, 24
-
-
-@pytest.fixture(autouse=True, scope="module")
-def registered() -> Iterator[None]:
-    blender.register()
-    yield
-    blender.unregister()
-
-
-@pytest.fixture(autouse=True)
-def first_scene(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("CLPT_PYTHON", sys.executable)
-    bpy.ops.wm.read_factory_settings()
 
 
 @pytest.fixture
@@ -52,15 +38,7 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def picture(folder: Path, samples: int = 8) -> np.ndarray:
     """Return the picture (h, w, 3) of Blender's scene."""
-    scene = bpy.context.scene
-    scene.render.engine, scene.clpt.samples, scene.clpt.mode = "CLPT", samples, "rgb"
-    scene.render.resolution_x, scene.render.resolution_y = SIZE
-    scene.render.resolution_percentage = 100
-    scene.render.image_settings.file_format = "OPEN_EXR"
-    scene.render.image_settings.color_depth = "32"
-    scene.render.filepath = str(folder / "picture.exr")
-    bpy.ops.render.render(write_still=True)
-    return np.asarray(images.read(scene.render.filepath))[..., :3]
+    return final(folder, SIZE, samples)
 
 
 def paint_of_an_image(image: Any) -> None:

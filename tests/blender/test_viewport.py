@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clpt import images
+from tests.blender.finals import final
 
 bpy: Any = pytest.importorskip("bpy")
 blender: Any = pytest.importorskip("blender")
@@ -22,7 +22,7 @@ engine: Any = pytest.importorskip("blender.engine")
 viewports: Any = pytest.importorskip("blender.viewport")
 mathutils: Any = pytest.importorskip("mathutils")
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("registered")]
 SIZE = 64, 48
 
 
@@ -113,13 +113,6 @@ class Window:
             self.viewport.close()
 
 
-@pytest.fixture(autouse=True, scope="module")
-def registered() -> Any:
-    blender.register()
-    yield
-    blender.unregister()
-
-
 @pytest.fixture
 def window(monkeypatch: pytest.MonkeyPatch) -> Iterator[Window]:
     """A viewport of Blender's first scene; what it draws is kept from the graphics card."""
@@ -172,19 +165,6 @@ def test_it_shows_the_scene_and_follows_changes(window: Window) -> None:
     ]
 
 
-def final(folder: Any, samples: int = 256) -> np.ndarray:
-    """Return the final picture (h, w, 3), the bottom row first."""
-    scene = bpy.context.scene
-    scene.render.engine, scene.clpt.samples, scene.clpt.mode = "CLPT", samples, "rgb"
-    scene.render.resolution_x, scene.render.resolution_y = SIZE
-    scene.render.resolution_percentage = 100
-    scene.render.image_settings.file_format = "OPEN_EXR"
-    scene.render.image_settings.color_depth = "32"
-    scene.render.filepath = str(folder / "final.exr")
-    bpy.ops.render.render(write_still=True)
-    return np.asarray(images.read(scene.render.filepath))[::-1, :, :3]
-
-
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
 def test_through_the_camera_it_is_the_final_picture(
     window: Window, kind: str, tmp_path: Path
@@ -193,7 +173,7 @@ def test_through_the_camera_it_is_the_final_picture(
     camera = bpy.context.scene.camera
     camera.data.type, camera.data.shift_x, camera.data.shift_y = kind, 0.1, -0.05
     bpy.context.scene.clpt.viewport_samples = 256
-    wanted = final(tmp_path)
+    wanted = final(tmp_path, SIZE, 256)[::-1]
     view = window.region_data
     view.view_perspective, view.is_perspective = "CAMERA", kind == "PERSP"
     view.view_matrix = camera.matrix_world.inverted()
