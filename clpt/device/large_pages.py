@@ -8,7 +8,7 @@ of 4 KiB if a process asks for them before it touches the memory (madvise(2), MA
 from __future__ import annotations
 
 import ctypes
-import mmap
+import sys
 
 import numpy as np
 import pyopencl as cl
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 _PAGE = 2 << 20  # [bytes] of x86-64 and of most ARM systems
 _LEAST = 2 * _PAGE  # [bytes] of a buffer that is sure to contain a whole page
-_ADVICE: int | None = getattr(mmap, "MADV_HUGEPAGE", None)  # only Linux has it
+_ADVICE = 14  # MADV_HUGEPAGE
 
 
 def pay(on_processor: bool, nbytes: int) -> bool:
     """Whether to ask for large pages for a buffer of so many bytes."""
-    return on_processor and nbytes >= _LEAST and _ADVICE is not None
+    return on_processor and nbytes >= _LEAST and sys.platform == "linux"
 
 
 def ask(queue: cl.CommandQueue, buffer: cl.Buffer, content: NDArray | None) -> None:
