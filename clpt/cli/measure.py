@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     help="Stop when all standard errors are at most this share of the value, such as 0.01.",
 )  # fmt: skip
 @click.option(
-    "--interpolate", type=click.IntRange(1), metavar="TEXELS",
+    "--interpolate", type=click.IntRange(1), default=1, metavar="TEXELS",
     help="Of --texels: the widest step between measured texels; others are interpolated where "
     "light is smooth.",
 )  # fmt: skip
@@ -74,11 +74,8 @@ def measure(
     """
     if (points is None) == (texels is None):
         raise click.UsageError("Give --at FILE.csv or --texels NAME.")
-    step = how.pop("interpolate")
-    if step is not None:
-        if texels is None:
-            raise click.UsageError("--interpolate is for maps: give --texels NAME.")
-        how["interpolate"] = step
+    if how["interpolate"] > 1 and texels is None:
+        raise click.UsageError("--interpolate is for maps: give --texels NAME.")
     locate(scene)
     from .. import formats, instruments
     from ..files import output_files
