@@ -167,11 +167,7 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
         number, reason = MANY, f"{reason}, in a bulb"
     if not _sees_clear(index, geometry):
         reason = f"{reason}; the camera sees little glass and few mirrors"
-        if number == MANY:
-            return Path(light_paths=MANY), reason
-        if _has_shades(lit):
-            return Path(light_paths=STREWN, aimed=STREWN_AIMED), f"{reason}, and lights have shades"
-        return Path(light_paths=FEW), reason
+        return _out_of_sight(lit, number, reason)
     if not integrator.asks_photons or index.has_media or index.shifts:
         return Path(light_paths=number), reason
     if index.adaptive:
@@ -180,6 +176,15 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
         return Path(light_paths=number), f"{reason}; photons of a pass are all at one time"
     whole = max(1, int(number))
     return Vcm(light_paths=whole), f"{reason}; the camera sees glass or mirrors"
+
+
+def _out_of_sight(lit: Lit, number: float, reason: str) -> tuple[Integrator, str]:
+    """The integrator where the camera hardly sees what makes caustics; number: of light paths."""
+    if number == MANY:
+        return Path(light_paths=MANY), reason
+    if _has_shades(lit):
+        return Path(light_paths=STREWN, aimed=STREWN_AIMED), f"{reason}, and lights have shades"
+    return Path(light_paths=FEW), reason
 
 
 def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
