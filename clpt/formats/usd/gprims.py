@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -295,20 +296,29 @@ def content(
     for prim, shapes in _shapes(document, prims["gprims"], inherited):
         whole.shapes += [(prim, shape, placement(prim)) for shape in shapes]
     whole.lights = [(prim, placement(prim)) for prim in prims["lights"]]
-    alike: dict[tuple[str, str], list[tuple[Usd.Prim, UsdShade.Material | None]]] = {}
-    for prim, bound in zip(prims["instances"], _bound(prims["instances"]), strict=True):
-        material = bound or inherited
-        key = str(prim.GetPrototype().GetPath()), str(material.GetPath()) if material else ""
-        alike.setdefault(key, []).append((prim, material))
-    for key, several in alike.items():
-        prototype, material = several[0][0].GetPrototype(), several[0][1]
-        make = partial(content, document, prototype, np.eye(4), material, depth + 1)
-        inner = document.once(("content", document.code, *key), make)
-        matrices = document.placements([prim for prim, _ in several])
+    alike: dict[tuple[Usd.Prim, str], list[Usd.Prim]] = defaultdict(list)
+    materials = {"": inherited}
+    instances = prims["instances"]
+    # Nothing in the world is bound unless a prim of it binds.
+    binds = base is not None or prims["bindings"]
+    all_bound = _bound(instances) if binds else [None] * len(instances)
+    for prim, bound in zip(instances, all_bound, strict=True):
+        name = str(bound.GetPath()) if bound else ""
+        materials.setdefault(name, bound)
+        alike[prim.GetPrototype(), name].append(prim)
+    for (prototype, name), several in alike.items():
+        key = "content", document.code, str(prototype.GetPath()), _path_of(materials[name])
+        make = partial(content, document, prototype, np.eye(4), materials[name], depth + 1)
+        matrices = document.placements(several)
+        inner = document.once(key, make)
         whole.copies.append((inner, matrices if base is None else base @ matrices))
     for prim in prims["instancers"]:
         whole.copies += _instancer(document, prim, placement(prim), inherited, depth)
     return whole
+
+
+def _path_of(material: UsdShade.Material | None) -> str:
+    return str(material.GetPath()) if material else ""
 
 
 def _bound(prims: list[Usd.Prim]) -> list[UsdShade.Material | None]:
@@ -353,12 +363,7 @@ def _instancer(
         if not root or not len(own):
             continue
         above = transforms.inverse(document.placement(root.GetParent()))
-        key = (
-            "content",
-            document.code,
-            str(root.GetPath()),
-            str(inherited.GetPath()) if inherited else "",
-        )
+        key = "content", document.code, str(root.GetPath()), _path_of(inherited)
         make = partial(content, document, root, above, inherited, depth + 1)
         inner = document.once(key, make)
         copies.append((inner, own))
@@ -402,8 +407,7 @@ def placed(document: Document, whole: Content) -> list[Shape]:
         ]
         group = Group(tuple(own), parts[0][0].GetName())
         solid = world[~transforms.are_singular(world)]
-        instance = Instance(group=group)
-        shapes += [instance.placed(matrix) for matrix in solid]
+        shapes += Instance(group=group).placed_at(solid)
     return shapes
 
 
