@@ -9,7 +9,7 @@ from pxr import Usd, UsdGeom, UsdShade
 
 from clpt.arrays import Floats, Integers
 from clpt.files import budget
-from clpt.formats.usd import meshes
+from clpt.formats.usd import meshes, skeletons
 from clpt.formats.usd.document import Document, rows
 from clpt.formats.usd.materials import surface
 from clpt.formats.usd.meshes import Topology
@@ -28,7 +28,7 @@ def curves(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
 
     Raises SceneError for counts that do not fit the points.
     """
-    points = document.points(prim, np.float64)
+    points = skeletons.points(document, prim)
     counts = document.array(prim, "curveVertexCounts", 0, np.int64)
     if points is None or counts is None or not len(points):
         return []
@@ -141,7 +141,7 @@ def _between(ends: Floats, lengths: list[int], basis: str) -> Floats:
 
 def points(document: Document, prim: Usd.Prim, material: UsdShade.Material | None) -> list[Shape]:
     """Return the balls of a Points prim, as one shape, in a list."""
-    centers = document.points(prim)
+    centers = skeletons.points(document, prim)
     if centers is None or not len(centers):
         return []
     budget.take(8 * centers.nbytes, "points", document.file)

@@ -87,9 +87,9 @@ class Document(Once):
         budget.check(size, f"{name} of {prim.GetPath()}", self.file)
         return rows(value, width, kind)
 
-    def points(self, prim: Usd.Prim, kind: type = np.float32) -> Any:
+    def points(self, prim: Usd.Prim) -> Any:
         """Return a prim's points (n, 3); None for none, and with a warning for one not finite."""
-        points = self.array(prim, "points", 3, kind)
+        points = self.array(prim, "points", 3)
         if points is None or np.isfinite(points).all():
             return points
         self.warn("left out, as a point of it is not finite", prim.GetPath())
@@ -162,7 +162,7 @@ GPRIMS = frozenset(
 )  # fmt: skip
 UNREAD = frozenset(
     ("NurbsPatch", "NurbsCurves", "HermiteCurves", "TetMesh", "LightFilter", "PluginLightFilter",
-     "ParticleField3DGaussianSplat", "ParticleField", "Skeleton")
+     "ParticleField3DGaussianSplat", "ParticleField")
 )  # fmt: skip
 BINDING = re.compile("material:binding(:|$)")
 HIDDEN = ("proxy", "guide")  # purposes that no picture shows

@@ -21,10 +21,12 @@ from clpt.files import budget
 from clpt.formats import ies
 from clpt.formats.usd import textures
 from clpt.formats.usd.document import Document, file_of
+from clpt.formats.usd.materials import Surface
 from clpt.scene.lights import Area, Constant, Directional, Envmap, Goniometric, Light, Point, Spot
 from clpt.scene.materials import Null
 from clpt.scene.shapes import Cylinder, Disk, Rectangle, Shape, Sphere
 from clpt.scene.textures import Bitmap, Product
+from clpt.scene.values import is_texture
 from clpt.spectra import RGBIlluminant
 
 TURNED = transforms.rotate([0.0, 1.0, 0.0], 180.0)  # lights shine along -z, clpt's along +z
@@ -61,6 +63,36 @@ def light(document: Document, prim: Usd.Prim, placement: Matrix) -> Lit:
         return _area(document, prim, placement)
     document.warn(f"{kind} is left out", prim.GetPath())
     return Lit([], [])
+
+
+def on_mesh(
+    document: Document, prim: Usd.Prim, look: Surface, both: bool, area: Callable[[], float]
+) -> Surface:
+    """Return the surface of a mesh with MeshLightAPI.
+
+    look: that of its material. both: its back emits too. area: of the mesh, in units of the stage.
+    By `light:materialSyncMode` the light is that of the API alone, with or without the material;
+    or what the material emits is its color, if it emits.
+    """
+    _tell(document, prim)
+    rgb = emitted(document, prim)
+    if document.value(prim, "inputs:normalize", False):
+        rgb = rgb / max(area(), 1e-30)
+    if _is_shaped(document, prim):
+        document.warn("shaping is left out of a mesh", prim.GetPath())
+    mode = str(document.value(prim, "light:materialSyncMode", "materialGlowTintsLight"))
+    if mode == "noMaterialResponse":
+        look = Surface(Null())
+    radiance: Any = RGBIlluminant(*rgb)
+    if mode == "materialGlowTintsLight" and look.emission is not None:
+        glow = look.emission.radiance
+        if is_texture(glow):
+            grey = bool(np.all(rgb == rgb[0]))
+            tint = float(rgb[0]) if grey else tuple(rgb.tolist())
+            radiance = Product(first=glow, second=tint, rgb=not grey)
+        else:
+            radiance = RGBIlluminant(*(rgb * glow.to_rgb("emission")))
+    return dataclasses.replace(look, emission=Area(radiance=radiance, two_sided=both))
 
 
 def emitted(document: Document, prim: Usd.Prim, usual: float = 1.0) -> Floats:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from pxr import Ar, Gf, Sdf, Tf, Usd, UsdUtils, Vt  # noqa: F401  all are loaded at one time
+from pxr import Ar, Gf, Sdf, Tf, Usd, UsdSkel, UsdUtils, Vt  # noqa: F401  all are loaded at one time
 
 from clpt.errors import SceneError, nearest
 from clpt.files import budget, input_files
