@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom, UsdShade
+from pxr import Usd, UsdGeom, UsdLux, UsdShade
 
 from clpt import transforms
 from clpt.arrays import Floats, Matrix
@@ -201,6 +201,8 @@ def volume(document: Document, prim: Usd.Prim, placement: Matrix) -> list[Shape]
         for relation in prim.GetRelationships()
         if relation.GetName().startswith("field:")
     }
+    if prim.HasAPI(UsdLux.VolumeLightAPI):
+        document.warn("VolumeLightAPI is left out", prim.GetPath())
     for name in fields.keys() - {"density"}:
         document.warn(f"field {name!r} is left out", prim.GetPath())
     source = document.stage.GetPrimAtPath(fields["density"][0]) if fields.get("density") else None
