@@ -190,7 +190,7 @@ def _pole(document: Document, prim: Usd.Prim, placement: Matrix) -> Matrix:
     """Return the transform of an image's space, whose up is +y, to that of its dome.
 
     A DomeLight has the pole +y. On a stage with the up axis z that leaves it lying, it has +z, as
-    programs that leave out a turn mean it.
+    programs that leave out a turn mean it. Blender to 5.0 does; its image has its middle at +x.
     """
     axis = str(
         document.value(prim, "poleAxis", "scene" if prim.GetTypeName() == "DomeLight_1" else "")
@@ -200,6 +200,8 @@ def _pole(document: Document, prim: Usd.Prim, placement: Matrix) -> Matrix:
     if not axis:
         up = placement["xyz".index(document.up), :3]
         axis = "Z" if document.up == "z" and abs(up[2]) > abs(up[1]) else "Y"
+        if axis == "Z" and document.stage.GetRootLayer().documentation.startswith("Blender"):
+            return transforms.rotate([0.0, 0.0, 1.0], 90.0) @ Z_POLE
     return Z_POLE if axis == "Z" else np.eye(4)
 
 

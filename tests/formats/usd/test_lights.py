@@ -267,6 +267,14 @@ def test_the_pole_of_a_dome(stage: Loader, tmp_path: File) -> None:
     assert np.allclose(lying.to_world[:3, 1], [0, 1, 0])
 
 
+def test_a_dome_of_blender_has_its_middle_at_x(stage: Loader, tmp_path: File) -> None:
+    """To version 5.0 Blender writes no turn; its Cycles shows the middle of the image at +x."""
+    write(tmp_path / "sky.exr", np.ones((4, 8, 3), np.float32))
+    dome = 'def DomeLight "L" { asset inputs:texture:file = @./sky.exr@ }'
+    made = stage(MESH + dome, 'upAxis = "Z"\ndoc = "Blender v5.0.1"').lights[0]
+    assert np.allclose(made.to_world[:3, :3], np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]]))
+
+
 GLOWING = """def Material "Glow" {
     token outputs:surface.connect = </Glow/S.outputs:surface>
     def Shader "S" {
