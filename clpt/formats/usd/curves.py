@@ -28,10 +28,11 @@ def curves(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
 
     Raises SceneError for counts that do not fit the points.
     """
-    points = skeletons.points(document, prim)
+    points = document.points(prim)
     counts = document.array(prim, "curveVertexCounts", 0, np.int64)
     if points is None or counts is None or not len(points):
         return []
+    points = skeletons.moved(document, prim, points)
     if (counts < 1).any() or counts.sum() != len(points):
         message = f"curveVertexCounts add up to {counts.sum()}, there are {len(points)} points"
         raise document.error(message, prim.GetPath())
@@ -141,9 +142,10 @@ def _between(ends: Floats, lengths: list[int], basis: str) -> Floats:
 
 def points(document: Document, prim: Usd.Prim, material: UsdShade.Material | None) -> list[Shape]:
     """Return the balls of a Points prim, as one shape, in a list."""
-    centers = skeletons.points(document, prim)
+    centers = document.points(prim)
     if centers is None or not len(centers):
         return []
+    centers = skeletons.moved(document, prim, centers)
     budget.take(8 * centers.nbytes, "points", document.file)
     widths = _widths(document, prim, np.ones(len(centers), np.int64))[0]
     look = surface(document, material, prim, both=True)

@@ -18,7 +18,7 @@ from clpt import transforms
 from clpt.arrays import Floats, Floats32, Matrix
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.formats import ies
+from clpt.formats import as_openpbr, ies
 from clpt.formats.usd import textures
 from clpt.formats.usd.document import Document, file_of
 from clpt.formats.usd.materials import Surface
@@ -91,7 +91,7 @@ def on_mesh(
             tint = float(rgb[0]) if grey else tuple(rgb.tolist())
             radiance = Product(first=glow, second=tint, rgb=not grey)
         else:
-            radiance = RGBIlluminant(*(rgb * glow.to_rgb("emission")))
+            radiance = RGBIlluminant(*(rgb * as_openpbr.rgb(glow, "emission")))
     return dataclasses.replace(look, emission=Area(radiance=radiance, two_sided=both))
 
 

@@ -216,7 +216,7 @@ def _topology(document: Document, prim: Usd.Prim) -> Topology | None:
 
 
 def _polygons(document: Document, prim: Usd.Prim, topology: Topology) -> Polygons:
-    points = skeletons.points(document, prim)
+    points = skeletons.moved(document, prim, document.points(prim))
     flipped = document.value(prim, "orientation", "rightHanded") == "leftHanded"
     scheme = str(document.value(prim, "subdivisionScheme", "catmullClark"))
     levels = document.level

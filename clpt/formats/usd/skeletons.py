@@ -14,11 +14,10 @@ from clpt.arrays import Floats32
 from clpt.formats.usd.document import Document
 
 
-def points(document: Document, prim: Usd.Prim) -> Floats32 | None:
-    """Return a prim's points (n, 3) in its own space, moved; None as `Document.points` does."""
-    rest: Floats32 | None = document.points(prim)
-    skin = None if rest is None else skin_of(document, prim)
-    return rest if skin is None or rest is None else skin.posed(skin.shaped(rest))
+def moved(document: Document, prim: Usd.Prim, rest: Floats32) -> Floats32:
+    """Return a prim's points (n, 3), in its own space, after its skeleton has moved them."""
+    skin = skin_of(document, prim)
+    return rest if skin is None else skin.posed(skin.shaped(rest))
 
 
 @dataclass(frozen=True)
