@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 
 Json = dict[str, Any]
+TURN = 2.0 * math.pi
 LUMINANCE = (0.2126729, 0.7151522, 0.0721750)  # of linear Rec. 709, as Cycles has it
 COMPARED = ("value1", "value2", "in1", "in2")
 INPUTS: dict[str, tuple[str, ...]] = {  # of nodes that are called without names

@@ -29,7 +29,7 @@ def cases() -> list[tuple[str, str, dict[str, Any], str]]:
     def add(kind: str, output: str, linked: str = "", **settings: Any) -> None:
         found.append((kind, output, settings, linked))
 
-    for operation in textures.MATH:
+    for operation in textures.operations.MATH:
         if operation != "FRACTION":
             add("Math", "Value", "ABC", operation=operation)
     for operation in ENUMS("ShaderNodeVectorMath", "operation"):
