@@ -81,6 +81,20 @@ def origin(groups: tuple[bpy.types.Node, ...], socket: Any) -> tuple[Site | None
     return None, socket
 
 
+def fixed_mapping(node: bpy.types.Node) -> tuple[list[float], list[float], list[float]] | None:
+    """Return where a Mapping node moves points, and how it turns and scales them.
+
+    None where that varies, and for nodes of another kind.
+    """
+    varies = any(s.is_linked for s in node.inputs if s.name != "Vector")
+    if node.type != "MAPPING" or node.vector_type != "POINT" or varies:
+        return None
+    move, angles, scale = (
+        list(node.inputs[key].default_value) for key in ("Location", "Rotation", "Scale")
+    )
+    return move, angles, scale
+
+
 class Value:
     """A value of a graph: numbers, or the name of a node or of a source; with its channels."""
 

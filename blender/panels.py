@@ -145,15 +145,6 @@ class ClptCamera(bpy.types.PropertyGroup):
     lens: _named("Lens", measured.LENSES, "", "A real lens, or its file; empty: the ideal one")
 
 
-def _turbidity(world: Any) -> float:
-    """Return the turbidity of the haze: Angstrom's coefficient after Preetham 1999."""
-    return (world.haze * 0.55**1.3 + 0.04586) / 0.04608
-
-
-def _set_turbidity(world: Any, value: float) -> None:
-    world.haze = max(0.04608 * value - 0.04586, 0.0) / 0.55**1.3
-
-
 class ClptWorld(bpy.types.PropertyGroup):
     """A clear sky by the physics of air."""
 
@@ -163,7 +154,8 @@ class ClptWorld(bpy.types.PropertyGroup):
     haze: _number("Haze", 0.1, 0.0, 2.0, "Optical depth straight up at 550 nm")
     turbidity: bpy.props.FloatProperty(
         name="Turbidity", description="The same haze as in other skies", min=1.0, max=20.0,
-        get=_turbidity, set=_set_turbidity,
+        get=lambda world: measured.turbidity(world.haze),
+        set=lambda world, value: setattr(world, "haze", measured.haze(value)),
     )  # fmt: skip
     ozone: _number("Ozone", 300.0, 0.0, 1000.0, "Column of ozone [Dobson units]")
     altitude: _number("Altitude", 0.0, 0.0, 60000.0, unit="LENGTH")

@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 
 from . import operations, patterns
-from .graphs import TURN, Site, Value, origin
+from .graphs import TURN, Site, Value, fixed_mapping, origin
 
 Read = Callable[[Any, Site], Value | None]  # of a nodes.Expression, whose `graph` is called g
 
@@ -93,14 +93,10 @@ def _affine(at: Site) -> np.ndarray | None:
         node, groups = site.node, site.groups
         if node.type == "TEX_COORD" and site.output == "UV":
             return matrix
-        plain = node.type == "MAPPING" and node.vector_type == "POINT"
-        if not plain or any(s.is_linked for s in node.inputs if s.name != "Vector"):
+        fixed = fixed_mapping(node)
+        if fixed is None or any(fixed[1][:2]):
             return None
-        move, angles, scale = (
-            list(node.inputs[key].default_value) for key in ("Location", "Rotation", "Scale")
-        )
-        if angles[0] or angles[1]:
-            return None
+        move, angles, scale = fixed
         cosine, sine = math.cos(angles[2]), math.sin(angles[2])
         step = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
         step = step @ np.diag([scale[0], scale[1], 1.0])
