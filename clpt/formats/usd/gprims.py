@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
@@ -26,7 +26,7 @@ from clpt.files import budget
 from clpt.formats import volumes
 from clpt.formats.framing import TO_BOX
 from clpt.formats.usd import curves, meshes
-from clpt.formats.usd.document import Document, file_of, shown
+from clpt.formats.usd.document import Document, Shown, file_of, shown
 from clpt.formats.usd.materials import surface
 from clpt.formats.usd.meshes import Topology
 from clpt.scene.materials import Null
@@ -298,25 +298,32 @@ def content(
     for prim, shapes in _shapes(document, prims["gprims"], inherited):
         whole.shapes += [(prim, shape, placement(prim)) for shape in shapes]
     whole.lights = [(prim, placement(prim)) for prim in prims["lights"]]
-    alike: dict[tuple[Usd.Prim, str], list[Usd.Prim]] = defaultdict(list)
-    materials = {"": inherited}
-    instances = prims["instances"]
-    # Nothing in the world is bound unless a prim of it binds.
-    binds = base is not None or prims["bindings"]
-    all_bound = _bound(instances) if binds else [None] * len(instances)
-    for prim, bound in zip(instances, all_bound, strict=True):
-        name = str(bound.GetPath()) if bound else ""
-        materials.setdefault(name, bound)
-        alike[prim.GetPrototype(), name].append(prim)
-    for (prototype, name), several in alike.items():
-        key = "content", document.code, str(prototype.GetPath()), _path_of(materials[name])
-        make = partial(content, document, prototype, np.eye(4), materials[name], depth + 1)
+    for prototype, material, several in _alike(prims, inherited, in_world=base is None):
+        key = "content", document.code, str(prototype.GetPath()), _path_of(material)
+        make = partial(content, document, prototype, np.eye(4), material, depth + 1)
         matrices = document.placements(several)
         inner = document.once(key, make)
         whole.copies.append((inner, matrices if base is None else base @ matrices))
     for prim in prims["instancers"]:
         whole.copies += _instancer(document, prim, placement(prim), inherited, depth)
     return whole
+
+
+def _alike(
+    prims: Shown, inherited: UsdShade.Material | None, *, in_world: bool
+) -> Iterator[tuple[Usd.Prim, UsdShade.Material | None, list[Usd.Prim]]]:
+    """Yield prototypes and the materials of what binds none in them, with their instances."""
+    instances, alike = prims["instances"], defaultdict[tuple[Usd.Prim, str], list[Usd.Prim]](list)
+    # Nothing in the world is bound unless a prim of it binds.
+    binds = prims["bindings"] or not in_world
+    materials = {"": inherited}
+    all_bound = _bound(instances) if binds else [None] * len(instances)
+    for prim, bound in zip(instances, all_bound, strict=True):
+        name = _path_of(bound)
+        materials.setdefault(name, bound)
+        alike[prim.GetPrototype(), name].append(prim)
+    for (prototype, name), several in alike.items():
+        yield prototype, materials[name], several
 
 
 def _path_of(material: UsdShade.Material | None) -> str:

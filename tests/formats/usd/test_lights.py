@@ -328,6 +328,8 @@ def test_an_image_that_glows_is_tinted(stage: Loader, tmp_path: File) -> None:
     texture = """def Shader "T" {
             uniform token info:id = "UsdUVTexture"
             asset inputs:file = @glow.exr@
+            token inputs:wrapS = "clamp"
+            token inputs:wrapT = "clamp"
             float3 outputs:rgb }
         token outputs:surface.connect"""
     scene = stage(text.replace("token outputs:surface.connect", texture, 1) + view)
