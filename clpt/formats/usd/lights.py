@@ -26,7 +26,7 @@ from clpt.scene.lights import Area, Constant, Directional, Envmap, Goniometric, 
 from clpt.scene.materials import Null
 from clpt.scene.shapes import Cylinder, Disk, Rectangle, Shape, Sphere
 from clpt.scene.textures import Bitmap, Product
-from clpt.scene.values import is_texture
+from clpt.scene.values import Textured, is_texture
 from clpt.spectra import RGBIlluminant
 
 TURNED = transforms.rotate([0.0, 1.0, 0.0], 180.0)  # lights shine along -z, clpt's along +z
@@ -83,7 +83,7 @@ def on_mesh(
     mode = str(document.value(prim, "light:materialSyncMode", "materialGlowTintsLight"))
     if mode == "noMaterialResponse":
         look = Surface(Null())
-    radiance: Any = RGBIlluminant(*rgb)
+    radiance: Textured = RGBIlluminant(*rgb)
     if mode == "materialGlowTintsLight" and look.emission is not None:
         glow = look.emission.radiance
         if is_texture(glow):
