@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surroundings that nodes compute, as images; in the process beside Blender, which has clpt."""
+"""Images of surroundings that nodes compute, and of lamps; in the process that has clpt."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from clpt import images
+from clpt.formats import ies
 from clpt.formats.native import read
 from clpt.scene.textures import Graph
 
@@ -49,27 +50,52 @@ class Directions:
 
 
 def lights(described: list[dict[str, Any]], folder: Path) -> list[dict[str, Any]]:
-    """Return lights with images in place of graphs."""
-    return [
-        {**light, "image": _file(light["image"], folder)}
-        if isinstance(light.get("image"), dict)
-        else light
-        for light in described
-    ]
+    """Return lights with images in place of graphs and of tables of directions."""
+    return [_baked(light, folder) for light in described]
 
 
 def scene(file: Path) -> None:
-    """Write a scene file again, with images in place of graphs around it."""
+    """Write a scene file again, with images in place of graphs and tables of its lights."""
     described = json.loads(file.read_text("utf-8"))
-    if any(isinstance(light.get("image"), dict) for light in described["lights"]):
-        described["lights"] = lights(described["lights"], file.parent)
-        file.write_text(json.dumps(described), "utf-8")
+    baked = lights(described["lights"], file.parent)
+    if baked != described["lights"]:
+        file.write_text(json.dumps({**described, "lights": baked}), "utf-8")
+
+
+def _baked(light: dict[str, Any], folder: Path) -> dict[str, Any]:
+    image = light.get("image")
+    if "table" in light:
+        kept = {name: value for name, value in light.items() if name not in ("table", "cone")}
+        file = _directions(light["table"], light.get("cone"), folder)
+        return {**kept, "image": {"type": "bitmap", "image": file, "raw": True, "wrap": "repeat"}}
+    is_graph = isinstance(image, dict) and light["type"] == "envmap"
+    return {**light, "image": _file(image, folder)} if is_graph else light
+
+
+def _directions(table: str, cone: list[float] | None, folder: Path) -> str:
+    """Return the image of a lamp's file of intensities [cd], where a spot has a cone within it.
+
+    cone: the cosines at its edge, and where it is as bright as within.
+    """
+    file = folder / f"lamp_{_name([table, cone])}.npy"
+    if not file.is_file():
+        image = np.asarray(ies.parameters(Path(table))["image"].image)
+        if cone is not None:
+            down = -np.cos(np.pi * (np.arange(len(image)) + 0.5) / len(image))
+            t = np.clip((down - cone[0]) / max(cone[1] - cone[0], 1e-6), 0.0, 1.0)
+            image = image * (t * t * (3.0 - 2.0 * t))[:, None, None]
+        np.save(file, image.astype(np.float32))
+    return str(file)
+
+
+def _name(described: Any) -> str:
+    """Return a name, the same one for the same description."""
+    return hashlib.sha256(json.dumps(described).encode()).hexdigest()[:16]
 
 
 def _file(radiance: dict[str, Any], folder: Path) -> str:
     """Return the image of a radiance; the same one for the same."""
-    name = hashlib.sha256(json.dumps(radiance).encode()).hexdigest()[:16]
-    file = folder / f"world_{name}.npy"
+    file = folder / f"world_{_name(radiance)}.npy"
     if not file.is_file():
         width, height = SIZE
         polar = np.pi * np.arange(height)[:, None] / (height - 1)

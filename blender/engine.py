@@ -11,27 +11,12 @@ from typing import Any
 import bpy
 import numpy as np
 
-from . import preferences, scenes
+from . import cameras, passes, preferences, scenes
 from .process import ProcessError, give_back, take
 from .viewport import Viewport
 
 ENGINE = "CLPT"
-# Passes of Blender: the layer, the option of the view layer, channels, what they mean.
-PASSES = {
-    "Depth": ("z", "use_pass_z", "Z", "VALUE"),
-    "Normal": ("shading_normal", "use_pass_normal", "XYZ", "VECTOR"),
-    "Position": ("position", "use_pass_position", "XYZ", "VECTOR"),
-    "UV": ("uv", "use_pass_uv", "UVA", "VECTOR"),
-    "Diffuse Color": ("albedo", "use_pass_diffuse_color", "RGB", "COLOR"),
-}
-Pass = tuple[str, str, str, str]  # its name, the layer of clpt, channels, what they mean
-MATTES = {
-    "crypto_object": ("use_pass_cryptomatte_object", "CryptoObject"),
-    "crypto_material": ("use_pass_cryptomatte_material", "CryptoMaterial"),
-}
-LEVELS = 3  # of mattes, of two names each
 PREVIEW_SAMPLES = 32
-FAR = 1e10  # depth where nothing is seen, as in Blender
 WAIT = 0.2  # [s] until the engine looks for a press of Escape
 
 
@@ -47,8 +32,9 @@ class ClptEngine(bpy.types.RenderEngine):
 
     def update_render_passes(self, scene: Any, renderlayer: Any) -> None:
         """Tell Blender which passes the compositor gets."""
-        for name, _, channels, kind in _passes(renderlayer):
-            self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
+        for each in passes.of_layer(renderlayer, scene.clpt):
+            letters = each.channels
+            self.register_pass(scene, renderlayer, each.name, len(letters), letters, each.kind)
 
     def view_update(self, context: Any, depsgraph: bpy.types.Depsgraph) -> None:
         """Take what has changed in the scene that a viewport shows."""
@@ -59,7 +45,7 @@ class ClptEngine(bpy.types.RenderEngine):
     def view_draw(self, context: Any, depsgraph: bpy.types.Depsgraph) -> None:
         """Draw the picture of a viewport."""
         if self.viewport is not None:
-            self.viewport.draw(context)
+            self.viewport.draw(context, depsgraph)
 
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Render the frame that Blender asks for. An error becomes a line of Blender's."""
@@ -90,10 +76,10 @@ class ClptEngine(bpy.types.RenderEngine):
         order = {"file": str(writer.write()), "width": width, "height": height}
         for line in writer.told:
             self.tell(line)
-        passes = [] if self.is_preview else _passes(shown)
-        for name, _, channels, _ in passes:
-            self.add_pass(name, len(channels), channels, layer=shown.name)
         settings = scene.clpt
+        wanted = [] if self.is_preview else passes.of_layer(shown, settings)
+        for each in wanted:
+            self.add_pass(each.name, len(each.channels), each.channels, layer=shown.name)
         if self.is_preview:
             order |= {"mode": "rgb", "samples": PREVIEW_SAMPLES}
         else:
@@ -102,10 +88,13 @@ class ClptEngine(bpy.types.RenderEngine):
                 "denoise": settings.denoise,
             }  # fmt: skip
         if scene.render.use_border and not self.is_preview:
-            order["crop"] = _border(scene.render, width, height)
-        self._run({**order, "layers": list({row[1]: None for row in passes})}, passes, shown.name)
+            order["crop"] = cameras.border(scene.render, width, height)
+        if any(each.layer == "bands" for each in wanted):
+            order |= {"bands": settings.bands, "lambdas": passes.ends(settings)}
+        order["layers"] = list({each.layer: None for each in wanted})
+        self._run(order, wanted, shown.name)
 
-    def _run(self, order: dict[str, Any], passes: list[Pass], layer: str) -> None:
+    def _run(self, order: dict[str, Any], wanted: list[passes.Pass], layer: str) -> None:
         """Have a picture made, and show it as it comes."""
         process, done = take(preferences.python()), False
         size = order["crop"][2:] if "crop" in order else (order["width"], order["height"])
@@ -127,7 +116,7 @@ class ClptEngine(bpy.types.RenderEngine):
                     self.tell(line)
                 if pictures:
                     layers = dict(zip(("", *order["layers"]), pictures, strict=False))
-                    self._show(layers, size, passes if len(pictures) > 1 else [], layer)
+                    self._show(layers, size, wanted if len(pictures) > 1 else [], layer)
                 done = message.get("done", False)
         finally:
             if done:
@@ -136,43 +125,19 @@ class ClptEngine(bpy.types.RenderEngine):
                 process.stop()
 
     def _show(
-        self, layers: dict[str, bytes], size: tuple[int, int], passes: list[Pass], layer: str
+        self,
+        layers: dict[str, bytes],
+        size: tuple[int, int],
+        wanted: list[passes.Pass],
+        layer: str,
     ) -> None:
         """Show the picture, and its passes where they are there: they come with the last one."""
         result = self.begin_result(0, 0, *size, layer=layer)
         there = result.layers[0].passes
         there["Combined"].rect.foreach_set(np.frombuffer(layers[""], np.float32))
-        for name, source, _, _ in passes:
-            values = np.frombuffer(layers[source], np.float32)
-            if name == "Depth":
-                values = np.where(values > 0.0, values, np.float32(FAR))
-            elif source in MATTES:
-                values = _level(values, int(name[-2:]), size)
-            there[name].rect.foreach_set(values)
+        for each in wanted:
+            there[each.name].rect.foreach_set(each.values(layers, size[0] * size[1]))
         self.end_result(result)
-
-
-def _passes(layer: bpy.types.ViewLayer) -> list[Pass]:
-    """Return the passes that a view layer asks for."""
-    passes = [(n, *row[:1], *row[2:]) for n, row in PASSES.items() if getattr(layer, row[1])]
-    levels = (min(layer.pass_cryptomatte_depth, 2 * LEVELS) + 1) // 2
-    for source, (option, name) in MATTES.items():
-        if getattr(layer, option):
-            passes += [(f"{name}{i:02d}", source, "rgba", "COLOR") for i in range(levels)]
-    return passes
-
-
-def _level(values: np.ndarray, level: int, size: tuple[int, int]) -> np.ndarray:
-    """Return two names and their shares of a pixel, of those in a matte (h w n)."""
-    width, height = size
-    return values.reshape(height * width, -1)[:, 4 * level : 4 * level + 4].ravel()
-
-
-def _border(render: bpy.types.RenderSettings, width: int, height: int) -> tuple[int, int, int, int]:
-    """Return the part of the picture that is rendered: x, y from above, width, height."""
-    left, right = (int(share * width) for share in (render.border_min_x, render.border_max_x))
-    below, above = (int(share * height) for share in (render.border_min_y, render.border_max_y))
-    return left, height - above, max(right - left, 1), max(above - below, 1)
 
 
 # Panels of Eevee that show what any engine reads of lamps, materials and cameras.

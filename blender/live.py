@@ -29,6 +29,7 @@ CANCEL_SECONDS = 0.05  # a pass ends within them when something moves
 REST = 0.1  # [s] without a change until the whole picture begins
 WAIT = 0.01  # [s] between looks whether a picture was taken
 SHARE = 0.1  # of the time, for sending pictures that get better
+DENOISED_FROM = 8  # samples
 PLACE = "to_world"
 
 
@@ -152,32 +153,41 @@ class Follower:
         self.renderer: clpt.Renderer | None = None
         self.scene: Scene | None = None
 
-    def follow(self, scene: Scene, beside: clpt.Renderer | None) -> clpt.Renderer:
+    def follow(
+        self, scene: Scene, beside: clpt.Renderer | None, denoise: str | None = None
+    ) -> clpt.Renderer:
         """Return the renderer of a scene; its film is empty if the scene is another one.
 
-        beside: a renderer that may have parts of the scene. After an error there is no renderer.
+        beside: a renderer that may have parts of the scene; denoise: how finished pictures are
+        denoised. After an error there is no renderer.
         """
         former, self.scene = self.scene, scene
         if scene is former and self.renderer is not None:
             return self.renderer
-        film = scene.film
-        width, height = (max(1, n // self.divider) for n in (film.width, film.height))
-        small = dataclasses.replace(
-            scene, film=dataclasses.replace(film, width=width, height=height)
-        )
+        small = dataclasses.replace(scene, film=self._small(scene.film))
         try:
-            if self.renderer is None or former is None or former.film is not film:
+            if self.renderer is None or former is None or former.film is not scene.film:
                 self.close()
                 self.scene = scene
                 self.renderer = clpt.Renderer(
-                    small, beside=beside, cancel_seconds=CANCEL_SECONDS, programs="shared"
-                )
+                    small, beside=beside, cancel_seconds=CANCEL_SECONDS, programs="shared",
+                    denoise=denoise,
+                )  # fmt: skip
             else:
                 self.renderer.update(**(_edits(former, scene) or {"scene": small}))
         except BaseException:
             self.close()
             raise
         return self.renderer
+
+    def _small(self, film: Film) -> Film:
+        """Return a film of fewer pixels, of the same part of the picture."""
+        width, height = (max(1, n // self.divider) for n in (film.width, film.height))
+        crop = film.crop
+        if crop is not None:
+            x, y, across, down = (n // self.divider for n in crop)
+            crop = min(x, width - 1), min(y, height - 1), max(1, across), max(1, down)
+        return dataclasses.replace(film, width=width, height=height, crop=crop)
 
     def close(self) -> None:
         """Give the device's memory back."""
@@ -222,11 +232,22 @@ def _edits(former: Scene, scene: Scene) -> dict[str, Any] | None:
 
 def _linear(renderer: clpt.Renderer) -> np.ndarray:
     """Return the picture so far as Blender has it: (h, w, 4) float32, the bottom row first."""
+    if renderer.denoise is not None and renderer.samples >= DENOISED_FROM:
+        return rendering.pixels(clpt.DenoisedPicture(renderer).picture())
     if renderer.scene.film.alpha:
         return rendering.pixels(renderer.image())
     picture = np.ascontiguousarray(renderer.film.get()[::-1])
     picture[..., 3] = 1.0
     return picture
+
+
+def _covered(film: Film) -> dict[str, list[float]]:
+    """Return the lower left corner and the extent of a film's part, as shares of its picture."""
+    x, y, width, height = film.crop or (0, 0, film.width, film.height)
+    return {
+        "corner": [x / film.width, 1.0 - (y + height) / film.height],
+        "extent": [width / film.width, height / film.height],
+    }
 
 
 def _same(some: list[Any], others: list[Any]) -> bool:
@@ -248,6 +269,7 @@ class Live:
         self.described: dict[str, Any] = {}
         self.scene: Scene | None = None
         self.film, self.film_key, self.size = Film(), "", [1, 1]
+        self.crop: list[int] | None = None
         self.serial = 0  # of the newest message that changes the picture
         self.is_new = self.moves = False
         self.sent = self.cost = 0.0
@@ -299,7 +321,7 @@ class Live:
             self.described["lights"] = lights
         if "camera" in changes:
             self.described["camera"] = changes["camera"]
-        self.size = changes.get("size", self.size)
+        self.size, self.crop = changes.get("size", self.size), changes.get("crop", self.crop)
         if self.described.get("camera") is None or "shapes" not in self.described:
             return
         try:
@@ -316,14 +338,16 @@ class Live:
 
     def _film(self) -> Film:
         """Return the film; the same object as before where nothing of it differs."""
-        key = json.dumps([self.described["film"], self.size, self.settings["mode"]])
+        mode, denoise = self.settings["mode"], self.settings["denoise"]
+        key = json.dumps([self.described["film"], self.size, self.crop, mode, denoise])
         if key == self.film_key:
             return self.film
         content = {"version": 2, "camera": self.described["camera"], "film": self.described["film"]}
         film = read.from_json(content, self.parts.folder).film
         width, height = self.size
+        crop = None if self.crop is None else tuple(self.crop)
         self.film_key = key
-        return dataclasses.replace(film, width=width, height=height, mode=self.settings["mode"])
+        return dataclasses.replace(film, width=width, height=height, mode=mode, crop=crop)
 
     def _fail(self, error: Exception) -> None:
         self.scene = None
@@ -340,7 +364,7 @@ class Live:
         if self.moves or self.whole.scene is not self.scene:
             began, was = time.perf_counter(), follower.renderer
             other = self.whole if follower is self.moving else self.moving
-            renderer = follower.follow(self.scene, other.renderer)
+            renderer = self._follow(follower, other.renderer)
             renderer.run(1)
             self.is_new = True
             self._send(renderer, follower.divider)
@@ -348,13 +372,19 @@ class Live:
                 self._adapt(time.perf_counter() - began)
             self.moves = False
             return
-        renderer = self.whole.follow(self.scene, None)
+        renderer = self._follow(self.whole, None)
         left = self.settings["samples"] - renderer.samples
         if left > 0:
             renderer.run(min(left, max(1, renderer.samples)), lambda _: self.link.inbox.empty())
             self.is_new = True
         if time.perf_counter() - self.sent > self.cost / SHARE or left <= 0:
             self._send(renderer, 1)
+
+    def _follow(self, follower: Follower, beside: clpt.Renderer | None) -> clpt.Renderer:
+        """Return the renderer of the present scene; whole pictures may be denoised."""
+        assert self.scene is not None
+        denoise = self.settings["denoise"] and follower is self.whole
+        return follower.follow(self.scene, beside, rendering.denoiser() if denoise else None)
 
     def _hears(self, seconds: float) -> bool:
         """Return whether a message comes within some time."""
@@ -384,6 +414,7 @@ class Live:
         message = {
             "samples": renderer.samples if divider == 1 else 0, "divider": divider,
             "size": [picture.shape[1], picture.shape[0]], "serial": self.serial,
+            **_covered(renderer.scene.film),
         }  # fmt: skip
         self.link.send(message, picture)
         self.sent = time.perf_counter()

@@ -133,13 +133,13 @@ def drops(settings: Any, python: str) -> Json:
     return json.loads(Path(command[-1]).read_text("utf-8"))
 
 
-def lens(settings: Any, camera: Any, focus: float) -> Json:
-    """Return the camera of a real lens with Blender's film, focus and f-number."""
-    name = settings.lens if settings.lens in LENSES else bpy.path.abspath(settings.lens)
-    stop = camera.dof.aperture_fstop if camera.dof.use_dof else 0.0
+def lens(camera: Any, width: float, focus: float) -> Json:
+    """Return the camera of a real lens with Blender's f-number; width of the film, focus [m]."""
+    name = camera.clpt.lens
     return {
-        "type": "lens", "lens": name, "film_width": 1e-3 * camera.sensor_width,
-        "focus_distance": focus, "f_number": stop,
+        "type": "lens", "lens": name if name in LENSES else bpy.path.abspath(name),
+        "film_width": width, "focus_distance": focus,
+        "f_number": camera.dof.aperture_fstop if camera.dof.use_dof else 0.0,
     }  # fmt: skip
 
 

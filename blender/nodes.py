@@ -17,6 +17,7 @@ from .graphs import Graph, Json, Site, Value, origin, socket_of
 from .textures import TEXTURES
 
 GREY = [0.8, 0.8, 0.8]
+METAL_FILMS = bpy.app.version >= (5, 0)  # before, thin films were on dielectrics alone
 told: dict[str, list[str]] = {}  # by names of data: what is lost, for the panels
 
 
@@ -105,7 +106,8 @@ class Tree:
 
     image: writes the image of a node and returns its bitmap, without coordinates; tell: takes what
     is lost. attributes: of meshes that the materials read, by what they are, with their numbers.
-    object, random: what Object Info knows; surface: False while a world is read.
+    object, random: what Object Info knows; surface: False while a world is read; tables: takes the
+    IES files of a lamp.
     """
 
     def __init__(self, image: Callable[[bpy.types.Node], Json | None], tell: Callable[[str], None]):
@@ -115,6 +117,7 @@ class Tree:
         self.personal = False  # whether it reads what only its object knows
         self.object: bpy.types.Object | None = None
         self.random, self.surface = 0.0, True
+        self.tables: list[str] | None = None
 
     def material(self, material: bpy.types.Material | None) -> tuple[Json, Any]:
         """Return a material and the radiance that it emits, None if it is dark."""
@@ -243,16 +246,45 @@ def _principled(tree: Tree, at: Site) -> tuple[Json, Any]:
     if through != 0.0:
         values["transmission_tint"] = color
     thickness = tree.number(at, "Thin Film Thickness")
-    if thickness != 0.0:
+    metal = _filmed_metal(tree, at, values)
+    bare = values["base_metalness"] == 1.0 and not METAL_FILMS
+    if thickness != 0.0 and not bare:
         values |= {
             "thin_film_weight": 1.0, "thin_film_ior": tree.single(at, "Thin Film IOR", 1.33),
             "thin_film_thickness": tree.made(lambda e: e.input(at, "Thin Film Thickness") * 1e-3),
         }  # fmt: skip
-    material = tree.bent(at, {"type": "openpbr", **_plain(values)})
+    material = tree.bent(at, metal or {"type": "openpbr", **_plain(values)})
     alpha = tree.share(at, "Alpha", 1.0)
     if alpha != 1.0:
         material = {"type": "mask", "material": material, "opacity": alpha}
     return _both(material, through), tree.light(at, "Emission Color", "Emission Strength")
+
+
+def _films(tree: Tree, at: Site) -> Json:
+    """Return the thin film of a shader, which `layers` of clpt's materials are; {} without one."""
+    thickness = tree.single(at, "Thin Film Thickness")
+    film = {"eta": tree.single(at, "Thin Film IOR", 1.33), "thickness": thickness}
+    return {"layers": [film]} if thickness > 0.0 else {}
+
+
+def _filmed_metal(tree: Tree, at: Site, values: Json) -> Json | None:
+    """Return a metal of even color under a film, by an index; None for other surfaces.
+
+    The index is that of Gulbrandsen 2014 for the reflectances straight on and at 82 degrees.
+    """
+    settings = "base_metalness", "coat_weight", "fuzz_weight", "specular_roughness_anisotropy"
+    plain = [values[name] for name in settings] == [1.0, 0.0, 0.0, 0.0]
+    colors = values["base_color"], values["specular_color"]
+    if not plain or not all(isinstance(color, list) for color in colors):
+        return None
+    films = _films(tree, at) if METAL_FILMS else {}
+    if not films:
+        return None
+    r, tint = np.minimum(colors[0], 0.999), np.array(colors[1])
+    edge, root = (r + (1.0 - r) * (6.0 / 7.0) ** 5) * tint, np.sqrt(r)
+    eta = (1.0 - edge) * (1.0 + root) / (1.0 - root) + edge * (1.0 - r) / (1.0 + r)
+    k = np.sqrt(np.maximum((r * (eta + 1.0) ** 2 - (eta - 1.0) ** 2) / (1.0 - r), 0.0))
+    return _conductor(tree, at, {"eta": eta.tolist(), "k": k.tolist(), **films})
 
 
 def _plain(values: Json) -> Json:
@@ -273,10 +305,9 @@ def _both(material: Json, through: Any = 0.0) -> Json:
 
 def _diffuse(tree: Tree, at: Site) -> tuple[Json, Any]:
     color, roughness = tree.color(at, "Color"), tree.number(at, "Roughness")
-    matte = {"type": "diffuse", "reflectance": color}
-    if isinstance(roughness, float) and roughness > 0.0:
-        matte = {"type": "oren_nayar", "reflectance": color, "sigma": 45.0 * roughness}
-    return _both(tree.bent(at, matte)), None
+    if roughness != 0.0:
+        return _open(tree, at, base_color=color, base_diffuse_roughness=roughness)
+    return _both(tree.bent(at, {"type": "diffuse", "reflectance": color})), None
 
 
 def _open(tree: Tree, at: Site, **values: Any) -> tuple[Json, Any]:
@@ -310,35 +341,41 @@ def _glossy(tree: Tree, at: Site) -> tuple[Json, Any]:
 
 def _metallic(tree: Tree, at: Site) -> tuple[Json, Any]:
     if at.node.fresnel_type == "PHYSICAL_CONDUCTOR":
-        alpha = tree.made(lambda e: e.input(at, "Roughness") * e.input(at, "Roughness"))
-        metal = {
-            "type": "rough_conductor", "alpha_u": _wide(alpha), "alpha_v": _wide(alpha),
-            **{key: list(at.node.inputs[name].default_value)
-               for key, name in (("eta", "IOR"), ("k", "Extinction"))},
-        }  # fmt: skip
-        return _both(tree.bent(at, metal)), None
-    return _open(
-        tree, at, base_metalness=1.0, base_color=tree.color(at, "Base Color"), specular_weight=1.0,
-        specular_color=tree.color(at, "Edge Tint"),
+        index = {
+            key: list(at.node.inputs[name].default_value)
+            for key, name in (("eta", "IOR"), ("k", "Extinction"))
+        }
+        return _both(tree.bent(at, _conductor(tree, at, index | _films(tree, at)))), None
+    values = {
+        "base_metalness": 1.0, "base_color": tree.color(at, "Base Color"), "specular_weight": 1.0,
+        "specular_color": tree.color(at, "Edge Tint"), "coat_weight": 0.0, "fuzz_weight": 0.0,
         **_stretched(tree, at, "Anisotropy", "Rotation"),
-    )  # fmt: skip
+    }  # fmt: skip
+    metal = _filmed_metal(tree, at, values)
+    return _open(tree, at, **values) if metal is None else (_both(tree.bent(at, metal)), None)
 
 
-def _wide(alpha: Any) -> Any:
-    return min(max(alpha, 1e-4), 1.0) if isinstance(alpha, float) else alpha
+def _conductor(tree: Tree, at: Site, values: Json) -> Json:
+    return {"type": "rough_conductor", **_alphas(tree, at), **values}
+
+
+def _alphas(tree: Tree, at: Site) -> Json:
+    """Return how rough facets are, as Cycles' roughness says it."""
+    alpha = tree.made(lambda e: e.input(at, "Roughness") * e.input(at, "Roughness"))
+    alpha = min(max(alpha, 1e-4), 1.0) if isinstance(alpha, float) else alpha
+    return {"alpha_u": alpha, "alpha_v": alpha}
 
 
 def _glass(tree: Tree, at: Site) -> tuple[Json, Any]:
     values: Json = {
         "int_ior": max(tree.single(at, "IOR", 1.5), 1.0), "ext_ior": 1.0,
-        "specular_transmittance": tree.color(at, "Color"),
+        "specular_transmittance": tree.color(at, "Color"), **_films(tree, at),
     }  # fmt: skip
     if at.node.type == "BSDF_REFRACTION":
         values["specular_reflectance"] = 0.0
-    alpha = tree.made(lambda e: e.input(at, "Roughness") * e.input(at, "Roughness"))
-    smooth = isinstance(alpha, float) and alpha < 1e-6
-    kind: Json = {"type": "dielectric"} if smooth else {
-        "type": "rough_dielectric", "alpha_u": _wide(alpha), "alpha_v": _wide(alpha),
+    smooth = tree.number(at, "Roughness") == 0.0
+    kind = {"type": "dielectric"} if smooth else {
+        "type": "rough_dielectric", **_alphas(tree, at),
     }  # fmt: skip
     return tree.bent(at, {**kind, **values}), None
 

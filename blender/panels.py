@@ -84,6 +84,16 @@ class ClptSettings(bpy.types.PropertyGroup):
         name="Viewport Samples", description="Paths of each pixel there", default=256, min=1,
         max=1 << 20,
     )  # fmt: skip
+    viewport_denoise: bpy.props.BoolProperty(
+        name="Viewport Denoise", description="Take most of the noise from pictures of viewports",
+        update=_tag,
+    )  # fmt: skip
+    bands: bpy.props.IntProperty(
+        name="Bands", description="Parts of the spectrum, each a pass of its radiance; 0: none",
+        min=0, max=64,
+    )  # fmt: skip
+    first_band: _number("First Band", 400.0, 200.0, 2400.0, "Where the bands begin [nm]")
+    last_band: _number("Last Band", 700.0, 300.0, 2500.0, "Where the bands end [nm]")
     sensor: bpy.props.EnumProperty(name="Sensor", items=SENSORS)
     sensor_file: bpy.props.StringProperty(name="Sensor File", subtype="FILE_PATH")
     white_balance: _named(
@@ -212,7 +222,10 @@ class Panel(bpy.types.Panel):
         owner = self.owner(context)
         settings = self.settings(owner)
         for name in self.shown(settings):
-            self.layout.prop(settings, name)
+            if name == "lightgroup":
+                self.layout.prop_search(settings, name, context.view_layer, "lightgroups")
+            else:
+                self.layout.prop(settings, name)
         for line in told.get(owner.name_full, ()):
             self.layout.label(text=line, icon="INFO")
 
@@ -222,7 +235,7 @@ class CLPT_PT_sampling(Panel):
 
     bl_label = "Sampling"
     bl_context = "render"
-    names = ("mode", "samples", "noise", "denoise", "viewport_samples")
+    names = ("mode", "samples", "noise", "denoise", "viewport_samples", "viewport_denoise")
 
 
 class CLPT_PT_film(Panel):
@@ -231,7 +244,7 @@ class CLPT_PT_film(Panel):
     bl_label = "Film Response"
     bl_context = "render"
     bl_options: ClassVar = {"DEFAULT_CLOSED"}
-    names = ("sensor", "sensor_file", "white_balance")
+    names = ("sensor", "sensor_file", "white_balance", "bands", "first_band", "last_band")
 
 
 class CLPT_PT_motion(Panel):
@@ -262,6 +275,51 @@ class CLPT_PT_passes(Panel):
     @classmethod
     def settings(cls, owner: Any) -> Any:
         return bpy.context.view_layer
+
+
+class CLPT_PT_lightgroups(Panel):
+    """Groups of lights, each with a pass: Blender's own list."""
+
+    bl_label = "Light Groups"
+    bl_context = "view_layer"
+    names = ("lightgroups",)
+
+    @classmethod
+    def settings(cls, owner: Any) -> Any:
+        return bpy.context.view_layer
+
+    def draw(self, context: bpy.types.Context) -> None:
+        row, layer, name = self.layout.row(), context.view_layer, "lightgroups"
+        row.template_list("UI_UL_list", name, layer, name, layer, "active_lightgroup_index", rows=3)
+        column = row.column(align=True)
+        for what in ("add", "remove"):
+            column.operator(f"scene.view_layer_{what}_lightgroup", icon=what.upper(), text="")
+
+
+class CLPT_PT_object(Panel):
+    """The light group of an object that emits."""
+
+    bl_label = "Light Group"
+    bl_context = "object"
+    names = ("lightgroup",)
+
+    @classmethod
+    def owner(cls, context: bpy.types.Context) -> Any:
+        return context.object
+
+    @classmethod
+    def settings(cls, owner: Any) -> Any:
+        return owner
+
+
+class CLPT_PT_world_group(CLPT_PT_object):
+    """The light group of a world."""
+
+    bl_context = "world"
+
+    @classmethod
+    def owner(cls, context: bpy.types.Context) -> Any:
+        return context.world
 
 
 class CLPT_PT_material(Panel):
@@ -324,8 +382,9 @@ GROUPS = {
     "Camera": ClptCamera,
 }  # fmt: skip
 PANELS = (
-    CLPT_PT_sampling, CLPT_PT_motion, CLPT_PT_film, CLPT_PT_passes, CLPT_PT_material, CLPT_PT_lamp,
-    CLPT_PT_camera, CLPT_PT_world,
+    CLPT_PT_sampling, CLPT_PT_motion, CLPT_PT_film, CLPT_PT_passes, CLPT_PT_lightgroups,
+    CLPT_PT_object, CLPT_PT_material, CLPT_PT_lamp, CLPT_PT_camera, CLPT_PT_world,
+    CLPT_PT_world_group,
 )  # fmt: skip
 
 

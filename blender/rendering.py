@@ -35,8 +35,8 @@ def _render(link: Link, message: dict[str, Any]) -> None:
     """Render a file until its samples are there, its noise is low, or Blender says stop."""
     scene = _scene(message)
     total, noise = int(message["samples"]), message.get("noise") or None
-    denoise = _denoiser() if message.get("denoise") else None
-    shown = time.monotonic()
+    denoise = denoiser() if message.get("denoise") else None
+    sent = time.monotonic()
     with clpt.Renderer(scene, denoise=denoise, cancel_seconds=0.1) as renderer:
         link.send({"samples": 0, "warnings": [*scene.warnings, *renderer.warnings]})
 
@@ -47,21 +47,25 @@ def _render(link: Link, message: dict[str, Any]) -> None:
             step = min(max(renderer.samples, 1), total - renderer.samples)
             if not renderer.run(step, goes_on, noise=noise):
                 break
-            if time.monotonic() - shown > SHOWN_EVERY:
-                link.send({"samples": renderer.samples}, pixels(renderer.image()))
-                shown = time.monotonic()
+            if time.monotonic() - sent > SHOWN_EVERY:
+                link.send({"samples": renderer.samples}, pixels(renderer.picture()))
+                sent = time.monotonic()
         while not link.inbox.empty():
             link.inbox.get()  # the order to stop
-        image = renderer.denoised() if denoise and renderer.samples else renderer.image()
+        shown = clpt.DenoisedPicture(renderer) if denoise and renderer.samples else renderer
+        picture = shown.picture()
         layers = renderer.layers() if message["layers"] else {}
+        if "bands" in message:
+            layers["bands"] = shown.image()
+        dark = np.zeros((*picture.shape[:2], 3), np.float32)  # a group without lights
         link.send(
             {"samples": renderer.samples, "done": True},
-            pixels(image),
-            *(_upward(layers[name], WIDTHS.get(name, 0)) for name in message["layers"]),
+            pixels(picture),
+            *(_upward(layers.get(name, dark), WIDTHS.get(name, 0)) for name in message["layers"]),
         )
 
 
-def _denoiser() -> str:
+def denoiser() -> str:
     """Return Open Image Denoise where it is installed, else clpt's own denoiser."""
     return "statistical" if importlib.util.find_spec("pyoidn") is None else "oidn"
 
@@ -70,7 +74,11 @@ def _scene(message: dict[str, Any]) -> Scene:
     bake.scene(Path(message["file"]))
     scene = read.load(Path(message["file"]), missing=GREY)
     changes = {name: message[name] for name in ("width", "height", "mode")}
-    changes["layers"] = tuple(message["layers"])
+    layers = ("light_groups" if name.startswith("light_") else name for name in message["layers"])
+    changes["layers"] = tuple(name for name in dict.fromkeys(layers) if name != "bands")
+    if "bands" in message:
+        changes["bands"] = message["bands"]
+        changes["lambda_min"], changes["lambda_max"] = message["lambdas"]
     if message.get("crop"):
         changes["crop"] = tuple(message["crop"])
     if message.get("noise"):

@@ -6,7 +6,8 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,25 +15,16 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from . import measured, meshes, preferences, process, volumes
-from .graphs import Json, Site, jenkins, origin
+from . import cameras, lights, measured, meshes, preferences, process, volumes
+from .graphs import Json, jenkins
+from .lights import listed
 from .nodes import Tree, told
 
 SURFACES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
-TO_CLPT = Matrix.Diagonal((-1.0, 1.0, -1.0, 1.0))  # cameras and lamps look along +z there
-# A dome of clpt has +y up and +z in its middle; of Blender +z up and +x in its middle.
-DOME = [[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 LINEAR = ("Non-Color", "Linear Rec.709", "Raw", "Linear")  # spaces without a curve
 READ = (".png", ".jpg", ".jpeg", ".exr", ".hdr", ".tga", ".bmp", ".webp")  # files that clpt reads
 SILENT = {"CAMERA", "EMPTY", "ARMATURE", "LATTICE", "LIGHT_PROBE", "SPEAKER"}
 
-# Factors from clpt's sky to those of Cycles, by the light on a floor at an elevation of 30 degrees.
-SKIES = {
-    "SINGLE_SCATTERING": 44.0, "MULTIPLE_SCATTERING": 65.0, "PREETHAM": 6.6, "HOSEK_WILKIE": 0.92,
-    "NISHITA": 44.0,
-}  # fmt: skip
-SUN = 98.0
-WORLD_PLACES = (("TEX_COORD", "Generated"), ("TEX_COORD", "Object"), ("NEW_GEOMETRY", "Position"))
 CAMERA = ("", "", ())  # the key of the camera
 
 Key = tuple[str, str, tuple[int, ...]]  # of an instance, at all times
@@ -79,6 +71,15 @@ class Writer:
         if text not in lines:
             lines.append(text)
 
+    @contextmanager
+    def reads(self, name: str) -> Iterator[None]:
+        """Let what is told while data of this name are read stand in their panel."""
+        self.owner, told[name] = name, []
+        try:
+            yield
+        finally:
+            self.owner = ""
+
     def write(self) -> Path:
         """Write all; return the scene file."""
         file = self.folder / "scene.json"
@@ -92,7 +93,7 @@ class Writer:
     def describe(self) -> Json:
         """Write meshes and images; return the scene that names their files."""
         shapes: list[Json] = []
-        lights: list[Json] = []
+        around: dict[str, list[Json]] = {"shapes": shapes, "lights": []}
         parts: dict[Any, list[Json]] = {}
         places: dict[Any, list[tuple[Key, Matrix]]] = {}
         names: dict[Key, str] = {}
@@ -105,18 +106,19 @@ class Writer:
             if source.type in SURFACES or source.type == "CURVES":
                 self.tree.random = _random(instance)
                 made = [self._material(slot, source) for slot in _slots(source)]
-                key = (source.data.as_pointer(), *(m.name for m in made))
+                key = (source.data.as_pointer(), source.lightgroup, *(m.name for m in made))
                 if key not in parts:
                     parts[key] = self._parts(len(parts), source)
                 names[_key(instance)] = source.name
                 places.setdefault(key, []).append((_key(instance), matrix))
             elif source.type == "LIGHT":
-                self._lamp(source, matrix, lights, shapes)
+                where, lamp = lights.lamp(self, source, matrix)
+                around[where].append(lamp)
             elif source.type == "VOLUME":
                 shapes += self._volume(source, matrix)
             elif source.type not in SILENT:
                 self.tell(f"objects of the type {source.type.title()} are left out")
-        lights += self._world()
+        around["lights"] += lights.world(self, self.depsgraph.scene.world)
         camera = self._camera()
         deforming = {
             rows[0][0]: parts[key] for key, rows in places.items() if len(rows) == 1
@@ -139,8 +141,7 @@ class Writer:
             "materials": self.named,
             "media": self.media,
             "groups": self.groups,
-            "shapes": shapes,
-            "lights": lights,
+            **around,
         }
 
     def _poses(self, parts: dict[Key, list[Json]]) -> list[Pose]:
@@ -258,10 +259,10 @@ class Writer:
             @ Matrix.Translation(0.5 * (low + high))
             @ Matrix.Diagonal((*(0.505 * (high - low)), 1.0))
         )
-        self.media[source.name_full] = {**medium, "to_world": [list(row) for row in matrix]}
+        self.media[source.name_full] = {**medium, "to_world": listed(matrix)}
         return [{
             "type": "cube", "material": {"type": "null"}, "name": source.name,
-            "interior": source.name_full, "to_world": [list(row) for row in box],
+            "interior": source.name_full, "to_world": listed(box),
         }]  # fmt: skip
 
     def _files(self, number: int, source: Any) -> dict[int, str]:
@@ -290,19 +291,17 @@ class Writer:
             return found
         tree = self.tree
         tree.used, tree.object, tree.personal = set(), source, False
-        self.owner = "" if material is None else material.name_full
-        told[self.owner] = []
-        described, radiance = tree.material(material)
+        nodes = None if material is None else material.node_tree
+        output = None if nodes is None else nodes.get_output_node("CYCLES")
+        with self.reads("" if material is None else material.name_full):
+            described, radiance = tree.material(material)
+            if material is not None and material.clpt.use_drops:
+                medium = self._drops(material.clpt)
+            else:
+                medium = None if output is None else volumes.medium(tree, output)
         if tree.personal:
             self.personal.add(key)
         key, interior = own if tree.personal else key, ""
-        nodes = None if material is None else material.node_tree
-        output = None if nodes is None else nodes.get_output_node("CYCLES")
-        if material is not None and material.clpt.use_drops:
-            medium = self._drops(material.clpt)
-        else:
-            medium = None if output is None else volumes.medium(tree, output)
-        self.owner = ""
         if medium is not None:
             self.media[key], interior = medium, key
         self.named[key] = described
@@ -323,7 +322,10 @@ class Writer:
         if made.interior:
             part["interior"] = made.interior
         if made.radiance is not None:
-            part["emission"] = {"type": "area", "radiance": made.radiance, "two_sided": True}
+            part["emission"] = {
+                "type": "area", "radiance": made.radiance, "two_sided": True,
+                "group": source.lightgroup,
+            }  # fmt: skip
         return part
 
     def image(self, node: bpy.types.Node) -> Json | None:
@@ -362,223 +364,17 @@ class Writer:
         np.save(file, np.ascontiguousarray(pixels))
         return {"type": "bitmap", "image": str(file), "raw": True}
 
-    def _lamp(self, source: Any, matrix: Matrix, lights: list[Json], shapes: list[Json]) -> None:
-        """Add a lamp; a strength of w watts is w / (4 pi) W/sr of a point."""
-        lamp = source.data
-        color = [c * lamp.energy * 2.0**lamp.exposure for c in lamp.color]
-        if lamp.use_temperature:
-            color = [c * t for c, t in zip(color, lamp.temperature_color, strict=True)]
-        color = self._lamp_nodes(lamp, color)
-        rigid = Matrix.LocRotScale(*matrix.decompose()[:2], (1.0, 1.0, 1.0))
-        place = [list(row) for row in rigid @ TO_CLPT]
-        if lamp.type == "SUN":
-            direction = [-value for value in rigid.col[2][:3]]
-            lights.append(
-                {
-                    "type": "directional",
-                    "direction": direction,
-                    "irradiance": self._emitted(lamp, color, 1.0),
-                    "angle": math.degrees(lamp.angle),
-                }
-            )
-        elif lamp.type == "POINT" and lamp.shadow_soft_size > 0.0:
-            area = 4.0 * math.pi * lamp.shadow_soft_size**2
-            shapes.append({
-                "type": "sphere", "radius": lamp.shadow_soft_size,
-                "center": list(rigid.translation), "material": "lamp",
-                "emission": self._surface(lamp, color, area),
-            })  # fmt: skip
-            self.named["lamp"] = {"type": "null"}
-        elif lamp.type == "POINT":
-            lights.append({
-                "type": "point", "position": list(rigid.translation),
-                "intensity": self._emitted(lamp, color, 0.25 / math.pi),
-            })  # fmt: skip
-        elif lamp.type == "SPOT":
-            edge = math.cos(0.5 * lamp.spot_size)
-            full = math.degrees(math.acos(min(edge + (1.0 - edge) * lamp.spot_blend, 1.0)))
-            lights.append({
-                "type": "spot", "to_world": place, "edge": "smooth", "beam_width": full,
-                "cutoff": math.degrees(0.5 * lamp.spot_size),
-                "intensity": self._emitted(lamp, color, 0.25 / math.pi),
-            })  # fmt: skip
-        else:
-            self._area(lamp, color, matrix, shapes)
-
-    def _lamp_nodes(self, lamp: Any, color: list[float]) -> list[float]:
-        """Return a lamp's color with what its nodes emit, which is one color."""
-        output = None
-        if lamp.node_tree is not None and lamp.use_nodes:
-            output = lamp.node_tree.get_output_node("CYCLES")
-        if output is None:
-            return color
-        self.owner = lamp.name_full
-        told[self.owner] = []
-        shader = self.tree.linked(Site(output, (), ""), "Surface")
-        glow = [0.0] * 3 if shader is None or shader[1] is None else shader[1]
-        if isinstance(glow, dict):
-            self.tell("patterns of lamps are not read: it is white")
-            glow = [1.0] * 3
-        self.owner = ""
-        return [c * g for c, g in zip(color, glow, strict=True)]
-
-    def _emitted(self, lamp: Any, color: list[float], factor: float) -> Any:
-        """Return what a lamp emits: its color, or its standard spectrum of the same luminance."""
-        if not lamp.clpt.spectrum:
-            return [c * factor for c in color]
-        luminance = 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2]
-        try:
-            return measured.lamp(lamp.clpt.spectrum, luminance * factor)
-        except ValueError as error:
-            self.tell(str(error))
-            return [c * factor for c in color]
-
-    def _surface(self, lamp: Any, color: list[float], area: float) -> Json:
-        """Return the emission of a lamp's surface [m^2]; it is even, and of its front."""
-        return {"type": "area", "radiance": self._emitted(lamp, color, 1.0 / (math.pi * area))}
-
-    def _area(self, lamp: Any, color: list[float], matrix: Matrix, shapes: list[Json]) -> None:
-        round_ = lamp.shape in ("DISK", "ELLIPSE")
-        width = lamp.size
-        height = lamp.size_y if lamp.shape in ("RECTANGLE", "ELLIPSE") else lamp.size
-        place = matrix @ TO_CLPT @ Matrix.Diagonal((0.5 * width, 0.5 * height, 1.0, 1.0))
-        across, along = place.col[0].xyz, place.col[1].xyz
-        area = across.cross(along).length * (math.pi if round_ else 4.0)
-        self.named["lamp"] = {"type": "null"}
-        shapes.append({
-            "type": "disk" if round_ else "rectangle", "to_world": [list(row) for row in place],
-            "material": "lamp",
-            "emission": self._surface(lamp, color, area),
-        })  # fmt: skip
-
-    def _world(self) -> list[Json]:
-        world = self.depsgraph.scene.world
-        if world is None:
-            return []
-        if world.clpt.use_sky:
-            return [self._sky(world.clpt)]
-        if not world.use_nodes or world.node_tree is None:
-            return [{"type": "constant", "radiance": list(world.color)}]
-        output = world.node_tree.get_output_node("CYCLES")
-        site = None if output is None else origin((), output.inputs["Surface"])[0]
-        if site is None:
-            return []
-        self.owner, self.tree.surface = world.name_full, False
-        told[self.owner] = []
-        try:
-            return self._surroundings(site)
-        finally:
-            self.owner, self.tree.surface = "", True
-
-    def _surroundings(self, site: Site) -> list[Json]:
-        """Return the lights of a world's shader: an image or a sky as it is, else a graph."""
-        if site.node.type in ("BACKGROUND", "EMISSION"):
-            strength = self.tree.number(site, "Strength", 1.0)
-            texture, _ = origin(site.groups, site.node.inputs["Color"])
-            kind = "" if texture is None else texture.node.type
-            if kind == "TEX_SKY" and isinstance(strength, float):
-                return [self._sky_texture(texture.node, strength)]
-            if kind == "TEX_ENVIRONMENT" and isinstance(strength, float):
-                dome = self._dome(texture, strength)
-                if dome is not None:
-                    return [dome]
-        radiance = self.tree.shader(site)[1]
-        if isinstance(radiance, dict):
-            return [{"type": "envmap", "image": radiance, "to_world": DOME}]
-        return [] if radiance is None else [{"type": "constant", "radiance": radiance}]
-
-    def _sky_texture(self, node: Any, strength: float) -> Json:
-        """Return clpt's own sky for a Sky Texture; the scale is by the light on a floor."""
-        self.tell("Sky Texture becomes clpt's own sky, whose colors differ")
-        scale = strength * SKIES[node.sky_type]
-        made = {"type": "sky", "sky_scale": scale, "sun_scale": 0.0, "to_world": DOME}
-        if node.sky_type in ("PREETHAM", "HOSEK_WILKIE"):
-            x, y, z = node.sun_direction
-            elevation, azimuth = math.atan2(z, math.hypot(x, y)), math.atan2(y, x)
-            made["aerosol"] = max(0.04608 * node.turbidity - 0.04586, 0.0) / 0.55**1.3
-        else:
-            elevation, azimuth = node.sun_elevation, 0.5 * math.pi - node.sun_rotation
-            made |= {
-                "aerosol": min(0.1 * node.aerosol_density, 2.0), "altitude": node.altitude,
-                "ozone": min(300.0 * node.ozone_density, 1000.0),
-                "sun_scale": strength * SUN * node.sun_intensity if node.sun_disc else 0.0,
-            }  # fmt: skip
-        degrees = math.degrees(max(elevation, math.radians(-12.0))), math.degrees(azimuth)
-        return {**made, "sun_elevation": degrees[0], "sun_azimuth": degrees[1]}
-
-    def _sky(self, sky: Any) -> Json:
-        return {
-            "type": "sky", "sun_elevation": math.degrees(sky.elevation),
-            "sun_azimuth": math.degrees(sky.azimuth), "aerosol": sky.haze,
-            "altitude": sky.altitude, "ozone": sky.ozone, "ground": list(sky.ground),
-            "sky_scale": sky.strength, "sun_scale": sky.strength, "to_world": DOME,
-        }  # fmt: skip
-
-    def _dome(self, texture: Site, strength: float) -> Json | None:
-        """Return an image that is turned about z alone; None for other coordinates."""
-        node = texture.node
-        bitmap = None if node.image is None else self.image(node)
-        turn, (source, _) = Matrix.Identity(4), origin(texture.groups, node.inputs["Vector"])
-        if source is not None and source.node.type == "MAPPING":
-            mapping = source.node
-            angles, scale, move = (
-                list(mapping.inputs[key].default_value) for key in ("Rotation", "Scale", "Location")
-            )
-            free = any(s.is_linked for s in mapping.inputs if s.name != "Vector")
-            if free or any(angles[:2]) or any(move) or scale != [1.0] * 3:
-                return None
-            turn = Matrix.Rotation(angles[2], 4, "Z")
-            source = origin(source.groups, mapping.inputs["Vector"])[0]
-        own = source is None or (source.node.type, source.output) in WORLD_PLACES
-        if bitmap is None or not own or node.projection != "EQUIRECTANGULAR":
-            return None
-        place = turn.inverted() @ Matrix(DOME)
-        return {
-            "type": "envmap", "image": bitmap["image"], "scale": strength,
-            "to_world": [list(row) for row in place],
-        }  # fmt: skip
-
     def _camera(self) -> Json:
         source = self.depsgraph.scene.camera
         if source is None:
             self.tell("there is no camera; it stands at (7, -7, 5)")
-            return {"type": "perspective", "to_world": [
-                {"look_at": {"origin": [7, -7, 5], "target": [0, 0, 0], "up": [0, 0, 1]}}
-            ]}  # fmt: skip
+            return cameras.NOWHERE
         source = source.evaluated_get(self.depsgraph)
-        camera, matrix = source.data, source.matrix_world
-        rigid = Matrix.LocRotScale(*matrix.decompose()[:2], (1.0, 1.0, 1.0)) @ TO_CLPT
         window = source.calc_matrix_camera(self.depsgraph, x=self.width, y=self.height)
-        described: Json = {"near": camera.clip_start, "far": camera.clip_end}
-        if camera.type == "ORTHO":
-            half = 1.0 / window[0][0]
-            place = rigid @ Matrix.Diagonal((half, half, 1.0, 1.0))
-            described |= {"type": "orthographic"}
-        else:
-            if camera.type != "PERSP":
-                self.tell(f"the camera {camera.type.title()} is read as a perspective")
-            place = rigid
-            described |= {
-                "type": "perspective", "fov_axis": "x",
-                "fov": math.degrees(2.0 * math.atan(1.0 / window[0][0])),
-                "offset_x": 0.5 * window[0][2], "offset_y": -0.5 * window[1][2],
-            }  # fmt: skip
-            described |= lens(camera, matrix)
-            if camera.clpt.lens:
-                focus = described.get("focus_distance", camera.dof.focus_distance or 10.0)
-                described = measured.lens(camera.clpt, camera, focus)
-        return {**described, "to_world": [list(row) for row in place]}
-
-
-def lens(camera: bpy.types.Camera, matrix: Matrix) -> Json:
-    """Return what a camera at a place has for depth of field."""
-    if not camera.dof.use_dof:
-        return {}
-    focus = camera.dof.focus_distance
-    if camera.dof.focus_object is not None:
-        focus = (camera.dof.focus_object.matrix_world.translation - matrix.translation).length
-    radius = 0.5e-3 * camera.lens / camera.dof.aperture_fstop
-    return {"type": "thin_lens", "aperture_radius": radius, "focus_distance": focus}
+        described, lost = cameras.final(source, window)
+        if lost:
+            self.tell(lost)
+        return described
 
 
 def _slots(source: Any) -> list[Any]:
@@ -613,14 +409,12 @@ def _key(instance: bpy.types.DepsgraphObjectInstance) -> Key:
 def _moved(placed: tuple[Key, Matrix], poses: list[Pose]) -> Json:
     """Return where something is, and how it moves while the shutter is open."""
     key, matrix = placed
-    place: Json = {"to_world": [list(row) for row in matrix]}
+    place: Json = {"to_world": listed(matrix)}
     keys = [(time, there[key]) for time, there in poses if key in there]
     if len(keys) < 2 or all(there == matrix for _, there in keys):
         return place
     back = matrix.inverted_safe()
-    motion = [
-        {"time": time, "transform": [list(row) for row in there @ back]} for time, there in keys
-    ]
+    motion = [{"time": time, "transform": listed(there @ back)} for time, there in keys]
     return {**place, "motion": motion}
 
 

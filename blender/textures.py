@@ -8,6 +8,7 @@ where it has no counterpart, which is told.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from typing import Any
 
@@ -787,6 +788,21 @@ def _wavelength(tree: Any, at: Site) -> Value:
     return tree.g("convert", tree.stops(tree.input(at, 0), rows, 0), channels=3)
 
 
+def _table(tree: Any, at: Site) -> Value:
+    """The intensities of an IES file by direction: a lamp gets them, as a factor."""
+    node, tables = at.node, tree.tree.tables
+    if tables is None:
+        return tree.told(at, "IES Texture counts as 1", 1.0)
+    if node.inputs["Vector"].is_linked:
+        tree.tell("Vector of an IES Texture is left out")
+    text = node.ies.as_string() if node.mode == "INTERNAL" and node.ies is not None else ""
+    path = bpy.path.abspath(node.filepath)
+    if not text and not os.path.isfile(path):
+        return tree.told(at, f"the IES file {path!r} is missing: it counts as 1", 1.0)
+    tables.append(text or path)
+    return tree.input(at, "Strength")
+
+
 def _passed(key: int, text: str) -> Read:
     """Return a function that hands on an input, and tells why."""
 
@@ -829,7 +845,7 @@ TEXTURES: dict[str, Read] = {
     "LIGHT_FALLOFF": _passed(0, "Light Falloff is quadratic"),
     "SHADERTORGB": _zero("Shader to RGB is of EEVEE alone", 0.5),
     "SCRIPT": _zero("Open Shading Language is not read", 0.5),
-    "TEX_IES": _zero("IES Texture counts as 1", 1.0),
+    "TEX_IES": _table,
     "TEX_SKY": _zero("Sky Texture beside others is grey", 0.3),
     "TEX_POINTDENSITY": _zero("Point Density counts as 0"),
     "TEX_GABOR": _zero("Gabor Texture is grey", 0.5),

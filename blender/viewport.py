@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
 import traceback
 import weakref
@@ -12,10 +11,9 @@ from typing import Any, ClassVar
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
-from . import preferences, process, scenes
-from .nodes import Json
+from . import cameras, preferences, process, scenes
+from .graphs import Json
 
 LISTENS_EVERY = 0.02  # [s]
 Key = tuple[int, ...]  # of an object, its evaluated geometry, and what its materials read
@@ -77,30 +75,6 @@ class LiveWriter(scenes.Writer):
         return {}  # the viewport has one of its own
 
 
-def camera(context: Any) -> Json:
-    """Return the view of a 3D viewport as a camera; its width is all that the region shows."""
-    view, space = context.region_data, context.space_data
-    window, place = view.window_matrix, view.view_matrix.inverted()
-    described: Json = {"near": space.clip_start, "far": space.clip_end}
-    if view.is_perspective:
-        described |= {
-            "type": "perspective", "fov_axis": "x",
-            "fov": math.degrees(2.0 * math.atan(1.0 / window[0][0])),
-            "offset_x": 0.5 * window[0][2], "offset_y": -0.5 * window[1][2],
-        }  # fmt: skip
-        source = context.scene.camera
-        if view.view_perspective == "CAMERA" and source is not None:
-            described |= scenes.lens(source.data, place)
-    else:
-        depth = -2.0 / window[2][2]  # what is seen begins behind the view's place
-        near = (window[2][3] + 1.0) / window[2][2]
-        half = 1.0 / window[0][0]
-        middle = Matrix.Translation((-window[0][3] * half, -window[1][3] / window[1][1], -near))
-        place = place @ middle @ Matrix.Diagonal((half, half, 1.0, 1.0))
-        described = {"type": "orthographic", "near": 0.0, "far": depth}
-    return {**described, "to_world": [list(row) for row in place @ scenes.TO_CLPT]}
-
-
 class Viewport:
     """What a viewport shows. engine: Blender's, of this viewport."""
 
@@ -116,6 +90,8 @@ class Viewport:
         self.view: Json = {}
         self.serial = 0  # of the last change
         self.picture: np.ndarray | None = None  # (h, w, 4) float32, the bottom row first
+        self.corner = (0.0, 0.0)  # its lower left one, and
+        self.extent = (1.0, 1.0)  # how much of the region it covers, as shares of it
         self.shown = 0  # the change that it shows
         self.samples = 0  # of each of its pixels, 0 while it is coarse
         self.texture: Any = None
@@ -135,12 +111,18 @@ class Viewport:
             traceback.print_exc()
             self._tell(f"{type(error).__name__}: {error}")
             return
-        self.scene["settings"] = {"mode": settings.mode, "samples": settings.viewport_samples}
+        self.scene["settings"] = {
+            "mode": settings.mode, "samples": settings.viewport_samples,
+            "denoise": settings.viewport_denoise,
+        }  # fmt: skip
 
-    def draw(self, context: Any) -> None:
+    def draw(self, context: Any, depsgraph: bpy.types.Depsgraph) -> None:
         """Send the view if it is another one, and draw the last picture that has come."""
         changes: Json = {}
-        view = {"camera": camera(context), "size": [context.region.width, context.region.height]}
+        view = {
+            "camera": cameras.view(context), "crop": cameras.view_border(context, depsgraph),
+            "size": [context.region.width, context.region.height],
+        }  # fmt: skip
         if self.scene is not None:
             changes["scene"] = self.scene
         changes |= {name: value for name, value in view.items() if self.view.get(name) != value}
@@ -205,6 +187,7 @@ class Viewport:
             width, height = message["size"]
             self.picture = np.frombuffer(pixels, np.float32).reshape(height, width, 4)
             self.texture = None
+            self.corner, self.extent = message["corner"], message["extent"]
             self.shown, self.samples = message["serial"], message["samples"]
             if self.process is not None:
                 self.process.send({"seen": True})
@@ -234,7 +217,8 @@ class Viewport:
             self.texture = gpu.types.GPUTexture((width, height), format="RGBA16F", data=values)
         gpu.state.blend_set("ALPHA_PREMULT")
         self.engine.bind_display_space_shader(context.scene)
-        draw_texture_2d(self.texture, (0, 0), context.region.width, context.region.height)
+        whole = np.array([context.region.width, context.region.height])
+        draw_texture_2d(self.texture, tuple(whole * self.corner), *(whole * self.extent))
         self.engine.unbind_display_space_shader()
         gpu.state.blend_set("NONE")
 

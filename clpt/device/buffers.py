@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import io
 import weakref
@@ -13,7 +14,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from clpt.device import disk_cache
+from clpt.device import disk_cache, large_pages
 
 from ..errors import MemoryBudgetError
 from .context import Device
@@ -66,6 +67,11 @@ class Buffers:
         self.limit = device.free_memory() if limit is None else limit
         self._live: weakref.WeakSet[CountedBuffer] = weakref.WeakSet()
         self._most = 0  # that live buffers may take [bytes], counted again when it is too much
+
+    @functools.cached_property
+    def _own_queue(self) -> cl.CommandQueue:
+        """A queue for new buffers, which do not wait for the device's other work."""
+        return cl.CommandQueue(self.device.context, self.device.queue.device)
 
     @property
     def used(self) -> int:
@@ -134,13 +140,20 @@ class Buffers:
             self._most = self.used
             if nbytes > self.available:
                 raise MemoryBudgetError(name, nbytes, self.available, advice)
+        large = large_pages.pay(self.device.info.is_cpu, nbytes)
+        copied = None if large else host
         access = cl.mem_flags.READ_WRITE
-        if host is not None:
+        if copied is not None:
             access |= cl.mem_flags.COPY_HOST_PTR
         try:
             buffer = CountedBuffer(
-                self.device.context, access, size=0 if host is not None else nbytes, hostbuf=host
+                self.device.context,
+                access,
+                size=0 if copied is not None else nbytes,
+                hostbuf=copied,
             )
+            if large:
+                large_pages.ask(self._own_queue, buffer, host)
         except cl.Error as error:
             raise refused(name, error, nbytes, self.available, advice) from error
         self._live.add(buffer)

@@ -271,3 +271,59 @@ def test_a_transparent_film_has_alpha(tmp_path: Path) -> None:
         channels = images.read_channels(scene.render.filepath)
         alphas.append(next(v for name, v in channels.items() if name.endswith("A")).mean())
     assert 0.05 < alphas[1] < 0.5 and alphas[0] == pytest.approx(alphas[1], abs=0.005)
+
+
+def table() -> str:
+    """An IES file whose intensity differs by direction, smooth: engines blend it differently."""
+    down, around = np.arange(0, 181, 5), np.arange(0, 361, 15)
+    turn = np.radians(around)[:, None]
+    candela = 400.0 + 300.0 * np.cos(np.radians(down)) + 100.0 * np.sin(np.radians(down)) * (
+        np.cos(turn) + np.sin(2.0 * turn)
+    )  # fmt: skip
+    lines = [down, around, *np.round(candela, 2)]
+    head = "IESNA:LM-63-1995\nTILT=NONE\n1 1000 1 37 25 1 2 0 0 0\n1 1 10\n"
+    return head + "\n".join(" ".join(map(str, line)) for line in lines) + "\n"
+
+
+@pytest.mark.parametrize("kind", ["POINT", "SPOT"])
+def test_ies_textures_are_those_of_cycles(kind: str, tmp_path: Path) -> None:
+    """A turned lamp of other light to all sides, from a text and from a file; quarters to 2 %."""
+    floor_and_camera()
+    lamp = bpy.data.lights.new("lamp", kind)
+    lamp.energy, lamp.shadow_soft_size, lamp.use_nodes = 3.0, 0.0, True
+    if kind == "SPOT":
+        lamp.spot_size, lamp.spot_blend = 1.6, 0.5
+    node = lamp.node_tree.nodes.new("ShaderNodeTexIES")
+    node.inputs["Strength"].default_value = 2.0
+    glow = lamp.node_tree.nodes["Emission"]
+    glow.inputs["Color"].default_value = (1.0, 0.6, 0.3, 1.0)
+    lamp.node_tree.links.new(node.outputs[0], glow.inputs["Strength"])
+    link("lamp", lamp, (0.3, 0.2, 2.0), (0.2, 0.1, 0.5))
+    if kind == "POINT":
+        node.ies = bpy.data.texts.new("lamp.ies")
+        node.ies.write(table())
+    else:
+        (tmp_path / "lamp.ies").write_text(table())
+        node.mode, node.filepath = "EXTERNAL", str(tmp_path / "lamp.ies")
+    ours, cycles = (picture(engine, tmp_path) for engine in ("CLPT", "CYCLES"))
+    for rows in np.split(np.stack([ours, cycles]), 2, axis=1):
+        for quarter in np.split(rows, 2, axis=2):
+            mine, theirs = quarter.mean(axis=(1, 2))
+            assert mine == pytest.approx(theirs, rel=0.02)
+
+
+def test_a_panorama_is_that_of_cycles(tmp_path: Path) -> None:
+    """All directions in latitude and longitude, from a turned camera: means of quarters to 2 %."""
+    floor_and_camera()
+    lamp = bpy.data.lights.new("lamp", "POINT")
+    lamp.energy, lamp.shadow_soft_size = 100.0, 0.0
+    link("lamp", lamp, (1.5, -4.0, 3.0), (0.0, 0.0, 0.0))
+    camera = bpy.context.scene.camera
+    camera.data.type, camera.rotation_euler = "PANO", (1.2, 0.2, 0.6)
+    camera.data.shift_x = camera.data.shift_y = 0.0
+    camera.data.panorama_type = "EQUIRECTANGULAR"
+    ours, cycles = (picture(engine, tmp_path) for engine in ("CLPT", "CYCLES"))
+    for rows in np.split(np.stack([ours, cycles]), 2, axis=1):
+        for quarter in np.split(rows, 2, axis=2):
+            mine, theirs = quarter.mean(axis=(1, 2, 3))
+            assert mine == pytest.approx(theirs, rel=0.02, abs=1e-3)

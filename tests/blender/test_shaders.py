@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.blender.test_surfaces import pictures, registered, stage
+from tests.blender.test_surfaces import pictures, stage
 
 bpy: Any = pytest.importorskip("bpy")
 
-pytestmark = pytest.mark.slow
-__all__ = ["registered", "stage"]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("registered")]
+__all__ = ["stage"]
 COLOR = (0.8, 0.3, 0.1, 1.0)
 
 
@@ -68,13 +68,13 @@ def coated(tree: Any) -> Any:
 GLOW = one("Emission", Color=(0.2, 0.4, 0.9, 1.0), Strength=0.7)
 SHADERS: dict[str, tuple[Callable[[Any], Any], float]] = {
     "diffuse": (one("BsdfDiffuse", Color=COLOR), 0.01),
-    "rough diffuse": (one("BsdfDiffuse", Color=COLOR, Roughness=0.8), 0.1),
+    "rough diffuse": (one("BsdfDiffuse", Color=COLOR, Roughness=0.8), 0.04),
     "glossy": (one("BsdfAnisotropic", Color=COLOR, Roughness=0.3), 0.05),
     "stretched": (one("BsdfAnisotropic", Color=COLOR, Roughness=0.4, Anisotropy=0.5), 0.06),
     "brushed": (one("BsdfPrincipled", Metallic=1.0, Roughness=0.4, Anisotropic=0.8), 0.06),
     "metallic": (one("BsdfMetallic", Base_Color=COLOR, Roughness=0.3), 0.05),
     "conductor": (one("BsdfMetallic", fresnel_type="PHYSICAL_CONDUCTOR", Roughness=0.4), 0.06),
-    "sheen": (one("BsdfSheen", Color=COLOR), 0.3),
+    "sheen": (one("BsdfSheen", Color=COLOR), 0.06),
     "glass": (one("BsdfGlass", Color=(0.9, 1.0, 0.9, 1.0)), 0.05),
     "rough glass": (one("BsdfGlass", Roughness=0.4), 0.06),
     "refraction": (one("BsdfRefraction", IOR=1.3), 0.06),
@@ -85,12 +85,12 @@ SHADERS: dict[str, tuple[Callable[[Any], Any], float]] = {
     "metal": (one("BsdfPrincipled", Base_Color=COLOR, Metallic=1.0, Roughness=0.4), 0.05),
     "coat": (one("BsdfPrincipled", Base_Color=COLOR, Coat_Weight=1.0), 0.05),
     "alpha": (one("BsdfPrincipled", Base_Color=COLOR, Alpha=0.4), 0.03),
-    "film": (one("BsdfPrincipled", Base_Color=COLOR, Thin_Film_Thickness=300.0, Metallic=1.0), 0.2),
+    "film": (one("BsdfPrincipled", Base_Color=COLOR, Metallic=1, Thin_Film_Thickness=300.0), 0.06),
     "mixture": (mixed("MixShader", 0.3, one("BsdfDiffuse"), one("BsdfAnisotropic")), 0.04),
     "half there": (mixed("MixShader", 0.3, one("BsdfDiffuse"), one("BsdfTransparent")), 0.03),
     "glows too": (mixed("AddShader", 0.0, one("BsdfDiffuse"), GLOW), 0.02),
     "two sides": (facing, 0.03),
-    "coated": (coated, 0.1),
+    "coated": (coated, 0.03),
 }  # fmt: skip
 
 

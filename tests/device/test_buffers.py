@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
+import pyopencl as cl
 import pytest
 
-from clpt.device import Buffers
+from clpt.device import Buffers, large_pages
 from clpt.errors import MemoryBudgetError
 
 
@@ -60,3 +64,44 @@ def test_an_error_frees_what_was_allocated_before_it(device):
         buffers.allocate("second", 600)
     assert buffers.used == kept.size
     del held
+
+
+@pytest.mark.parametrize("without", [False, True])
+def test_a_large_array_comes_back(device, without, monkeypatch):
+    """Where a system has large pages, and where it has none."""
+    if without:
+        monkeypatch.setattr(large_pages, "pay", lambda *_: False)
+    buffers = Buffers(device)
+    array = np.arange(3 << 20, dtype=np.float32).reshape(3, -1)
+    buffer = buffers.upload("a", array[:, 1:])
+    np.testing.assert_array_equal(
+        buffers.download(buffer, array[:, 1:].shape, np.float32), array[:, 1:]
+    )
+    assert buffers.used == array[:, 1:].nbytes
+
+
+LARGE_PAGES = Path("/sys/kernel/mm/transparent_hugepage")
+
+
+@pytest.mark.skipif(not LARGE_PAGES.exists(), reason="large pages are Linux's")
+def test_a_large_buffer_of_a_processor_asks_for_large_pages(device):
+    if not device.info.is_cpu:
+        pytest.skip("large pages are for processors")
+    buffer = Buffers(device).allocate("a", 16 << 20)
+    flags = cl.map_flags.READ
+    view, _ = cl.enqueue_map_buffer(device.queue, buffer, flags, 0, buffer.size, np.uint8)
+    middle = view.ctypes.data + buffer.size // 2
+    assert "hg" in flags_of_memory(middle)
+    view.base.release(device.queue)
+
+
+def flags_of_memory(address: int) -> list[str]:
+    """The kernel's flags of the mapping that holds an address."""
+    inside = False
+    for line in Path("/proc/self/smaps").read_text().splitlines():
+        bounds = re.match(r"([0-9a-f]+)-([0-9a-f]+) ", line)
+        if bounds:
+            inside = int(bounds[1], 16) <= address < int(bounds[2], 16)
+        elif inside and line.startswith("VmFlags:"):
+            return line.split()[1:]
+    return []
