@@ -76,9 +76,10 @@ lint: $(VENV)/.dev
 	$(BIN)/mypy
 	$(BIN)/mypy --config-file= --strict --follow-imports=silent tests/typed_program.py
 
-# the extension, with all wheels: Blender installs it from disk
+# the extension, with all wheels: Blender installs it from disk. For another system:
+# make blender PLATFORM=windows-x64
 blender: $(VENV)/.run
-	$(BIN)/python packaging/blender_zip.py
+	$(BIN)/python packaging/blender_zip.py $(addprefix --platform ,$(PLATFORM))
 
 docs: $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build

@@ -33,6 +33,7 @@ DESKS = [(0.8, 2.4), (3.6, 5.2)], [(0.6, 1.4), (2.6, 3.4)], (0.68, 0.72)
 GREYS = {"floor": 0.2, "ceiling": 0.8, "walls": 0.5, "desk": 0.4}
 HEIGHT = 0.75  # of the map
 BOUNCES = 6
+STEP = 32  # of an interpolated map
 RANGE = 470.0  # nm of the film
 COARSE = "-ab 6 -ad 256 -as 64 -aa 0.2 -ar 64 -ds 0.2 -dj 0.7 -dc 1 -dt 0 -lw 1e-3 -lr 8"
 FINE = "-ab 6 -ad 1024 -as 256 -aa 0.1 -ar 128 -ds 0.1 -dj 0.7 -dc 1 -dt 0 -lw 1e-4 -lr 8"
@@ -123,10 +124,10 @@ def by_radiance(folder: Path, at: Floats, settings: str) -> tuple[Floats, float]
     return np.frombuffer(told.stdout).reshape(-1, 3)[:, 1].reshape(at.shape[:-1]), took
 
 
-def by_clpt(at: Floats, samples: int) -> tuple[Floats, Floats, float]:
+def by_clpt(at: Floats, samples: int, step: int = 1) -> tuple[Floats, Floats, float]:
     """Return irradiances (...), standard errors, and the processor time [s]."""
     began = time.process_time()
-    found = instruments.measure(scene(), "irradiance", at, samples=samples)
+    found = instruments.measure(scene(), "irradiance", at, samples=samples, interpolate=step)
     took = time.process_time() - began
     return found.values / RANGE, found.errors / RANGE, took
 
@@ -140,8 +141,11 @@ def error(values: Floats, reference: Floats) -> float:
 @click.option("--size", type=(int, int), default=(640, 480), show_default=True)
 @click.option("--reference", default=1 << 17, help="Samples of a point of the reference.")
 @click.option("--samples", default="32,128", show_default=True)
+@click.option("--interpolated", default="64,128,256", show_default=True, help="Samples, likewise.")
 @click.argument("folder", type=Path)
-def main(size: tuple[int, int], reference: int, samples: str, folder: Path) -> None:
+def main(
+    size: tuple[int, int], reference: int, samples: str, interpolated: str, folder: Path
+) -> None:
     """Print figures as JSON lines; FOLDER gets the room and the maps."""
     folder.mkdir(parents=True, exist_ok=True)
     at = points(*size)
@@ -155,11 +159,13 @@ def main(size: tuple[int, int], reference: int, samples: str, folder: Path) -> N
     ratio = pure / exact[::6, ::6]
     row = {"of": "rtrace without a cache over clpt", "mean": float(ratio.mean())}
     print(json.dumps({**row, "spread": float(ratio.std()), "seconds": round(took, 1)}), flush=True)
-    for count in map(int, samples.split(",")):
-        values, _, took = by_clpt(at, count)
-        np.save(folder / f"clpt_{count}.npy", values)
-        row = {"of": f"clpt, {count} samples", "error": error(values[some], exact)}
-        print(json.dumps({**row, "seconds": round(took, 1)}), flush=True)
+    runs = [(int(count), 1) for count in samples.split(",") if count]
+    runs += [(int(count), STEP) for count in interpolated.split(",") if count]
+    for count, step in runs:
+        values, _, took = by_clpt(at, count, step)
+        np.save(folder / f"clpt_{count}_{step}.npy", values)
+        row = {"of": f"clpt, {count} samples, step {step}", "error": error(values[some], exact)}
+        print(json.dumps({**row, "seconds": round(took, 2)}), flush=True)
     for settings in (COARSE, FINE):
         values, took = by_radiance(folder, at, settings)
         row = {"of": f"rtrace {settings}", "error": error(values[some], exact)}

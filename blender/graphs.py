@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 
 Json = dict[str, Any]
+TURN = 2.0 * math.pi
 LUMINANCE = (0.2126729, 0.7151522, 0.0721750)  # of linear Rec. 709, as Cycles has it
 COMPARED = ("value1", "value2", "in1", "in2")
 INPUTS: dict[str, tuple[str, ...]] = {  # of nodes that are called without names
@@ -78,6 +79,20 @@ def origin(groups: tuple[bpy.types.Node, ...], socket: Any) -> tuple[Site | None
         else:
             return Site(node, groups, output.identifier), output
     return None, socket
+
+
+def fixed_mapping(node: bpy.types.Node) -> tuple[list[float], list[float], list[float]] | None:
+    """Return where a Mapping node moves points, and how it turns and scales them.
+
+    None where that varies, and for nodes of another kind.
+    """
+    varies = any(s.is_linked for s in node.inputs if s.name != "Vector")
+    if node.type != "MAPPING" or node.vector_type != "POINT" or varies:
+        return None
+    move, angles, scale = (
+        list(node.inputs[key].default_value) for key in ("Location", "Rotation", "Scale")
+    )
+    return move, angles, scale
 
 
 class Value:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mathutils import Matrix
 
 from . import measured
-from .graphs import Json, Site, origin
+from .graphs import Json, Site, fixed_mapping, origin
 
 if TYPE_CHECKING:
     from .scenes import Writer
@@ -193,7 +193,7 @@ def _sky_texture(node: Any, strength: float) -> Json:
     if node.sky_type in ("PREETHAM", "HOSEK_WILKIE"):
         x, y, z = node.sun_direction
         elevation, azimuth = math.atan2(z, math.hypot(x, y)), math.atan2(y, x)
-        made["aerosol"] = max(0.04608 * node.turbidity - 0.04586, 0.0) / 0.55**1.3
+        made["aerosol"] = measured.haze(node.turbidity)
     else:
         elevation, azimuth = node.sun_elevation, 0.5 * math.pi - node.sun_rotation
         made |= {
@@ -220,15 +220,11 @@ def _dome(writer: Writer, texture: Site, strength: float) -> Json | None:
     bitmap = None if node.image is None else writer.image(node)
     turn, (source, _) = Matrix.Identity(4), origin(texture.groups, node.inputs["Vector"])
     if source is not None and source.node.type == "MAPPING":
-        mapping = source.node
-        angles, scale, move = (
-            list(mapping.inputs[key].default_value) for key in ("Rotation", "Scale", "Location")
-        )
-        free = any(s.is_linked for s in mapping.inputs if s.name != "Vector")
-        if free or any(angles[:2]) or any(move) or scale != [1.0] * 3:
+        fixed = fixed_mapping(source.node)
+        if fixed is None or any(fixed[1][:2]) or any(fixed[0]) or fixed[2] != [1.0] * 3:
             return None
-        turn = Matrix.Rotation(angles[2], 4, "Z")
-        source = origin(source.groups, mapping.inputs["Vector"])[0]
+        turn = Matrix.Rotation(fixed[1][2], 4, "Z")
+        source = origin(source.groups, source.node.inputs["Vector"])[0]
     own = source is None or (source.node.type, source.output) in WORLD_PLACES
     if bitmap is None or not own or node.projection != "EQUIRECTANGULAR":
         return None

@@ -61,13 +61,27 @@ def spectrum(text: str) -> Any:
     return float(text) if re.fullmatch(r"[\d.]+", text) else {"values": rows(text)}
 
 
+def _kelvin(text: str) -> float | None:
+    """Return the temperature that a text such as 3000 K names, None for others."""
+    found = re.fullmatch(r"\s*(\d+)\s*K\s*", text)
+    return None if found is None else float(found[1])
+
+
+def turbidity(haze: float) -> float:
+    """Return the turbidity of haze, an optical depth: Angstrom's coefficient, Preetham 1999."""
+    return (haze * 0.55**1.3 + 0.04586) / 0.04608
+
+
+def haze(turbidity: float) -> float:
+    """Return the optical depth of haze straight up at 550 nm, of a turbidity."""
+    return max(0.04608 * turbidity - 0.04586, 0.0) / 0.55**1.3
+
+
 def lamp(text: str, luminance: float) -> Json:
     """Return what a lamp emits: by a standard's name, in kelvin, typed, or by its data sheet."""
-    text = text.strip()
-    kelvin = re.fullmatch(r"(\d+)\s*K", text)
+    text, kelvin = text.strip(), _kelvin(text)
     if kelvin is not None:
-        return {"type": "blackbody", "kelvin": float(kelvin[1]), "normalised": True,
-                "scale": luminance}  # fmt: skip
+        return {"type": "blackbody", "kelvin": kelvin, "normalised": True, "scale": luminance}
     if text in LAMPS:
         return {"type": "illuminant", "name": text, "scale": luminance}
     table = np.array(rows(text))
@@ -152,6 +166,5 @@ def film(settings: Any) -> Json:
         made["sensor"] = settings.sensor
     white = settings.white_balance.strip()
     if white:
-        kelvin = re.fullmatch(r"(\d+)\s*K", white)
-        made["white_balance"] = white if kelvin is None else float(kelvin[1])
+        made["white_balance"] = _kelvin(white) or white
     return made

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from operator import attrgetter
 from typing import Any, ClassVar
 
 import bpy
@@ -51,51 +53,52 @@ def _named(name: str, names: tuple[str, ...], default: str = "", text: str = "")
     )  # fmt: skip
 
 
-def _number(name: str, default: float, least: float, most: float, text: str = "") -> Any:
+def _number(
+    name: str, default: float, least: float, most: float, text: str = "", **how: Any
+) -> Any:
     return bpy.props.FloatProperty(
-        name=name,
-        default=default,
-        min=least,
-        max=most,
-        description=text,
-        precision=3,
-        update=_tag,
-    )
+        name=name, default=default, min=least, max=most, description=text, precision=3,
+        **{"update": _tag, **how},
+    )  # fmt: skip
+
+
+def _count(name: str, default: int, least: int, most: int, text: str) -> Any:
+    return bpy.props.IntProperty(name=name, default=default, min=least, max=most, description=text)
+
+
+def _flag(name: str, text: str = "") -> Any:
+    return bpy.props.BoolProperty(name=name, description=text, update=_tag)
+
+
+def _text(name: str, text: str = "") -> Any:
+    return bpy.props.StringProperty(name=name, description=text, update=_tag)
+
+
+def _path(name: str) -> Any:
+    return bpy.props.StringProperty(name=name, subtype="FILE_PATH", update=_tag)
+
+
+def _choice(name: str, items: Any, text: str = "") -> Any:
+    return bpy.props.EnumProperty(name=name, items=items, description=text, update=_tag)
 
 
 class ClptSettings(bpy.types.PropertyGroup):
     """How a scene is rendered."""
 
-    mode: bpy.props.EnumProperty(name="Mode", items=MODES, default="spectral")
-    samples: bpy.props.IntProperty(
-        name="Samples", description="Paths of each pixel", default=128, min=1, max=1 << 20
-    )
-    denoise: bpy.props.BoolProperty(
-        name="Denoise", description="Take most of the noise from the finished picture"
-    )
-    noise: bpy.props.FloatProperty(
-        name="Noise Limit",
-        description="Pixels below this relative noise get no more samples; 0: no limit",
-        min=0.0,
-        max=1.0,
-        precision=3,
-    )
-    viewport_samples: bpy.props.IntProperty(
-        name="Viewport Samples", description="Paths of each pixel there", default=256, min=1,
-        max=1 << 20,
+    mode: _choice("Mode", MODES)
+    samples: _count("Samples", 128, 1, 1 << 20, "Paths of each pixel")
+    denoise: _flag("Denoise", "Take most of the noise from the finished picture")
+    noise: _number(
+        "Noise Limit", 0.0, 0.0, 1.0,
+        "Pixels below this relative noise get no more samples; 0: no limit",
     )  # fmt: skip
-    viewport_denoise: bpy.props.BoolProperty(
-        name="Viewport Denoise", description="Take most of the noise from pictures of viewports",
-        update=_tag,
-    )  # fmt: skip
-    bands: bpy.props.IntProperty(
-        name="Bands", description="Parts of the spectrum, each a pass of its radiance; 0: none",
-        min=0, max=64,
-    )  # fmt: skip
+    viewport_samples: _count("Viewport Samples", 256, 1, 1 << 20, "Paths of each pixel there")
+    viewport_denoise: _flag("Viewport Denoise", "Take most of the noise from viewports' pictures")
+    bands: _count("Bands", 0, 0, 64, "Parts of the spectrum, each a pass of its radiance; 0: none")
     first_band: _number("First Band", 400.0, 200.0, 2400.0, "Where the bands begin [nm]")
     last_band: _number("Last Band", 700.0, 300.0, 2500.0, "Where the bands end [nm]")
-    sensor: bpy.props.EnumProperty(name="Sensor", items=SENSORS)
-    sensor_file: bpy.props.StringProperty(name="Sensor File", subtype="FILE_PATH")
+    sensor: _choice("Sensor", SENSORS)
+    sensor_file: _path("Sensor File")
     white_balance: _named(
         "White Balance", measured.LAMPS, "", "A standard or 4000 K becomes white; empty: none"
     )
@@ -104,35 +107,23 @@ class ClptSettings(bpy.types.PropertyGroup):
 class ClptMaterial(bpy.types.PropertyGroup):
     """A surface by its substance, in place of the nodes."""
 
-    kind: bpy.props.EnumProperty(
-        update=_tag, name="Surface", items=SURFACES, description="What the surface is made of"
-    )
+    kind: _choice("Surface", SURFACES, "What the surface is made of")
     glass: _named("Glass", measured.GLASSES, "n-bk7", "A glass, a liquid or a crystal")
     metal: _named("Metal", measured.METALS, "gold", "Its measured index counts")
     roughness: _number("Roughness", 0.0, 0.0, 1.0)
-    absorption: bpy.props.StringProperty(
-        update=_tag, name="Absorption", description=f"[1/m] {TYPED}"
-    )
+    absorption: _text("Absorption", f"[1/m] {TYPED}")
     film_thickness: _number("Film", 0.0, 0.0, 1e5, "Thickness of a thin film [nm]; 0: none")
     film_ior: _number("Film IOR", 1.33, 1.0, 4.0)
     period: _number("Period", 1600.0, 100.0, 1e5, "From groove to groove [nm]")
     depth: _number("Depth", 150.0, 0.0, 1000.0, "Of a groove [nm]")
-    angle: bpy.props.FloatProperty(
-        update=_tag, name="Angle", subtype="ANGLE", description="From u to v"
-    )
-    spectrum: bpy.props.StringProperty(
-        update=_tag, name="Reflectance", description=f"A number; {TYPED}"
-    )
+    angle: _number("Angle", 0.0, -1e4, 1e4, "From u to v", subtype="ANGLE")
+    spectrum: _text("Reflectance", f"A number; {TYPED}")
     absorbed: _number("Absorbed", 450.0, 260.0, 800.0, "Wavelength that the dye takes most of [nm]")
     strength: _number("Strength", 0.8, 0.0, 1.0, "Share of the light there that it takes")
     emitted: _number("Emitted", 550.0, 300.0, 850.0, "Wavelength that it emits most of [nm]")
     quantum_yield: _number("Yield", 0.8, 0.0, 1.0, "Photons that come out of each")
-    file: bpy.props.StringProperty(update=_tag, name="File", subtype="FILE_PATH")
-    use_drops: bpy.props.BoolProperty(
-        update=_tag,
-        name="Drops Inside",
-        description="The inside is a fog of small balls, by Mie's theory",
-    )
+    file: _path("File")
+    use_drops: _flag("Drops Inside", "The inside is a fog of small balls, by Mie's theory")
     drops: _named("Of", ("water", *measured.GLASSES), "water", "What the drops are made of")
     radius: _number("Radius", 8.0, 0.01, 1000.0, "Of drops [micrometres]")
     spread: _number("Spread", 0.1, 0.001, 2.0, "Standard deviation of the radii's logarithm")
@@ -154,238 +145,111 @@ class ClptCamera(bpy.types.PropertyGroup):
     lens: _named("Lens", measured.LENSES, "", "A real lens, or its file; empty: the ideal one")
 
 
-def _turbidity(world: Any) -> float:
-    """Return the turbidity of the haze: Angstrom's coefficient after Preetham 1999."""
-    return (world.haze * 0.55**1.3 + 0.04586) / 0.04608
-
-
-def _set_turbidity(world: Any, value: float) -> None:
-    world.haze = max(0.04608 * value - 0.04586, 0.0) / 0.55**1.3
-
-
 class ClptWorld(bpy.types.PropertyGroup):
     """A clear sky by the physics of air."""
 
-    use_sky: bpy.props.BoolProperty(update=_tag, name="Clear Sky")
-    elevation: bpy.props.FloatProperty(
-        update=_tag, name="Sun Elevation", subtype="ANGLE", default=0.6, min=-0.2, max=1.5707
-    )
-    azimuth: bpy.props.FloatProperty(
-        update=_tag,
-        name="Sun Azimuth",
-        description="From +X toward +Y",
-        subtype="ANGLE",
-        min=-6.2831,
-        max=6.2831,
-    )
+    use_sky: _flag("Clear Sky")
+    elevation: _number("Sun Elevation", 0.6, -0.2, 1.5707, subtype="ANGLE")
+    azimuth: _number("Sun Azimuth", 0.0, -6.2831, 6.2831, "From +X toward +Y", subtype="ANGLE")
     haze: _number("Haze", 0.1, 0.0, 2.0, "Optical depth straight up at 550 nm")
     turbidity: bpy.props.FloatProperty(
         name="Turbidity", description="The same haze as in other skies", min=1.0, max=20.0,
-        get=_turbidity, set=_set_turbidity,
+        get=lambda world: measured.turbidity(world.haze),
+        set=lambda world, value: setattr(world, "haze", measured.haze(value)),
     )  # fmt: skip
     ozone: _number("Ozone", 300.0, 0.0, 1000.0, "Column of ozone [Dobson units]")
-    altitude: bpy.props.FloatProperty(
-        update=_tag, name="Altitude", unit="LENGTH", min=0.0, max=60000.0
-    )
+    altitude: _number("Altitude", 0.0, 0.0, 60000.0, unit="LENGTH")
     ground: bpy.props.FloatVectorProperty(
-        update=_tag, name="Ground", subtype="COLOR", default=(0.2, 0.2, 0.2), min=0.0, max=1.0
+        name="Ground", subtype="COLOR", default=(0.2, 0.2, 0.2), min=0.0, max=1.0, update=_tag
     )
-    strength: bpy.props.FloatProperty(update=_tag, name="Strength", default=1.0, min=0.0)
+    strength: _number("Strength", 1.0, 0.0, 3.4e38)
+
+
+Names = tuple[str, ...]
+
+
+def of_material(settings: Any) -> Names:
+    """Return the settings that matter to a material."""
+    drops = ("drops", "radius", "spread", "share") if settings.use_drops else ()
+    return ("kind", *FIELDS.get(settings.kind, ()), "use_drops", *drops)
 
 
 class Panel(bpy.types.Panel):
-    """A panel of this engine; `names` are the settings that it shows."""
+    """A panel of this engine.
+
+    owner: what has to be there, settings: what it shows, both by their places in the context; names
+    are the settings, or a function of them.
+    """
 
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     COMPAT_ENGINES: ClassVar = {"CLPT"}
-    names: ClassVar[tuple[str, ...]] = ()
-
-    @classmethod
-    def owner(cls, context: bpy.types.Context) -> Any:
-        return context.scene
+    owner: ClassVar[str] = "scene"
+    settings: ClassVar[str] = "scene.clpt"
+    names: ClassVar[Names | Callable[[Any], Names]] = ()
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return context.engine in cls.COMPAT_ENGINES and cls.owner(context) is not None
+        return context.engine in cls.COMPAT_ENGINES and attrgetter(cls.owner)(context) is not None
 
     @classmethod
-    def shown(cls, settings: Any) -> tuple[str, ...]:
-        return cls.names
-
-    @classmethod
-    def settings(cls, owner: Any) -> Any:
-        return owner.clpt
+    def shown(cls, context: Any) -> tuple[Any, Names]:
+        """Return settings, and the names of those that are shown."""
+        settings = attrgetter(cls.settings)(context)
+        return settings, cls.names(settings) if callable(cls.names) else cls.names
 
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
-        owner = self.owner(context)
-        settings = self.settings(owner)
-        for name in self.shown(settings):
+        settings, names = self.shown(context)
+        for name in names:
             if name == "lightgroup":
                 self.layout.prop_search(settings, name, context.view_layer, "lightgroups")
+            elif name == "lightgroups":
+                self._groups(context.view_layer)
             else:
                 self.layout.prop(settings, name)
-        for line in told.get(owner.name_full, ()):
+        for line in told.get(attrgetter(self.owner)(context).name_full, ()):
             self.layout.label(text=line, icon="INFO")
 
-
-class CLPT_PT_sampling(Panel):
-    """Samples and mode."""
-
-    bl_label = "Sampling"
-    bl_context = "render"
-    names = ("mode", "samples", "noise", "denoise", "viewport_samples", "viewport_denoise")
-
-
-class CLPT_PT_film(Panel):
-    """How the film sees wavelengths."""
-
-    bl_label = "Film Response"
-    bl_context = "render"
-    bl_options: ClassVar = {"DEFAULT_CLOSED"}
-    names = ("sensor", "sensor_file", "white_balance", "bands", "first_band", "last_band")
-
-
-class CLPT_PT_motion(Panel):
-    """Alpha of what is not covered, and blur of what moves: Blender's own settings."""
-
-    bl_label = "Alpha and Motion"
-    bl_context = "render"
-    names = (
-        "film_transparent", "use_motion_blur", "motion_blur_position", "motion_blur_shutter",
-    )  # fmt: skip
-
-    @classmethod
-    def settings(cls, owner: Any) -> Any:
-        return owner.render
-
-
-class CLPT_PT_passes(Panel):
-    """Passes for the compositor: Blender's own settings."""
-
-    bl_label = "Passes"
-    bl_context = "view_layer"
-    names = (
-        "use_pass_z", "use_pass_position", "use_pass_normal", "use_pass_uv",
-        "use_pass_diffuse_color", "use_pass_cryptomatte_object", "use_pass_cryptomatte_material",
-        "pass_cryptomatte_depth",
-    )  # fmt: skip
-
-    @classmethod
-    def settings(cls, owner: Any) -> Any:
-        return bpy.context.view_layer
-
-
-class CLPT_PT_lightgroups(Panel):
-    """Groups of lights, each with a pass: Blender's own list."""
-
-    bl_label = "Light Groups"
-    bl_context = "view_layer"
-    names = ("lightgroups",)
-
-    @classmethod
-    def settings(cls, owner: Any) -> Any:
-        return bpy.context.view_layer
-
-    def draw(self, context: bpy.types.Context) -> None:
-        row, layer, name = self.layout.row(), context.view_layer, "lightgroups"
+    def _groups(self, layer: bpy.types.ViewLayer) -> None:
+        """Show Blender's list of a view layer's light groups."""
+        row, name = self.layout.row(), "lightgroups"
         row.template_list("UI_UL_list", name, layer, name, layer, "active_lightgroup_index", rows=3)
         column = row.column(align=True)
         for what in ("add", "remove"):
             column.operator(f"scene.view_layer_{what}_lightgroup", icon=what.upper(), text="")
 
 
-class CLPT_PT_object(Panel):
-    """The light group of an object that emits."""
-
-    bl_label = "Light Group"
-    bl_context = "object"
-    names = ("lightgroup",)
-
-    @classmethod
-    def owner(cls, context: bpy.types.Context) -> Any:
-        return context.object
-
-    @classmethod
-    def settings(cls, owner: Any) -> Any:
-        return owner
-
-
-class CLPT_PT_world_group(CLPT_PT_object):
-    """The light group of a world."""
-
-    bl_context = "world"
-
-    @classmethod
-    def owner(cls, context: bpy.types.Context) -> Any:
-        return context.world
-
-
-class CLPT_PT_material(Panel):
-    """What a surface and its inside are made of, and what its nodes lose."""
-
-    bl_label = "Measured Surface"
-    bl_context = "material"
-
-    @classmethod
-    def owner(cls, context: bpy.types.Context) -> Any:
-        return context.material
-
-    @classmethod
-    def shown(cls, settings: Any) -> tuple[str, ...]:
-        drops = ("drops", "radius", "spread", "share") if settings.use_drops else ()
-        return ("kind", *FIELDS.get(settings.kind, ()), "use_drops", *drops)
-
-
-class CLPT_PT_camera(Panel):
-    """A real lens."""
-
-    bl_label = "Real Lens"
-    bl_context = "data"
-    names = ("lens",)
-
-    @classmethod
-    def owner(cls, context: bpy.types.Context) -> Any:
-        return context.camera
-
-
-class CLPT_PT_lamp(Panel):
-    """The spectrum of a lamp."""
-
-    bl_label = "Spectrum"
-    bl_context = "data"
-    names = ("spectrum",)
-
-    @classmethod
-    def owner(cls, context: bpy.types.Context) -> Any:
-        return context.light
-
-
-class CLPT_PT_world(Panel):
-    """The physical sky."""
-
-    bl_label = "Clear Sky"
-    bl_context = "world"
-    names = (
-        "use_sky", "elevation", "azimuth", "turbidity", "haze", "ozone", "altitude", "ground",
-        "strength",
-    )  # fmt: skip
-
-    @classmethod
-    def owner(cls, context: bpy.types.Context) -> Any:
-        return context.world
-
-
+ROWS: tuple[tuple[str, str, str, str, str, Any], ...] = (  # tab, label, owner, settings, names
+    ("sampling", "render", "Sampling", "scene", "scene.clpt",
+     ("mode", "samples", "noise", "denoise", "viewport_samples", "viewport_denoise")),
+    ("motion", "render", "Alpha and Motion", "scene", "scene.render",
+     ("film_transparent", "use_motion_blur", "motion_blur_position", "motion_blur_shutter")),
+    ("film", "render", "Film Response", "scene", "scene.clpt",
+     ("sensor", "sensor_file", "white_balance", "bands", "first_band", "last_band")),
+    ("passes", "view_layer", "Passes", "scene", "view_layer",
+     ("use_pass_z", "use_pass_position", "use_pass_normal", "use_pass_uv",
+      "use_pass_diffuse_color", "use_pass_cryptomatte_object", "use_pass_cryptomatte_material",
+      "pass_cryptomatte_depth")),
+    ("groups", "view_layer", "Light Groups", "scene", "view_layer", ("lightgroups",)),
+    ("object", "object", "Light Group", "object", "object", ("lightgroup",)),
+    ("material", "material", "Measured Surface", "material", "material.clpt", of_material),
+    ("lamp", "data", "Spectrum", "light", "light.clpt", ("spectrum",)),
+    ("camera", "data", "Real Lens", "camera", "camera.clpt", ("lens",)),
+    ("world", "world", "Clear Sky", "world", "world.clpt",
+     ("use_sky", "elevation", "azimuth", "turbidity", "haze", "ozone", "altitude", "ground",
+      "strength")),
+    ("world_group", "world", "Light Group", "world", "world", ("lightgroup",)),
+)  # fmt: skip
+KEYS = "bl_context", "bl_label", "owner", "settings", "names"
+PANELS = tuple(
+    type(f"CLPT_PT_{name}", (Panel,), dict(zip(KEYS, row, strict=True))) for name, *row in ROWS
+)
+PANELS[2].bl_options = {"DEFAULT_CLOSED"}  # the film's
 GROUPS = {
     "Scene": ClptSettings, "Material": ClptMaterial, "Light": ClptLamp, "World": ClptWorld,
     "Camera": ClptCamera,
 }  # fmt: skip
-PANELS = (
-    CLPT_PT_sampling, CLPT_PT_motion, CLPT_PT_film, CLPT_PT_passes, CLPT_PT_lightgroups,
-    CLPT_PT_object, CLPT_PT_material, CLPT_PT_lamp, CLPT_PT_camera, CLPT_PT_world,
-    CLPT_PT_world_group,
-)  # fmt: skip
 
 
 def register() -> None:

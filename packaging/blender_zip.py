@@ -23,7 +23,10 @@ TAGS = {
     + ["manylinux2014_x86_64"],
     "windows-x64": ["win_amd64"],
     "macos-arm64": [f"macosx_{major}_0_arm64" for major in (14, 13, 12, 11)],
+    "macos-x64": [f"macosx_{version}_x86_64" for version in ("11_0", "10_15", "10_13", "10_9")],
 }
+# that packages ask for on other systems: pip asks which system it runs on, not which is wanted
+FURTHER = {"windows-x64": ["colorama"]}
 
 
 def pip(*words: str) -> bool:
@@ -41,7 +44,7 @@ def wheels(platform: str, extras: str = "") -> tuple[list[Path], list[str]]:
     built = pip("wheel", "--no-deps", "--wheel-dir", str(folder), str(ROOT))
     tags = [word for tag in TAGS[platform] for word in ("--platform", tag)]
     where = ["--dest", str(folder), "--find-links", str(folder), "--only-binary", ":all:"]
-    own = [f"{file}{extras}" for file in folder.glob("clpt-*.whl")]
+    own = [f"{file}{extras}" for file in folder.glob("clpt-*.whl")] + FURTHER.get(platform, [])
     loaded = built and pip("download", *own, *where, *tags, "--python-version", PYTHON)
     found = {plain(file.name.split("-")[0]): file for file in sorted(folder.glob("*.whl"))}
     missing = [] if loaded else [name for name in needed() if name not in found]

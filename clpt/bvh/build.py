@@ -267,7 +267,7 @@ class Runs:
 
 
 def build_parts(
-    device: Device,
+    building: Building,
     vertices: Array,
     faces: NDArray,
     tags: NDArray,
@@ -277,11 +277,11 @@ def build_parts(
 ) -> tuple[Bvh, NDArray[np.uint32]]:
     """Build a tree for each run of triangles, in shared buffers.
 
-    Returns the trees, and the offsets of their nodes and leaves, (n, 2) uint32 [32 bytes]. Other
-    parameters and errors: see `build`.
+    building: for the whole. Returns the trees, and the offsets of their nodes and leaves, (n, 2)
+    uint32 [32 bytes]. Other parameters and errors: see `build`.
     """
     start = time.perf_counter()
-    trees, building = [], Building(device)
+    trees = []
     for (i, j), rows in zip(pairwise(runs.firsts), chain(runs.keys, repeat(1)), strict=False):
         if rows > 1 and runs.corners is not None:
             _check_reach(runs.corners, "a vertex")

@@ -54,12 +54,13 @@ def _source(root: str) -> Source:
 class Building:
     """A build on a device. Programs and kernels are created once a context.
 
-    stream: for all commands, by default a new stream of the device's queue.
+    stream: for all commands, by default a new stream of the device's queue. limit: of its buffers
+    [bytes], by default the device's free memory.
     """
 
-    def __init__(self, device: Device, stream: Stream | None = None):
+    def __init__(self, device: Device, stream: Stream | None = None, limit: int | None = None):
         self.device = device
-        self.buffers = Buffers(device)
+        self.buffers = Buffers(device, limit)
         self.stream: Stream = stream or Stream(device.queue)
         self.grain = FEW if device.info.is_cpu else MANY
         self._programs: dict[str, Program] = {}

@@ -41,6 +41,11 @@ if TYPE_CHECKING:
     help="Stop when all standard errors are at most this share of the value, such as 0.01.",
 )  # fmt: skip
 @click.option(
+    "--interpolate", type=click.IntRange(1), default=1, metavar="TEXELS",
+    help="Of --texels: the widest step between measured texels; others are interpolated where "
+    "light is smooth.",
+)  # fmt: skip
+@click.option(
     "--bands", type=click.IntRange(1, 1000), default=47, show_default=True,
     help="Of spectral quantities, over the wavelengths of the scene's film.",
 )  # fmt: skip
@@ -69,6 +74,8 @@ def measure(
     """
     if (points is None) == (texels is None):
         raise click.UsageError("Give --at FILE.csv or --texels NAME.")
+    if how["interpolate"] > 1 and texels is None:
+        raise click.UsageError("--interpolate is for maps: give --texels NAME.")
     locate(scene)
     from .. import formats, instruments
     from ..files import output_files

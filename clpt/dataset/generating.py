@@ -25,6 +25,7 @@ from clpt.dataset.truth import Truth, ground_truth, truth_scene
 from clpt.dataset.writers import WRITERS, Writer
 from clpt.errors import ClptError, SceneError, UnknownKindError
 from clpt.files import output_files
+from clpt.render.film_renderer import maker_of
 from clpt.render.flow.scene_to_tables import lower
 from clpt.render.options import RenderOptions
 from clpt.render.records import Features
@@ -192,10 +193,13 @@ class Renderers:
             self.open[0].update(scene=scene)
         else:
             self.open.append(Renderer(scene, self.device, **self.options))
+            maker_of(self.open[0]).home.keep_forms()
 
     def _for_truth(self, scene: Scene) -> Renderer:
         if len(self.open) == 1:
-            self.open.append(Renderer(truth_scene(scene), self.open[0].device))
+            light = self.open[0]
+            self.open.append(Renderer(truth_scene(scene), light.device, beside=light))
+            maker_of(self.open[1]).home.beside = maker_of(light).home
         return self.open[1]
 
 

@@ -178,9 +178,16 @@ class BoundKernel:
         """Drop the references to buffers; the driver keeps them until its commands end."""
         self._values.clear()
 
+    def forget(self) -> None:
+        """Drop the references to buffers, and let the next `bind` set every argument."""
+        self._values.clear()
+        self._numbers.clear()
+
     def set_args(self, **named: Any) -> None:
         """Set arguments by name. Raises TypeError like `Kernel.bind`."""
         for name, new in named.items():
+            if isinstance(new, cl.Buffer) and self._values.get(name) is new:
+                continue
             number = isinstance(new, (int, float, tuple))
             if number and type(new) is type(old := self._numbers.get(name)) and new == old:
                 continue  # setting a number takes longer than enqueueing a kernel

@@ -20,7 +20,7 @@ from clpt.arrays import Floats, Floats32
 from clpt.scene import insides
 from clpt.scene import materials as m
 from clpt.scene.params import fields_of, params
-from clpt.scene.roles import REAL
+from clpt.scene.roles import REAL, REFLECTANCE
 from clpt.scene.textures import Bitmap, Checkerboard, Mix
 from clpt.scene.values import IndexLike, SpectrumLike, Texture, Textured, TexturedNumber
 from clpt.spectra import RGBUnbounded, Spectrum, cie
@@ -234,18 +234,43 @@ def _under_gloss(
     material: m.Plastic | m.RoughPlastic, roughness: TexturedNumber, warn: Warn
 ) -> Surface:
     warn(f"OpenPBR approximates {material.kind}")
+    color, index = material.diffuse_reflectance, _relative(material.int_ior, material.ext_ior)
+    if material.nonlinear:
+        color = _saturated(color, dispersion(index)[0], warn)
     return Surface(
         m.Openpbr(
             base_weight=1.0,
-            base_color=material.diffuse_reflectance,
+            base_color=color,
             specular_color=material.specular_reflectance,
-            specular_ior=_relative(material.int_ior, material.ext_ior),
+            specular_ior=index,
             specular_roughness=roughness,
         )
     )
 
 
-def _fresnel(eta: Floats, k: Floats, cosine: float) -> Floats:
+def _saturated(color: Textured, index: float, warn: Warn) -> Textured:
+    """Return what leaves a coat of a base's color, with all reflections between them.
+
+    Of diffuse light within, the share F = 1 - (1 - F outside) / index^2 is reflected at the coat.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(32)
+    cosines = 0.5 * (nodes + 1.0)
+    outside = (weights * cosines * _fresnel(np.array(index), np.array(0.0), cosines)).sum()
+    back = 1.0 - (1.0 - outside) / index**2
+
+    def leaving(albedo: Floats) -> Floats:
+        return albedo * (1.0 - back) / (1.0 - albedo * back)
+
+    if isinstance(color, Bitmap):
+        pixels = leaving(np.clip(color.pixels(REFLECTANCE), 0.0, 1.0)).astype(np.float32)
+        return dataclasses.replace(color, image=pixels, raw=True)
+    if isinstance(color, Texture):
+        warn("that reflections within a coat saturate a pattern")
+        return color
+    return _color(leaving(rgb(color, "reflectance")))
+
+
+def _fresnel(eta: Floats, k: Floats, cosine: float | Floats) -> Floats:
     """Return the reflectance of a conductor by its index eta + i k."""
     sine2, n2, k2 = 1.0 - cosine * cosine, eta * eta, k * k
     inner = n2 - k2 - sine2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import logging
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from clpt.arrays import Floats, whole
 from clpt.errors import SceneError
 from clpt.geometry.triangles import triangulate
-from clpt.instruments.measuring import LIFT, Measurement, measure
+from clpt.instruments.interpolation import Surface
+from clpt.instruments.measuring import LIFT, Measurement, Meter, measure
 from clpt.instruments.quantities import QUANTITIES
 from clpt.render.options import check_scene
 from clpt.scene import Scene
@@ -22,7 +23,7 @@ from clpt.scene.shapes import Shape
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from clpt.instruments.measuring import MeasureOptions
+    from clpt.instruments.measuring import MeasureOptions, MeterOptions
 
 log = logging.getLogger(__name__)
 
@@ -104,7 +105,7 @@ def bake(
     quantity: one at points, see `QUANTITIES`: of the hemisphere of the surface's normal, or of the
     whole sphere just above it. name, size: see `texels`; padding: see `Texels.picture`. Values and
     errors (h, w), or (h, w, bands), are NaN where nothing of the surface is. options: see
-    `measure`, which raises the other errors.
+    `measure`, which raises the other errors; with `interpolate` most texels are interpolated.
     """
     check_scene(scene)
     if quantity in QUANTITIES and QUANTITIES[quantity].at != "points":
@@ -112,7 +113,15 @@ def bake(
     at = texels(scene, name, size)
     lifted = quantity in QUANTITIES and QUANTITIES[quantity].everywhere
     points = at.points + 2.0 * LIFT * at.normals if lifted else at.points
-    measured = measure(scene, quantity, points, at.normals, **options)
+    step = whole(options.pop("interpolate", 1), 1, where="interpolate")
+    if step == 1:
+        measured = measure(scene, quantity, points, at.normals, **options)
+    else:
+        pictures = at.picture(points, 0), at.picture(at.normals, 0)
+        surface = Surface(*pictures, at.covered)
+        meter = Meter(scene, quantity, **cast("MeterOptions", options))
+        measured = meter.measure_map(surface, step)
+        measured = dataclasses.replace(measured.at(at.covered), measured=measured.measured)
     return dataclasses.replace(
         measured,
         values=at.picture(measured.values, padding),

@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt import device as dev
-from clpt.arrays import Floats, Image, vectors
+from clpt.arrays import Floats, Image, Integers, vectors, whole
 from clpt.errors import SceneError, UnknownKindError
+from clpt.instruments.interpolation import TOLERANCE, Surface, interpolated
 from clpt.instruments.quantities import QUANTITIES, Quantity
 from clpt.render.options import RenderOptions, check_scene
 from clpt.render.renderer import Renderer
@@ -46,7 +47,7 @@ class Measurement:
     values, errors: (...) as the points or directions are, float64; spectral quantities have an axis
     of bands behind, `tristimulus` has X, Y, Z. The color of darkness is NaN.
     unit: of both. wavelengths: middles of the bands (bands,) [nm], or None.
-    samples: paths of each entry.
+    samples: paths of each entry. measured: which entries were, where others are interpolated.
     """
 
     quantity: str
@@ -55,6 +56,7 @@ class Measurement:
     errors: Floats
     samples: int
     wavelengths: Floats | None = None
+    measured: NDArray[np.bool_] | None = None
 
     @property
     def relative_error(self) -> float:
@@ -64,16 +66,24 @@ class Measurement:
 
     def at(self, entries: NDArray[np.bool_]) -> Measurement:
         """Return what some of the entries (...) measure, (n,)."""
-        return dataclasses.replace(self, values=self.values[entries], errors=self.errors[entries])
+        measured = None if self.measured is None else self.measured[entries]
+        values, errors = self.values[entries], self.errors[entries]
+        return dataclasses.replace(self, values=values, errors=errors, measured=measured)
 
 
-class MeasureOptions(RenderOptions, total=False):
-    """Options of `measure`, whose docstring has their meaning."""
+class MeterOptions(RenderOptions, total=False):
+    """Options of a `Meter`."""
 
     samples: int
     error: float | None
     bands: int
     device: dev.Device | str | int | None
+
+
+class MeasureOptions(MeterOptions, total=False):
+    """Options of `measure`, whose docstring has their meaning."""
+
+    interpolate: int
 
 
 def measure(
@@ -84,6 +94,7 @@ def measure(
     *,
     samples: int = 4096,
     error: float | None = None,
+    interpolate: int = 1,
     bands: int = 47,
     device: dev.Device | str | int | None = None,
     **options: Unpack[RenderOptions],
@@ -92,42 +103,96 @@ def measure(
 
     quantity: a name in `QUANTITIES`. at: points (..., 3) [m]. directions: the points' normals, or
     those in which rays go from them; (..., 3), or one for all. samples: paths of each entry, at
-    most. error: stop when each standard error is at most this share of its value. bands: of
-    spectral quantities. device, options: see `clpt.Renderer`. The scene's camera is not used; its
-    film has the range of wavelengths.
+    most. error: stop when each standard error is at most this share of its value. interpolate: of
+    a map of points (h, w, 3), the widest step between measured points; see `interpolated`. bands:
+    of spectral quantities. device, options: see `clpt.Renderer`. The scene's camera is not used;
+    its film has the range of wavelengths.
 
     Raises UnknownKindError for a quantity, SceneError for points that cannot be used, and as
     `clpt.Renderer` does.
     """
-    check_scene(scene)
-    if quantity not in QUANTITIES:
-        raise UnknownKindError("quantity", quantity, QUANTITIES)
-    if error is not None and not error > 0.0:
-        raise SceneError(f"must be above 0, not {error!r}", where="error")
+    step = whole(interpolate, 1, where="interpolate")
+    meter = Meter(scene, quantity, samples=samples, error=error, bands=bands, device=device,
+                  **options)  # fmt: skip
     points = vectors(np.atleast_2d(at), "at")
     toward = np.broadcast_to(vectors(np.atleast_2d(directions), "directions"), points.shape)
-    rows = points.reshape(-1, 3), toward.reshape(-1, 3)
-    instrument = photometer(scene, QUANTITIES[quantity], *rows, bands=bands)
-    with Renderer(instrument, device, **options) as renderer:
-        return _read(renderer, quantity, points.shape[:-1], samples, error)
+    if step == 1:
+        return meter.measure(points, toward)
+    if points.ndim != 3:
+        message = f"needs points of a map, (h, w, 3), not of shape {points.shape}"
+        raise SceneError(message, where="interpolate")
+    return meter.measure_map(Surface(points, toward, np.ones(points.shape[:2], bool)), step)
 
 
-def _read(
-    renderer: Renderer, quantity: str, shape: tuple[int, ...], samples: int, error: float | None
-) -> Measurement:
-    """Add samples until the errors are small enough, and return what an instrument measures."""
-    count = math.prod(shape)
-    turns = len(AXES) if QUANTITIES[quantity].everywhere else 1
-    most = max(1, math.ceil(samples / (REPLICAS * turns)))
-    step = most if error is None else min(most, FIRST_SAMPLES)
-    while True:
-        renderer.run(step)
-        pixels = _pixels(renderer.image(), turns, count)
-        measured = _measured(quantity, pixels, renderer.scene.film, shape)
-        measured = dataclasses.replace(measured, samples=renderer.samples * REPLICAS * turns)
-        step = min(renderer.samples, most - renderer.samples)
-        if step <= 0 or (error is not None and measured.relative_error <= error):
-            return measured
+class Meter:
+    """Measures a quantity at points of a scene; parameters: see `measure`."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        quantity: str,
+        *,
+        samples: int = 4096,
+        error: float | None = None,
+        bands: int = 47,
+        device: dev.Device | str | int | None = None,
+        **options: Unpack[RenderOptions],
+    ):
+        check_scene(scene)
+        if quantity not in QUANTITIES:
+            raise UnknownKindError("quantity", quantity, QUANTITIES)
+        if error is not None and not error > 0.0:
+            raise SceneError(f"must be above 0, not {error!r}", where="error")
+        self.scene, self.quantity, self.kind = scene, quantity, QUANTITIES[quantity]
+        self.samples, self.error, self.bands = samples, error, bands
+        self.device, self.options = device, options
+
+    def measure(self, points: Floats, directions: Floats, seed: int | None = None) -> Measurement:
+        """Return values at points (..., 3); seed: in place of the scene's."""
+        scene = self.scene if seed is None else dataclasses.replace(self.scene, seed=seed)
+        rows = points.reshape(-1, 3), directions.reshape(-1, 3)
+        instrument = photometer(scene, self.kind, *rows, bands=self.bands)
+        with Renderer(instrument, self.device, **self.options) as renderer:
+            return self._read(renderer, points.shape[:-1])
+
+    def measure_map(self, surface: Surface, step: int) -> Measurement:
+        """Return values of a map (h, w), most of them interpolated; step: see `measure`.
+
+        Raises SceneError for quantities along rays, and for those that are not linear in light.
+        """
+        if self.kind.at == "rays" or not self.kind.linear:
+            why = "is measured along rays" if self.kind.at == "rays" else "is not linear in light"
+            raise SceneError(f"{self.quantity} {why}", where="interpolate")
+        parts: list[Measurement] = []
+
+        def look(rows: Integers, columns: Integers) -> tuple[Floats, Floats]:
+            seed = (self.scene.seed + len(parts)) % 2**32  # each look is independent
+            part = self.measure(surface.points[rows, columns], surface.normals[rows, columns], seed)
+            parts.append(part)
+            return part.values.reshape(len(rows), -1), part.errors.reshape(len(rows), -1)
+
+        tolerance = TOLERANCE if self.error is None else self.error
+        values, errors, measured = interpolated(surface, look, step, tolerance)
+        form = (*measured.shape, *parts[0].values.shape[1:])
+        return dataclasses.replace(
+            parts[0], values=values.reshape(form), errors=errors.reshape(form), measured=measured,
+            samples=max(part.samples for part in parts),
+        )  # fmt: skip
+
+    def _read(self, renderer: Renderer, shape: tuple[int, ...]) -> Measurement:
+        """Add samples until the errors are small enough; return what an instrument measures."""
+        count, error = math.prod(shape), self.error
+        turns = len(AXES) if self.kind.everywhere else 1
+        most = max(1, math.ceil(self.samples / (REPLICAS * turns)))
+        step = most if error is None else min(most, FIRST_SAMPLES)
+        while True:
+            renderer.run(step)
+            pixels = _pixels(renderer.image(), turns, count)
+            measured = _measured(self.quantity, pixels, renderer.scene.film, shape)
+            measured = dataclasses.replace(measured, samples=renderer.samples * REPLICAS * turns)
+            step = min(renderer.samples, most - renderer.samples)
+            if step <= 0 or (error is not None and measured.relative_error <= error):
+                return measured
 
 
 def _pixels(image: Image, turns: int, count: int) -> Floats:

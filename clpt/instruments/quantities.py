@@ -40,6 +40,11 @@ class Quantity:
     everywhere: bool = False
     color: Callable[[Floats], Floats] | None = None
 
+    @property
+    def linear(self) -> bool:
+        """Whether the value of mixed light is the mixture of values."""
+        return self.color is None or self.color is color.tristimulus
+
     def film(self, film: Film, bands: int) -> Film:
         """Return a film that measures it; bands: of a spectral quantity."""
         film = dataclasses.replace(

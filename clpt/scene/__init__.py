@@ -149,9 +149,10 @@ class Scene:
         listed = [subject] if trimeshes.is_mesh(subject) else _listed(subject, "shapes")
         shown: list[Shape] = []
         for i, part in enumerate(listed):
-            if trimeshes.is_mesh(part):
-                part = shapes.Mesh.from_trimesh(part)
-            _check_kind(part, Shape, f"shapes[{i}]")
+            if not isinstance(part, Shape):
+                if trimeshes.is_mesh(part):
+                    part = shapes.Mesh.from_trimesh(part)
+                _check_kind(part, Shape, f"shapes[{i}]")
             shown.append(part)
         parts = studio.parts(shown, camera=camera, own_lights=lights, up=up)
         return cls(**parts, name=name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, ClassVar, TypeVar, cast
@@ -68,9 +68,16 @@ class Shape(Kind):
 
     def placed(self: ShapeKind, to_world: ArrayLike) -> ShapeKind:
         """Return the shape with another `to_world`, (4, 4); no other parameter is checked again."""
-        other = object.__new__(type(self))
-        vars(other).update(vars(self), to_world=in_memory(to_world))
-        return other
+        return self.placed_at([in_memory(to_world)])[0]
+
+    def placed_at(self: ShapeKind, to_worlds: Iterable[ArrayLike]) -> list[ShapeKind]:
+        """Return the shape at each of `to_worlds`, (4, 4) in memory, as `placed` does."""
+        kind, parameters, copies = type(self), vars(self), []
+        for to_world in to_worlds:
+            other = object.__new__(kind)
+            vars(other).update(parameters, to_world=to_world)
+            copies.append(other)
+        return copies
 
     material: Material = host(Diffuse(), "of the surface", form="material")
     emission: PoweredLamp | None = host(None, "an `area` light, or None", form="area_light")

@@ -45,9 +45,11 @@ def framing_camera(
     upward = transforms.transform_vectors(up, top)
     view = transforms.look_at(direction(from_, up), np.zeros(3), upward)[:3, :3]
     all_seen = 1.5 * radius
-    for points in _outlines(scene_shapes):
+    half_picture = np.tan(np.radians(FOV / 2.0))
+    sides = [side * view[:, axis] / half_picture for axis in (0, 1) for side in (-1.0, 1.0)]
+    for points in _outlines(scene_shapes, np.array(sides) - view[:, 2]):
         local = (points - centre) @ view
-        aside = np.abs(local[:, :2]).max(axis=1) / np.tan(np.radians(FOV / 2.0))
+        aside = np.abs(local[:, :2]).max(axis=1) / half_picture
         all_seen = max(all_seen, MARGIN * float(np.max(aside - local[:, 2])))
     origin = centre + distance * all_seen * direction(from_, up)
     return Perspective(
@@ -69,7 +71,9 @@ def world_bounds(
     boxes = [
         shape_bounds(shape) for shape in scene_shapes if not isinstance(shape, shapes.Instance)
     ]
-    boxes += [(points.min(axis=0), points.max(axis=0)) for points in _instance_points(scene_shapes)]
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    for points in _instance_points(scene_shapes, axes):
+        boxes.append((points.min(axis=0), points.max(axis=0)))
     if not boxes:
         boxes = [(-np.ones(3), np.ones(3))]
     return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
@@ -103,31 +107,58 @@ def shape_bounds(shape: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.f
     return points.min(axis=0) - reach, points.max(axis=0) + reach
 
 
-def _outlines(scene_shapes: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
-    """Yield for each shape points (n, 3) in world space whose hull contains it."""
+def _outlines(
+    scene_shapes: Sequence[shapes.Shape], directions: NDArray[np.float64]
+) -> Iterator[NDArray[np.float64]]:
+    """Yield points (n, 3) in world space; no shape reaches farther along any direction (k, 3)."""
     for shape in scene_shapes:
-        if isinstance(shape, shapes.Mesh):
-            yield transforms.transform_points(np.asarray(shape.to_world), shape.vertices)
-        elif not isinstance(shape, shapes.Instance):
-            yield _box_corners(*shape_bounds(shape))
-    yield from _instance_points(scene_shapes)
+        if not isinstance(shape, shapes.Instance):
+            yield _hull(shape)
+    yield from _instance_points(scene_shapes, directions)
 
 
-def _instance_points(scene_shapes: Sequence[shapes.Shape]) -> Iterator[NDArray[np.float64]]:
-    """Yield points (n, 3) whose hull contains instances: of groups, or of boxes for very many."""
+def _hull(shape: shapes.Shape) -> NDArray[np.float64]:
+    """Return points (n, 3) in world space whose hull contains a shape, no instance."""
+    if isinstance(shape, shapes.Mesh):
+        return transforms.transform_points(np.asarray(shape.to_world), shape.vertices)
+    return _box_corners(*shape_bounds(shape))
+
+
+def _instance_points(
+    scene_shapes: Sequence[shapes.Shape], directions: NDArray[np.float64]
+) -> Iterator[NDArray[np.float64]]:
+    """Yield points (n, 3) as `_outlines` does, of instances; of boxes of groups for very many."""
     instances: dict[int, list[shapes.Instance]] = {}
     for shape in scene_shapes:
         if isinstance(shape, shapes.Instance) and shape.group.shapes:
             instances.setdefault(id(shape.group), []).append(shape)
     for placed in instances.values():
-        matrices = np.stack([np.asarray(shape.to_world, np.float64)[:3] for shape in placed])
-        points = np.concatenate(list(_outlines(placed[0].group.shapes)))
+        matrices = np.array([shape.to_world for shape in placed], np.float64)[:, :3]
+        points = np.concatenate([_hull(shape) for shape in placed[0].group.shapes])
+        matrices = matrices[_may_be_outermost(matrices, points, directions)]
         if len(points) * len(matrices) > EXACT:
             points = _box_corners(points.min(axis=0), points.max(axis=0))
         step = max(CHUNK // len(points), 1)
         for first in range(0, len(matrices), step):
             part = matrices[first : first + step]
             yield (points @ part[:, :, :3].transpose(0, 2, 1) + part[:, None, :, 3]).reshape(-1, 3)
+
+
+def _may_be_outermost(
+    matrices: NDArray[np.float64], points: NDArray[np.float64], directions: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Return which matrices (n, 3, 4) may move points (m, 3) farthest along a direction (k, 3).
+
+    Points reach at least as far as their mean does, and no farther than their box does.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    along = directions @ matrices  # (n, k, 4): a row is linear in the coordinates of a point
+    least = along[:, :, :3] @ points.mean(axis=0) + along[:, :, 3]
+    most = along[:, :, :3] @ ((low + high) / 2.0) + along[:, :, 3]
+    most += np.abs(along[:, :, :3]) @ ((high - low) / 2.0)
+    rounding = 1e-9 * np.abs(most).max()
+    farthest: NDArray[np.bool_] = (most >= least.max(axis=0) - rounding).any(axis=1)
+    return farthest
 
 
 def _box_corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -65,7 +65,7 @@ def test_surfaces(kind: str, box: Any, tmp_path: Path) -> None:
     made, told = scene(tmp_path)
     assert not told
     assert shown(made)[..., :3].max() > 0.0
-    assert set(panels.CLPT_PT_material.shown(box.clpt)) <= set(box.clpt.bl_rna.properties.keys())
+    assert {*panels.of_material(box.clpt)} <= {*box.clpt.bl_rna.properties.keys()}
 
 
 def test_drops_inside(box: Any, tmp_path: Path) -> None:

@@ -235,13 +235,13 @@ def test_panels_show_what_the_engine_reads() -> None:
     assert wanted <= shown
     assert any("WORLD_PT" in name for name in shown)
     context = SimpleNamespace(
-        engine="CLPT", scene=scene, light=bpy.data.lights[0], material=bpy.data.materials[0],
-        world=bpy.data.worlds[0], camera=bpy.data.cameras[0], object=bpy.data.objects[0],
+        engine="CLPT", scene=scene, view_layer=scene.view_layers[0], light=bpy.data.lights[0],
+        material=bpy.data.materials[0], world=bpy.data.worlds[0], camera=bpy.data.cameras[0],
+        object=bpy.data.objects[0],
     )  # fmt: skip
     for panel in panels.PANELS:
         assert panel.poll(context)
-        settings = panel.settings(panel.owner(context))
-        names = panel.shown(settings)
+        settings, names = panel.shown(context)
         assert names and all(name in settings.bl_rna.properties for name in names), panel
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -48,3 +50,19 @@ def test_the_wheels_that_are_there_are_in_the_manifest(maker: Any, tmp_path: Pat
         wheels = [name for name in archive.namelist() if name.endswith(".whl")]
     assert wheels == ["wheels/pyopencl-1-cp311-cp311-manylinux_2_28_x86_64.whl"]
     assert f'  "./{wheels[0]}",' in manifest and manifest.index(wheels[0]) < manifest.index("[perm")
+
+
+@pytest.mark.slow
+def test_blender_finds_the_manifest_valid(maker: Any, tmp_path: Path) -> None:
+    """By its own tool, for all systems at once."""
+    bpy = pytest.importorskip("bpy")
+    tool = Path(bpy.utils.resource_path("LOCAL")) / "scripts/addons_core/bl_pkg/cli/blender_ext.py"
+    file = tmp_path / "clpt.zip"
+    for platform in maker.TAGS:
+        folder = tmp_path / "wheels" / platform
+        folder.mkdir(parents=True)
+        (folder / f"pyopencl-1-cp311-cp311-{maker.TAGS[platform][0]}.whl").write_bytes(b"")
+    maker.write(file, list(maker.TAGS))
+    command = [sys.executable, str(tool), "validate", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "FATAL" not in done.stdout, done.stdout + done.stderr

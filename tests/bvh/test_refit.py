@@ -153,7 +153,9 @@ def test_one_of_several_trees_moves(device, building, layout):
     vertices, faces = mesh(triangles(rng, 505))
     moved = vertices.copy()
     moved[900:] += rng.normal(0, 1, moved[900:].shape).astype(np.float32)
-    tree, begins = bvh.build_parts(device, vertices, faces, tags, bvh.Runs(counts), layout)
+    tree, begins = bvh.build_parts(
+        bvh.Building(device), vertices, faces, tags, bvh.Runs(counts), layout
+    )
     before = content(device, tree)
     bvh.refit(building, tree, on_device(device, moved), on_device(device, faces), parts=[1, 2])
     building.stream.wait()

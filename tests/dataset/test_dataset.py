@@ -102,6 +102,27 @@ def test_truth_is_that_of_rays_by_formula(index):
         assert truth.visibility[i] == pytest.approx((truth.instances == i + 1).sum() / whole)
 
 
+def shiny(index: int, rng: np.random.Generator) -> Scene:
+    """The scene of an index; of every other one the ball is of polished metal."""
+    made = scene(index, rng)
+    metal = materials.Conductor(metal="gold")
+    kept = [*made.shapes[:-1], dataclasses.replace(made.shapes[-1], material=metal)]
+    lamps = [*made.lights, lights.Directional(direction=(1.0, 0.5, -1.0))]
+    made = dataclasses.replace(made, lights=lamps, integrator=Path(max_depth=4))
+    return dataclasses.replace(made, shapes=kept) if index % 2 else made
+
+
+def test_pictures_are_those_of_new_renderers():
+    """To the bit, where light paths come and go, and where both scenes share their trees."""
+    for picture in dataset.pictures(shiny, [0, 1, 2, 3, 3, 0], spp=2):
+        with clpt.Renderer(picture.scene) as renderer:
+            renderer.run(2)
+            np.testing.assert_array_equal(picture.image, renderer.image()[..., :3])
+        alone = dataset.ground_truth(picture.scene)
+        for name in ("instances", "depth", "position", "normal", "visible"):
+            np.testing.assert_array_equal(vars(picture.truth)[name], vars(alone)[name])
+
+
 def test_poses_and_3d_boxes():
     """Poses are rigid; corners of the boxes are those of the cube, and enclose the ball."""
     view = scene(0, np.random.default_rng(3))

@@ -13,6 +13,7 @@ from clpt import transforms as tf
 from clpt.choices import QUANTITIES as NAMES
 from clpt.errors import SceneError, UnknownKindError
 from clpt.instruments import QUANTITIES, measure, photometer
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Film, Scene, cameras, lights, materials, media, shapes
 from clpt.scene.integrators import Box, Path
 from clpt.spectra import Blackbody, Constant, Tabulated
@@ -112,6 +113,23 @@ def test_infrared_of_satellites():
     share = np.interp(lambdas * 1e9, [2000.0, 2500.0], [0.4, 0.1])
     measured = measure(lit, "radiance", [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], samples=4096)
     agrees(measured, 1e-3 * (planck * share).mean() * (high - low))
+
+
+@pytest.mark.parametrize(
+    ("radiance", "end", "warned"),
+    [
+        (1.0, 2300.0, "830 nm"),  # D65
+        (1.0, 830.0, ""),
+        (Blackbody(2856.0), 2300.0, ""),
+        (Tabulated((400.0, 1000.0), (1.0, 1.0)), 2300.0, "1000 nm"),
+        (Tabulated((400.0, 900.0, 1000.0), (1.0, 1.0, 0.0)), 2300.0, ""),
+    ],
+)
+def test_lamps_whose_data_end_within_the_film_are_warned_of(radiance, end, warned):
+    lit = scene(lamps=(lights.Constant(radiance=radiance),))
+    lit = dataclasses.replace(lit, film=Film(size=(8, 8), lambda_max=end))
+    found = [text for text in lower(lit).warnings if "spectrum ends" in text]
+    assert len(found) == bool(warned) and all(warned in text for text in found)
 
 
 def test_rays():

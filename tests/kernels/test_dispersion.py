@@ -139,11 +139,11 @@ def test_rough(glass: str, lambdas: np.ndarray, alpha: float) -> None:
     for a, b in PAIRS:
         wo, wi = tilted(a), tilted(b, 0.9)
         got = probe(params, wo[None], wi[None], np.full((1, 3), 0.5))["eval"][0]
-        expected = [_walter(wo, wi, value, alpha) for value in n]
+        expected = [walter(wo, wi, value, alpha) for value in n]
         np.testing.assert_allclose(got, expected, rtol=2e-3, atol=1e-3 * max(expected) + 1e-7)
 
 
-def _walter(wo: np.ndarray, wi: np.ndarray, n: float, alpha: float) -> float:
+def walter(wo: np.ndarray, wi: np.ndarray, n: float, alpha: float) -> float:
     """f |cos| of radiance at one index."""
     n_o, n_i = (1.0, n) if wo[2] > 0.0 else (n, 1.0)
     n_i = n_o if wo[2] * wi[2] > 0.0 else n_i

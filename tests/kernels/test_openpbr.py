@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clpt import spectra
 from clpt.render.materials import rough_coat_table as coats
 from clpt.scene.materials import Openpbr
 from clpt.scene.params import device_params
@@ -14,6 +15,7 @@ from clpt.spectra import RGBUnbounded
 from clpt.testing.checks import albedos
 from clpt.testing.settings import pairs, tilted
 from tests.kernels.harness import Probe
+from tests.kernels.test_dispersion import PAIRS, walter
 
 UP = np.array([[0.0, 0.0, 1.0]])
 PLAIN = Openpbr()
@@ -196,3 +198,44 @@ def test_a_colour_at_a_depth_is_an_absorption() -> None:
     a = glass.absorption
     np.testing.assert_allclose(np.exp(-0.1 * np.array([a.r, a.g, a.b])), [0.5, 0.25, 1.0])
     assert Openpbr(transmission_color=0.5).transmission_tint.value == 0.5
+
+
+SPECTRAL = {"lambdas": np.array([400.0, 500.0, 600.0, 700.0])}  # [nm], the hero first
+
+
+@pytest.mark.parametrize("glass", ["sf11", "diamond"])
+def test_glass_has_the_index_of_each_wavelength(glass: str) -> None:
+    """Walter et al. 2007 eq. 20 and 21, but for light of several bounces between facets (2e-4)."""
+    n, probe = spectra.glass(glass).sample(SPECTRAL["lambdas"]), Probe(Openpbr, "spectral")
+    glassy = {"transmission_weight": 1.0, "specular_ior": n, "specular_roughness": np.sqrt(0.1)}
+    made = {**_params(**glassy), **SPECTRAL}
+    for a, b in PAIRS:
+        wo, wi = tilted(a), tilted(b, 0.9)
+        got = probe(made, wo[None], wi[None], np.full((1, 3), 0.5))["eval"][0]
+        expected = [walter(wo, wi, value, 0.1) for value in n]
+        np.testing.assert_allclose(got, expected, rtol=4e-3, atol=2e-3 * max(expected) + 2e-4)
+
+
+@pytest.mark.parametrize("glass", ["sf11", "diamond"])
+def test_facets_leave_the_share_of_each_wavelength_to_the_base(glass: str) -> None:
+    """(1 - E(o)) (1 - E(i)) / (1 - mean E), with E by float64 sums."""
+    n, probe = spectra.glass(glass).sample(SPECTRAL["lambdas"]), Probe(Openpbr, "spectral")
+    made = {**_params(specular_ior=n, specular_roughness=0.3), **SPECTRAL}
+    wo, wi = (
+        np.array([tilted(25.0), tilted(60.0)]),
+        np.array([tilted(50.0, 0.8), tilted(10.0, 2.0)]),
+    )
+    black, white = (probe({**made, "base_color": c}, wo, wi, wo)["eval"] for c in (0.0, 1.0))
+
+    def left(cosines: np.ndarray) -> np.ndarray:
+        return 1.0 - np.array([coats.reflectance("ggx", 0.09, eta, cosines) for eta in n]).T
+
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    cosines = 0.5 * (nodes + 1.0)
+    mean = (weights * cosines) @ left(cosines)
+    expected = left(wo[:, 2]) * left(wi[:, 2]) / mean * wi[:, 2:] / np.pi
+    got = white - black
+    np.testing.assert_allclose(got, expected, rtol=0.01)
+    # Wavelengths beside each other: a mean index would be .007 off.
+    got, expected = (part / part.mean(axis=1, keepdims=True) for part in (got, expected))
+    np.testing.assert_allclose(got, expected, rtol=2e-3)

@@ -9,7 +9,7 @@ from pxr import Usd, UsdGeom, UsdShade
 
 from clpt.arrays import Floats, Integers
 from clpt.files import budget
-from clpt.formats.usd import meshes
+from clpt.formats.usd import meshes, skeletons
 from clpt.formats.usd.document import Document, rows
 from clpt.formats.usd.materials import surface
 from clpt.formats.usd.meshes import Topology
@@ -28,10 +28,11 @@ def curves(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
 
     Raises SceneError for counts that do not fit the points.
     """
-    points = document.points(prim, np.float64)
+    points = document.points(prim)
     counts = document.array(prim, "curveVertexCounts", 0, np.int64)
     if points is None or counts is None or not len(points):
         return []
+    points = skeletons.moved(document, prim, points)
     if (counts < 1).any() or counts.sum() != len(points):
         message = f"curveVertexCounts add up to {counts.sum()}, there are {len(points)} points"
         raise document.error(message, prim.GetPath())
@@ -144,6 +145,7 @@ def points(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
     centers = document.points(prim)
     if centers is None or not len(centers):
         return []
+    centers = skeletons.moved(document, prim, centers)
     budget.take(8 * centers.nbytes, "points", document.file)
     widths = _widths(document, prim, np.ones(len(centers), np.int64))[0]
     look = surface(document, material, prim, both=True)

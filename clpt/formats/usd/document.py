@@ -6,9 +6,9 @@ another purpose are not shown.
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections import defaultdict
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -87,9 +87,9 @@ class Document(Once):
         budget.check(size, f"{name} of {prim.GetPath()}", self.file)
         return rows(value, width, kind)
 
-    def points(self, prim: Usd.Prim, kind: type = np.float32) -> Any:
+    def points(self, prim: Usd.Prim) -> Any:
         """Return a prim's points (n, 3); None for none, and with a warning for one not finite."""
-        points = self.array(prim, "points", 3, kind)
+        points = self.array(prim, "points", 3)
         if points is None or np.isfinite(points).all():
             return points
         self.warn("left out, as a point of it is not finite", prim.GetPath())
@@ -162,12 +162,13 @@ GPRIMS = frozenset(
 )  # fmt: skip
 UNREAD = frozenset(
     ("NurbsPatch", "NurbsCurves", "HermiteCurves", "TetMesh", "LightFilter", "PluginLightFilter",
-     "ParticleField3DGaussianSplat", "ParticleField", "Skeleton")
+     "ParticleField3DGaussianSplat", "ParticleField")
 )  # fmt: skip
+BINDING = re.compile("material:binding(:|$)")
 HIDDEN = ("proxy", "guide")  # purposes that no picture shows
 
 
-Shown = dict[str, list[Usd.Prim]]  # prims by role: see ROLES, and "instances"
+Shown = dict[str, list[Usd.Prim]]  # prims by role: see ROLES, "instances" and "bindings"
 ROLES = {
     **dict.fromkeys(GPRIMS, "gprims"), **dict.fromkeys(LIGHTS, "lights"), "Camera": "cameras",
     "PointInstancer": "instancers", "Volume": "volumes", "RenderSettings": "settings",
@@ -177,35 +178,33 @@ ROLES = {
 def shown(document: Document, root: Usd.Prim, *, defined: bool = True) -> Shown:
     """Return the prims that are shown below a prim, and that prim.
 
-    defined: leave out prims that only `over` speaks of, as a stage does; prototypes may be below
-    such prims.
+    Prims are shown if they and those above are visible and of a purpose that is shown; cameras
+    always. defined: leave out prims that only `over` speaks of, as a stage does; prototypes may be
+    below such prims. Under "bindings" stand prims that bind a material, if any does.
     """
     prims: Shown = defaultdict(list)
-    for prim in _prims(document, root, defined):
-        name = prim.GetTypeName()
-        role = ROLES.get(name)
-        if role is not None:
-            prims[role].append(prim)
+    known: set[tuple[str, ...]] = set()  # many prims author the same properties
+    anywhere = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
+    iterator = iter(Usd.PrimRange(root, Usd.PrimDefaultPredicate if defined else anywhere))
+    for prim in iterator:
+        name, authored = prim.GetTypeName(), tuple(prim.GetAuthoredPropertyNames())
+        if authored not in known:
+            known.add(authored)
+            if any(BINDING.match(property_name) for property_name in authored):
+                prims["bindings"].append(prim)
+        if "visibility" in authored and document.value(prim, "visibility") == "invisible":
+            iterator.PruneChildren()
+            if name != "Camera":
+                continue
+        elif "purpose" in authored and prim.GetAttribute("purpose").Get() in HIDDEN:
+            iterator.PruneChildren()
+            continue
+        if name in ROLES:
+            prims[ROLES[name]].append(prim)
+            if name == "PointInstancer":
+                iterator.PruneChildren()
         elif name in UNREAD:
             document.warn(f"{name} is not read", prim.GetPath())
         elif prim.IsInstance():
             prims["instances"].append(prim)
     return prims
-
-
-def _prims(document: Document, root: Usd.Prim, defined: bool) -> Iterator[Usd.Prim]:
-    """Yield a prim and those below it that are visible and of a purpose that is shown."""
-    anywhere = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
-    iterator = iter(Usd.PrimRange(root, Usd.PrimDefaultPredicate if defined else anywhere))
-    for prim in iterator:
-        said = prim.GetAuthoredPropertyNames()  # most prims say neither
-        if "visibility" in said and document.value(prim, "visibility") == "invisible":
-            iterator.PruneChildren()
-            if prim.GetTypeName() != "Camera":
-                continue
-        elif "purpose" in said and prim.GetAttribute("purpose").Get() in HIDDEN:
-            iterator.PruneChildren()
-            continue
-        elif prim.GetTypeName() == "PointInstancer":
-            iterator.PruneChildren()
-        yield prim

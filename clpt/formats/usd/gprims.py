@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
@@ -16,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom, UsdShade
+from pxr import Usd, UsdGeom, UsdLux, UsdShade
 
 from clpt import transforms
 from clpt.arrays import Floats, Matrix
@@ -25,7 +26,7 @@ from clpt.files import budget
 from clpt.formats import volumes
 from clpt.formats.framing import TO_BOX
 from clpt.formats.usd import curves, meshes
-from clpt.formats.usd.document import Document, file_of, shown
+from clpt.formats.usd.document import Document, Shown, file_of, shown
 from clpt.formats.usd.materials import surface
 from clpt.formats.usd.meshes import Topology
 from clpt.scene.materials import Null
@@ -200,6 +201,8 @@ def volume(document: Document, prim: Usd.Prim, placement: Matrix) -> list[Shape]
         for relation in prim.GetRelationships()
         if relation.GetName().startswith("field:")
     }
+    if prim.HasAPI(UsdLux.VolumeLightAPI):
+        document.warn("VolumeLightAPI is left out", prim.GetPath())
     for name in fields.keys() - {"density"}:
         document.warn(f"field {name!r} is left out", prim.GetPath())
     source = document.stage.GetPrimAtPath(fields["density"][0]) if fields.get("density") else None
@@ -295,20 +298,36 @@ def content(
     for prim, shapes in _shapes(document, prims["gprims"], inherited):
         whole.shapes += [(prim, shape, placement(prim)) for shape in shapes]
     whole.lights = [(prim, placement(prim)) for prim in prims["lights"]]
-    alike: dict[tuple[str, str], list[tuple[Usd.Prim, UsdShade.Material | None]]] = {}
-    for prim, bound in zip(prims["instances"], _bound(prims["instances"]), strict=True):
-        material = bound or inherited
-        key = str(prim.GetPrototype().GetPath()), str(material.GetPath()) if material else ""
-        alike.setdefault(key, []).append((prim, material))
-    for key, several in alike.items():
-        prototype, material = several[0][0].GetPrototype(), several[0][1]
+    for prototype, material, several in _alike(prims, inherited, in_world=base is None):
+        key = "content", document.code, str(prototype.GetPath()), _path_of(material)
         make = partial(content, document, prototype, np.eye(4), material, depth + 1)
-        inner = document.once(("content", document.code, *key), make)
-        matrices = document.placements([prim for prim, _ in several])
+        matrices = document.placements(several)
+        inner = document.once(key, make)
         whole.copies.append((inner, matrices if base is None else base @ matrices))
     for prim in prims["instancers"]:
         whole.copies += _instancer(document, prim, placement(prim), inherited, depth)
     return whole
+
+
+def _alike(
+    prims: Shown, inherited: UsdShade.Material | None, *, in_world: bool
+) -> Iterator[tuple[Usd.Prim, UsdShade.Material | None, list[Usd.Prim]]]:
+    """Yield prototypes and the materials of what binds none in them, with their instances."""
+    instances, alike = prims["instances"], defaultdict[tuple[Usd.Prim, str], list[Usd.Prim]](list)
+    # Nothing in the world is bound unless a prim of it binds.
+    binds = prims["bindings"] or not in_world
+    materials = {"": inherited}
+    all_bound = _bound(instances) if binds else [None] * len(instances)
+    for prim, bound in zip(instances, all_bound, strict=True):
+        name = _path_of(bound)
+        materials.setdefault(name, bound)
+        alike[prim.GetPrototype(), name].append(prim)
+    for (prototype, name), several in alike.items():
+        yield prototype, materials[name], several
+
+
+def _path_of(material: UsdShade.Material | None) -> str:
+    return str(material.GetPath()) if material else ""
 
 
 def _bound(prims: list[Usd.Prim]) -> list[UsdShade.Material | None]:
@@ -353,12 +372,7 @@ def _instancer(
         if not root or not len(own):
             continue
         above = transforms.inverse(document.placement(root.GetParent()))
-        key = (
-            "content",
-            document.code,
-            str(root.GetPath()),
-            str(inherited.GetPath()) if inherited else "",
-        )
+        key = "content", document.code, str(root.GetPath()), _path_of(inherited)
         make = partial(content, document, root, above, inherited, depth + 1)
         inner = document.once(key, make)
         copies.append((inner, own))
@@ -402,8 +416,7 @@ def placed(document: Document, whole: Content) -> list[Shape]:
         ]
         group = Group(tuple(own), parts[0][0].GetName())
         solid = world[~transforms.are_singular(world)]
-        instance = Instance(group=group)
-        shapes += [instance.placed(matrix) for matrix in solid]
+        shapes += Instance(group=group).placed_at(solid)
     return shapes
 
 

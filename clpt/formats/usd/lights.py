@@ -18,13 +18,15 @@ from clpt import transforms
 from clpt.arrays import Floats, Floats32, Matrix
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.formats import ies
+from clpt.formats import as_openpbr, ies
 from clpt.formats.usd import textures
 from clpt.formats.usd.document import Document, file_of
+from clpt.formats.usd.materials import Surface
 from clpt.scene.lights import Area, Constant, Directional, Envmap, Goniometric, Light, Point, Spot
 from clpt.scene.materials import Null
 from clpt.scene.shapes import Cylinder, Disk, Rectangle, Shape, Sphere
 from clpt.scene.textures import Bitmap, Product
+from clpt.scene.values import Textured, is_texture
 from clpt.spectra import RGBIlluminant
 
 TURNED = transforms.rotate([0.0, 1.0, 0.0], 180.0)  # lights shine along -z, clpt's along +z
@@ -61,6 +63,36 @@ def light(document: Document, prim: Usd.Prim, placement: Matrix) -> Lit:
         return _area(document, prim, placement)
     document.warn(f"{kind} is left out", prim.GetPath())
     return Lit([], [])
+
+
+def on_mesh(
+    document: Document, prim: Usd.Prim, look: Surface, both: bool, area: Callable[[], float]
+) -> Surface:
+    """Return the surface of a mesh with MeshLightAPI.
+
+    look: that of its material. both: its back emits too. area: of the mesh, in units of the stage.
+    By `light:materialSyncMode` the light is that of the API alone, with or without the material;
+    or what the material emits is its color, if it emits.
+    """
+    _tell(document, prim)
+    rgb = emitted(document, prim)
+    if document.value(prim, "inputs:normalize", False):
+        rgb = rgb / max(area(), 1e-30)
+    if _is_shaped(document, prim):
+        document.warn("shaping is left out of a mesh", prim.GetPath())
+    mode = str(document.value(prim, "light:materialSyncMode", "materialGlowTintsLight"))
+    if mode == "noMaterialResponse":
+        look = Surface(Null())
+    radiance: Textured = RGBIlluminant(*rgb)
+    if mode == "materialGlowTintsLight" and look.emission is not None:
+        glow = look.emission.radiance
+        if is_texture(glow):
+            grey = bool(np.all(rgb == rgb[0]))
+            tint = float(rgb[0]) if grey else tuple(rgb.tolist())
+            radiance = Product(first=glow, second=tint, rgb=not grey)
+        else:
+            radiance = RGBIlluminant(*(rgb * as_openpbr.rgb(glow, "emission")))
+    return dataclasses.replace(look, emission=Area(radiance=radiance, two_sided=both))
 
 
 def emitted(document: Document, prim: Usd.Prim, usual: float = 1.0) -> Floats:
@@ -158,7 +190,7 @@ def _pole(document: Document, prim: Usd.Prim, placement: Matrix) -> Matrix:
     """Return the transform of an image's space, whose up is +y, to that of its dome.
 
     A DomeLight has the pole +y. On a stage with the up axis z that leaves it lying, it has +z, as
-    programs that leave out a turn mean it.
+    programs that leave out a turn mean it. Blender to 5.0 does; its image has its middle at +x.
     """
     axis = str(
         document.value(prim, "poleAxis", "scene" if prim.GetTypeName() == "DomeLight_1" else "")
@@ -168,6 +200,8 @@ def _pole(document: Document, prim: Usd.Prim, placement: Matrix) -> Matrix:
     if not axis:
         up = placement["xyz".index(document.up), :3]
         axis = "Z" if document.up == "z" and abs(up[2]) > abs(up[1]) else "Y"
+        if axis == "Z" and document.stage.GetRootLayer().documentation.startswith("Blender"):
+            return transforms.rotate([0.0, 0.0, 1.0], 90.0) @ Z_POLE
     return Z_POLE if axis == "Z" else np.eye(4)
 
 

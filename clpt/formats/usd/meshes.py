@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Usd, UsdGeom, UsdShade
+from pxr import Usd, UsdGeom, UsdLux, UsdShade
 
+from clpt import transforms
 from clpt.arrays import Integers
 from clpt.files import budget
 from clpt.formats.meshes.mesh import Arrays, checked
+from clpt.formats.usd import lights, skeletons
 from clpt.formats.usd.document import Document, rows
 from clpt.formats.usd.materials import Surface, surface
 from clpt.geometry import catmull_clark
@@ -160,7 +162,7 @@ def meshes(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
     material: that of the faces in no subset. Raises SceneError for faces of vertices that are not
     there.
     """
-    stays = not any(
+    stays = skeletons.skin_of(document, prim) is None and not any(
         prim.GetAttribute(name).ValueMightBeTimeVarying() for name in ("points", "normals")
     )
     key = "meshes", str(prim.GetPath()), str(material.GetPath()) if material else ""
@@ -175,11 +177,26 @@ def _all(document: Document, prim: Usd.Prim, material: UsdShade.Material | None)
         return []
     polygons = _polygons(document, prim, topology)
     both, parts = bool(document.value(prim, "doubleSided", False)), []
+    shines = prim.HasAPI(UsdLux.MeshLightAPI)
     for faces, bound in _subsets(document, prim, len(topology.counts), material):
         look = surface(document, bound, prim, both=both)
+        if shines:
+            look = lights.on_mesh(
+                document, prim, look, both, lambda: _area(document, prim, polygons)
+            )
         part = _mesh(document, prim, polygons, faces, look)
         parts += [] if part is None else [part]
     return parts
+
+
+def _area(document: Document, prim: Usd.Prim, polygons: Polygons) -> float:
+    """Return the area of all faces under the prim's own transforms, in units of the stage."""
+    topology = polygons.topology
+    triangles, _ = triangulate(polygons.points, topology.counts, topology.corners)
+    corners = transforms.transform_points(document.placement(prim), polygons.points)
+    first, second, third = corners[topology.corners[triangles]].swapaxes(0, 1)
+    across = np.cross(second - first, third - first)
+    return 0.5 * float(np.linalg.norm(across, axis=1).sum())
 
 
 def _topology(document: Document, prim: Usd.Prim) -> Topology | None:
@@ -199,7 +216,7 @@ def _topology(document: Document, prim: Usd.Prim) -> Topology | None:
 
 
 def _polygons(document: Document, prim: Usd.Prim, topology: Topology) -> Polygons:
-    points = document.array(prim, "points", 3)
+    points = skeletons.moved(document, prim, document.points(prim))
     flipped = document.value(prim, "orientation", "rightHanded") == "leftHanded"
     scheme = str(document.value(prim, "subdivisionScheme", "catmullClark"))
     levels = document.level
@@ -209,6 +226,11 @@ def _polygons(document: Document, prim: Usd.Prim, topology: Topology) -> Polygon
         return _refined(document, prim, topology, points, levels, flipped)
     parents = np.arange(len(topology.counts))
     own = _normals(document, prim, topology)
+    skin = None if own is None else skeletons.skin_of(document, prim)
+    if own is not None and skin is not None:
+        at_corners = own.values[own.at_corners(topology)]
+        turned = skin.turned(document.points(prim), at_corners, topology.corners)
+        own = Primvar(turned, np.arange(len(turned)), "faceVarying")
     if own is None and scheme in ("catmullClark", "loop"):
         triangles, _ = triangulate(points, topology.counts, topology.corners)
         smooth = smooth_normals(points, topology.corners[triangles])

@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from pxr import Ar, Gf, Sdf, Tf, Usd, UsdUtils, Vt  # noqa: F401  all are loaded at one time
+from pxr import Ar, Gf, Sdf, Tf, Usd, UsdSkel, UsdUtils, Vt  # noqa: F401  all are loaded at one time
 
 from clpt.errors import SceneError, nearest
 from clpt.files import budget, input_files
@@ -87,9 +87,7 @@ def _over_shutter(document: Document, variables: dict[str, Any]) -> Scene:
     opening, length = scene.extra.pop("shutter")
     if "shutter" in variables:
         opening, length = 0.0, _number(document.file, variables, "shutter", 0.0)
-    # A value with a single sample is the same at all times.
-    moves = any(len(layer.ListAllTimeSamples()) > 1 for layer in stage.GetUsedLayers())
-    if not length > 0.0 or not moves:
+    if not length > 0.0 or not _moves(stage):
         return scene
     rate = stage.GetTimeCodesPerSecond()
 
@@ -100,6 +98,11 @@ def _over_shutter(document: Document, variables: dict[str, Any]) -> Scene:
         return posed
 
     return animation.scene_over_shutter(at, (time + opening) / rate, length / rate)
+
+
+def _moves(stage: Usd.Stage) -> bool:
+    """Whether a layer has samples of several times; a value of one sample never changes."""
+    return any(len(layer.ListAllTimeSamples()) > 1 for layer in stage.GetUsedLayers())
 
 
 def _select(path: Path, stage: Usd.Stage, variants: str) -> None:

@@ -108,13 +108,15 @@ class Rebuild(Plan):
             scene.buffers.release(self.replaced.pop())
 
 
-def prepare_rebuild(wavefront: Wavefront, lowered: Lowered, refit: bool = False) -> Rebuild:
+def prepare_rebuild(
+    wavefront: Wavefront, lowered: Lowered, refit: bool = False, beside: DeviceScene | None = None
+) -> Rebuild:
     """Return the plan after which a wavefront renders another lowering.
 
     refit: refit the tree over triangles that only moved; this is faster than a new tree, but rays
     are slower if triangles moved far. Programs are built if the features differ, trees if triangles
     or boxes differ; words of tables are written where they differ. The picture equals that of a new
-    renderer.
+    renderer. beside: a scene on the device, whose trees are taken over if they are the same.
 
     Both lowerings must have the same kinds of paths, see `has_other_paths`. Raises SceneError as in
     `refusal`, KernelBuildError, MemoryBudgetError; the wavefront is then unchanged.
@@ -124,7 +126,7 @@ def prepare_rebuild(wavefront: Wavefront, lowered: Lowered, refit: bool = False)
         raise refused
     changes = _changes(wavefront, lowered, refit)
     with wavefront.scene.buffers.all_or_nothing():
-        return _stage(wavefront, lowered, changes)
+        return _stage(wavefront, lowered, changes, beside)
 
 
 def refusal(former: Lowered, new: Lowered) -> SceneError | None:
@@ -139,9 +141,14 @@ def refusal(former: Lowered, new: Lowered) -> SceneError | None:
     return None
 
 
+def kinds_of_paths(lowered: Lowered) -> tuple[float, ...]:
+    """Return the numbers that a lowering has in common with others whose films have its form."""
+    return tuple(float(lowered.settings[name]) for name in OF_PATHS)
+
+
 def has_other_paths(former: Lowered, new: Lowered) -> bool:
     """Return whether a lowering asks for other kinds of paths, so for a film of another form."""
-    return any(former.settings[name] != new.settings[name] for name in OF_PATHS)
+    return kinds_of_paths(former) != kinds_of_paths(new)
 
 
 def _changes(wavefront: Wavefront, lowered: Lowered, refit: bool) -> _Changes:
@@ -167,7 +174,9 @@ def _changes(wavefront: Wavefront, lowered: Lowered, refit: bool) -> _Changes:
     )
 
 
-def _stage(wavefront: Wavefront, lowered: Lowered, changes: _Changes) -> Rebuild:
+def _stage(
+    wavefront: Wavefront, lowered: Lowered, changes: _Changes, beside: DeviceScene | None
+) -> Rebuild:
     """Build new kernels, buffers and trees beside the present scene, which stays unchanged."""
     scene, paths, queue = wavefront.scene, wavefront.paths, wavefront.paths.queue
     if changes.kernels:
@@ -176,7 +185,9 @@ def _stage(wavefront: Wavefront, lowered: Lowered, changes: _Changes) -> Rebuild
         built = scene.device.builds.programs - before
         log.info("the scene needs other kernels: %d programs were built", built)
     tables, new_trees = _new_tables(scene, lowered, changes), scene.trees
-    if changes.boxes:
+    if changes.boxes and beside is not None and _has_same_trees(beside, scene, lowered, changes):
+        new_trees = dataclasses.replace(beside.trees, shared=True)
+    elif changes.boxes:
         vertices = tables.get("vertices", scene.tables["vertices"])
         former = None if changes.triangles else scene.trees
         layout, quality = changes.strategy.layout, scene.tree_quality
@@ -187,6 +198,22 @@ def _stage(wavefront: Wavefront, lowered: Lowered, changes: _Changes) -> Rebuild
         queue = paths.new_queue(changes.strategy.queued, len(lowered.features.materials.kinds))
     replaced = _replaced(wavefront, tables, new_trees, queue)
     return Rebuild(wavefront, lowered, changes, tables, new_trees, queue, replaced)
+
+
+def _has_same_trees(
+    beside: DeviceScene, scene: DeviceScene, lowered: Lowered, changes: _Changes
+) -> bool:
+    """Return whether the trees of another scene are those of a lowering."""
+    layout, other = changes.strategy.layout, beside.lowered
+    if beside.moved_tables or beside.tree_refitted or beside.strategy.layout != layout:
+        return False
+    if beside.device.context != scene.device.context or beside.tree_quality != scene.tree_quality:
+        return False
+    parts = zip(vars(other.instances).values(), vars(lowered.instances).values(), strict=True)
+    return all(_same(*map(np.asarray, pair)) for pair in parts) and all(
+        _same(vars(other)[name], vars(lowered)[name])
+        for name in ("vertices", "faces", "tags", "boxes")
+    )
 
 
 def _new_tables(scene: DeviceScene, lowered: Lowered, changes: _Changes) -> dict[str, cl.Buffer]:
@@ -214,7 +241,7 @@ def _replaced(
     scene, former = wavefront.scene, wavefront.paths.queue
     of_caller = scene.lowered.zero_copy
     buffers = [scene.tables[name] for name in tables if name not in of_caller]
-    if new_trees is not scene.trees:
+    if new_trees is not scene.trees and not scene.trees.shared:
         buffers.append(scene.trees.instances)
     if queue is not former:
         buffers += [value for value in former.values() if isinstance(value, cl.Buffer)]

@@ -35,6 +35,9 @@ from clpt.scene.roles import INDEX
 from clpt.scene.shapes import Instance, Shape
 from clpt.scene.textures import check_textures
 
+DATA_END = 830.0  # nm, of the CIE's tables
+FAINT = 0.05  # of a spectrum's largest value: an end below it is no step
+
 
 def check(scene: Scene) -> None:
     """Raise SceneError for a scene that cannot be rendered, whatever the device.
@@ -103,6 +106,7 @@ def warnings_of(index: SceneIndex) -> list[str]:
             f"film.sensor sees nothing from {film.lambda_min:g} to {film.lambda_max:g} nm, so the"
             " picture is black; ask for film.bands"
         )
+    warnings += _ending_early(index)
     if not index.lights and next(emissions(index), None) is None:
         warnings.append("no light in the scene, so the picture is black: add one to `lights`")
     if film.mode == "rgb" and mt.Fluorescent in index.leaves:
@@ -120,6 +124,25 @@ def _disperses(shape: Shape) -> bool:
         if part.refracts
         for name, param in params(type(part)).items()
     )
+
+
+def _ending_early(index: SceneIndex) -> list[str]:
+    """Return a warning of lamps whose data end within the infrared of a film."""
+    film = index.film
+    if not index.spectral or film.lambda_max <= DATA_END:
+        return []
+    lambdas = np.arange(film.lambda_min, film.lambda_max + 0.5)
+    ends = set()
+    for spectrum in emissions(index):
+        values = spectrum.sample(lambdas)
+        lit = np.flatnonzero(values)
+        if len(lit) and lit[-1] + 2 < len(lambdas) and values[lit[-1]] > FAINT * values.max():
+            ends.add(float(lambdas[lit[-1]]))
+    return [
+        f"a lamp's spectrum ends at {end:g} nm, the film at {film.lambda_max:g} nm: it is dark "
+        "beyond; give a temperature, or a table to there"
+        for end in sorted(ends)
+    ]
 
 
 def _of_motion(index: SceneIndex) -> list[str]:

@@ -132,18 +132,20 @@ def lower(
     *,
     anew: bool = False,
     shared: bool = False,
+    beside: Lowered | None = None,
 ) -> Lowered:
     """Lower a scene.
 
     texture_budget: [bytes] for images, None for no limit. former: of a similar scene, which saves
     time; choices for "auto" stay, unless `anew`. Arrays, lights and images that are the same
     objects as in the former scene are taken to hold the same values. shared: see `SceneIndex`.
+    beside: of a scene with the same shapes in other materials, which saves time too.
 
     Raises SceneError where the scene makes no sense: it names the shape, light or material; and
     for an image whose file changes meanwhile, and where it takes more than the budget of its load
     has left.
     """
-    cache = LoweringCache(former.cache if former else None)
+    cache = LoweringCache(former.cache if former else None, beside.cache if beside else None)
     integrator = lit_ghosts = None
     if former is not None and not anew:
         integrator, lit_ghosts = former.integrator, former.features.transport.lit_ghosts

@@ -49,7 +49,7 @@ class Bounds:
         theta_o = np.full(len(low), np.pi)
         return replace(self, low=low, high=high, center=0.5 * (low + high), theta_o=theta_o)
 
-    def __getitem__(self, rows: ArrayLike) -> Bounds:
+    def __getitem__(self, rows: ArrayLike | slice) -> Bounds:
         return Bounds(*(array[rows] for array in self.arrays))
 
 

@@ -6,6 +6,7 @@ import hashlib
 import logging
 import threading
 import time
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
@@ -17,6 +18,7 @@ from clpt import device as dev
 from clpt.denoise import needs
 from clpt.errors import DeviceError, SceneError
 from clpt.render.edit.moving import Moving
+from clpt.render.edit.plans import kinds_of_paths
 from clpt.render.edit.scene_edit import (
     Successors,
     resolve_device_arrays,
@@ -42,6 +44,7 @@ from clpt.version import VERSION
 
 log = logging.getLogger("clpt.render.renderer")  # which the documentation names
 
+MOST_SPARE = 2  # replaced wavefronts that are kept
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
 WAY = tuple(f"chosen.{name}" for name in ("integrator", "light_paths", "guide_paths", "splatting"))
 TO_OUTPUT = ("to_first", "to_second", "to_third")
@@ -78,7 +81,8 @@ class DeviceFilm:
     `RenderOptions`. share: values of several devices; without it the
     scene may have arrays in the memory of the device. former: a similar lowered scene. moving: the
     shapes that have moved on the device; blurred: whether the tables have keys of motion that
-    `scene` does not have; successors: of the shapes and materials of the first scene.
+    `scene` does not have; successors: of the shapes and materials of the first scene. beside: a
+    film on the same device, whose scene has the same shapes: trees and lowered parts are shared.
 
     Raises as `Renderer` does.
     """
@@ -115,6 +119,8 @@ class DeviceFilm:
             halves=options.get("halves", False) or needs.halves(denoise, scene.noise),
         )
         self._opened: Wavefront | None = None
+        self.beside: DeviceFilm | None = None
+        self._spare: OrderedDict[tuple[float, ...], Wavefront] | None = None
         lowered = self.lower(scene, share, former, anew=True)
         self.seconds["lower"] = time.perf_counter() - start
         self._opened = first = self.create(lowered)
@@ -197,7 +203,7 @@ class DeviceFilm:
 
     def close(self) -> None:
         """Give the device's memory back."""
-        self._opened = self.moving = None
+        self._opened = self.moving = self._spare = None
 
     # ---- another scene
 
@@ -215,8 +221,9 @@ class DeviceFilm:
 
         def make() -> Lowered:
             readable, budget = resolve_device_arrays(scene, self.device.queue), self._texture_budget
-            shared = self._shared
-            lowered = lower(readable, budget, former, anew=chooses, shared=shared)
+            shared, near = self._shared, self.beside
+            beside = near.wavefront.scene.lowered if near is not None else None
+            lowered = lower(readable, budget, former, anew=chooses, shared=shared, beside=beside)
             if not lowered.candidates or steered:
                 return lowered
             return decided(self.device, self._tuning, readable, lowered, budget, shared=shared)
@@ -237,10 +244,27 @@ class DeviceFilm:
         alike = replace(present, settings={**present.settings, **chosen})
         return None if alike.differences(origin) else origin.chosen_integrator
 
+    def keep_forms(self) -> None:
+        """Keep replaced wavefronts from now on, for scenes that ask for their forms again."""
+        self._spare = OrderedDict()
+
+    def spare(self, lowered: Lowered) -> Wavefront | None:
+        """Return a replaced wavefront whose kinds of paths are those of a lowered scene, or None.
+
+        Its picture is in the memory of the present picture.
+        """
+        return None if self._spare is None else self._spare.get(kinds_of_paths(lowered))
+
     def exchange(self, wavefront: Wavefront) -> None:
         """Replace the wavefront, whose film has another form; the memory of the picture stays."""
-        wavefront.show_in(self.wavefront.film.picture)
+        former = self.wavefront
+        if wavefront.film.picture is not former.film.picture:
+            wavefront.show_in(former.film.picture)
         self._opened, self.moving = wavefront, None
+        if self._spare is not None:
+            self._spare[kinds_of_paths(former.scene.lowered)] = former
+            while len(self._spare) > MOST_SPARE:
+                self._spare.popitem(last=False)
 
     # ---- origin and form
 

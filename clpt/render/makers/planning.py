@@ -75,12 +75,18 @@ class Changes:
 
 @dataclass(frozen=True, eq=False)
 class Exchange(Plan):
-    """A wavefront in place of a film's former wavefront, whose film has another form."""
+    """A wavefront in place of a film's former wavefront, whose film has another form.
+
+    rebuild: of a wavefront that was in use before; None for a new one.
+    """
 
     film: DeviceFilm
     wavefront: Wavefront
+    rebuild: Plan | None = None
 
     def write(self) -> None:
+        if self.rebuild is not None:
+            self.rebuild.write()
         self.film.exchange(self.wavefront)
 
 
@@ -225,7 +231,8 @@ def _rebuilt(
     warnings = [*lowered.warnings, *remarks]
     if has_other_paths(former, lowered):
         return _exchange(film, lowered), warnings
-    return prepare_rebuild(film.wavefront, lowered, refit=not whole), warnings
+    beside = film.beside.wavefront.scene if film.beside is not None else None
+    return prepare_rebuild(film.wavefront, lowered, not whole, beside), warnings
 
 
 def _another_integrator(
@@ -238,10 +245,13 @@ def _another_integrator(
 
 
 def _exchange(film: DeviceFilm, lowered: Lowered) -> Exchange:
-    """Return the plan of a new wavefront. Raises as `Wavefront.create`, or `refusal`."""
+    """Return the plan of another wavefront. Raises as `Wavefront.create`, or `refusal`."""
     refused = refusal(film.wavefront.scene.lowered, lowered)
     if refused is not None:
         raise refused
+    spare = film.spare(lowered)
+    if spare is not None:
+        return Exchange(film, spare, prepare_rebuild(spare, lowered))
     wavefront = film.create(lowered)
     wavefront.prepare()
     return Exchange(film, wavefront)

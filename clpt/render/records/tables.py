@@ -177,11 +177,12 @@ class LoweringCache:
 
     Numbers and texts are compared by value, other arguments by identity: an array that is the same
     object is taken to hold the same values. former: the cache of the lowering before; a result that
-    is asked for again moves here, and `settle` drops the others.
+    is asked for again moves here, and `settle` drops the others. beside: of a similar scene.
     """
 
-    def __init__(self, former: LoweringCache | None = None):
+    def __init__(self, former: LoweringCache | None = None, beside: LoweringCache | None = None):
         self._former = {} if former is None else former._results
+        self._beside = {} if beside is None else beside._results
         self._results: dict[Any, tuple[Any, Any]] = {}
 
     def __call__(
@@ -196,12 +197,13 @@ class LoweringCache:
         key = function, *map(_key, by)
         if key not in self._results:
             # Values that are compared by identity stay alive: no other object gets their id.
-            self._results[key] = self._former.get(key) or (function(*arguments), by)
+            known = self._former.get(key) or self._beside.get(key)
+            self._results[key] = known or (function(*arguments), by)
         return self._results[key][0]
 
     def settle(self) -> None:
-        """Drop results of the former cache that were not asked for."""
-        self._former = {}
+        """Drop results of the other caches that were not asked for."""
+        self._former, self._beside = {}, {}
 
 
 def _key(argument: object) -> Any:

@@ -36,7 +36,10 @@ FEWEST = 3  # edges of a path from a light over two surfaces to the camera: the 
 MOSTLY = 0.5  # share of small lights in the power of all lights, for more light paths than FEW
 FEW = 0.125  # light paths for each sample, if small lights have less than MOSTLY
 SOME = 0.25  # the same if small lights have more; `vcm` has 1, as its photons are light paths
-STREWN, STREWN_AIMED = 0.25, 0.2  # number and share that aims where caustics are hardly seen
+STREWN, STREWN_AIMED = 0.25, 0.2  # number and share that aims for lights in shades
+SHADE = 0.05  # of the distance from a light to the camera: nearer diffuse surfaces are its shade
+SHADED = 0.25  # of the directions of a light that meet its shade; and of the power of all lights
+LAMPS = 16  # with the most power, for the search for shades
 FOGGY = 0.25, 0.5  # FEW and SOME for lights in media that scatter
 MANY = 8  # the same for lights in bulbs, which paths from the camera hardly find
 DIRECTIONS = 128  # from a light, for the share of specular surfaces around it
@@ -163,9 +166,8 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     if sum(share for _, place, share in small if _is_enclosed(geometry, place)) >= MOSTLY:
         number, reason = MANY, f"{reason}, in a bulb"
     if not _sees_clear(index, geometry):
-        strewn = Path(light_paths=STREWN, aimed=STREWN_AIMED)
-        chosen = Path(light_paths=MANY) if number == MANY else strewn
-        return chosen, f"{reason}; the camera sees little glass and few mirrors"
+        reason = f"{reason}; the camera sees little glass and few mirrors"
+        return _out_of_sight(lit, number, reason)
     if not integrator.asks_photons or index.has_media or index.shifts:
         return Path(light_paths=number), reason
     if index.adaptive:
@@ -174,6 +176,15 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
         return Path(light_paths=number), f"{reason}; photons of a pass are all at one time"
     whole = max(1, int(number))
     return Vcm(light_paths=whole), f"{reason}; the camera sees glass or mirrors"
+
+
+def _out_of_sight(lit: Lit, number: float, reason: str) -> tuple[Integrator, str]:
+    """The integrator where the camera hardly sees what makes caustics; number: of light paths."""
+    if number == MANY:
+        return Path(light_paths=MANY), reason
+    if _has_shades(lit):
+        return Path(light_paths=STREWN, aimed=STREWN_AIMED), f"{reason}, and lights have shades"
+    return Path(light_paths=FEW), reason
 
 
 def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
@@ -261,6 +272,60 @@ def _sees_clear(index: SceneIndex, geometry: Geometry) -> bool:
         if directions.shape[1] <= (1.0 - SEEN) * RAYS:
             return True
     return False
+
+
+def _has_shades(lit: Lit) -> bool:
+    """Whether much light first meets diffuse surfaces close to its source.
+
+    These are small and bright, as irradiance falls with the square of the distance. Paths from the
+    camera seldom meet them, and light paths all do. Instances and analytic shapes do not count.
+    """
+    index, shutter = lit.index, lit.index.motions.shutter
+    eye = surroundings.camera_origin(index.camera, index.film, (shutter.open + shutter.close) / 2.0)
+    bounds = light_bounds.concatenated([source.bounds for source in lit.sources.every])
+    placed = [(share, place, rows) for _, place, share, rows in _small_rows(lit) if share > 0.0]
+    shaded = 0.0
+    for share, place, rows in sorted(placed, key=lambda lamp: -lamp[0])[:LAMPS]:
+        if place is not None:
+            near = SHADE * float(np.linalg.norm(eye - place))
+            met = _covered(_nearby(lit.geometry, place, near), place, _directions(bounds[rows]))
+            shaded += share * (len(np.unique(met)) >= SHADED * DIRECTIONS)
+    return shaded >= SHADED
+
+
+def _directions(bounds: light_bounds.Bounds) -> NDArray[np.float64]:
+    """Directions (3, DIRECTIONS) of light with bounds; all directions where they differ much."""
+    axis = bounds.axis.mean(axis=0)
+    apart = np.arccos(np.clip(bounds.axis @ bounds.axis[0], -1.0, 1.0)).max()
+    widest = apart + (bounds.theta_o + bounds.theta_e).max()
+    if bounds.both.any() or widest >= np.pi:
+        return _cone(np.array([0.0, 0.0, 1.0]), -1.0, DIRECTIONS)
+    return _cone(axis / np.linalg.norm(axis), math.cos(widest), DIRECTIONS)
+
+
+def _nearby(geometry: Geometry, place: NDArray[np.float64], near: float) -> NDArray[np.float64]:
+    """Return pieces (n, 10) of diffuse shapes that emit no light, close to a place [m]."""
+    found = [np.zeros((0, 10))]
+    starts = [(shape, vertex, face) for _, shape, vertex, face in geometry.owners]
+    world = len(geometry.faces) - sum(geometry.instances.triangles)
+    ends = [*starts[1:], (None, geometry.world_vertices, world)]
+    for (shape, vertex, face), (_, last_vertex, last_face) in zip(starts, ends, strict=True):
+        corners = geometry.vertices[vertex:last_vertex]
+        if not len(corners) or shape.emission is not None or not _is_diffuse(shape.material):
+            continue
+        if _apart(corners.min(axis=0), corners.max(axis=0), place) > near:
+            continue
+        triangles_ = geometry.vertices[geometry.faces[face:last_face]].astype(np.float64)
+        close = _apart(triangles_.min(axis=1), triangles_.max(axis=1), place) <= near
+        found.append(np.pad(triangles_[close].reshape(-1, 9), ((0, 0), (0, 1))))
+    return np.concatenate(found)
+
+
+def _apart(
+    low: NDArray[np.floating], high: NDArray[np.floating], place: NDArray[np.float64]
+) -> Any:
+    """Return the distance from a place to boxes (..., 3)."""
+    return np.linalg.norm(np.maximum(np.maximum(low - place, place - high), 0.0), axis=-1)
 
 
 def _by_material(all_: Iterable[Shape]) -> Iterable[Shape]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections import deque
+from collections import OrderedDict, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -31,6 +31,7 @@ FINISH_SECONDS = 1.0  # from a request to stop until paths in flight are abandon
 FIRST_PARTS = 8  # launches of a stage before the time of a launch is known
 LEAST_ITEMS = 1 << 12  # of a part
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
+MOST_IDLE = 16  # kernels that are kept for scenes that need them again
 IDLE = {"samples": (0, 0), "begin": 0, "bounces": 0, "restart": 0, "leave": None}  # nothing to do
 
 OnBatch = Callable[[Any], bool]  # called with counters; returns whether a run goes on
@@ -77,6 +78,7 @@ class Kernels:
         self.device, self._owners = on, owners
         self.programs: dict[str, device.Program] = {}
         self.seconds = 0.0
+        self._idle: OrderedDict[tuple[device.Program, str], device.BoundKernel] = OrderedDict()
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -101,7 +103,23 @@ class Kernels:
         """Return a kernel of a program with its arguments, by the names in its signature."""
         kernel = self.programs[program].kernel(name)
         arguments = {**self.arguments, **more}
-        return kernel.bind(**{a.name: arguments[a.name] for a in kernel.arguments})
+        named = {a.name: arguments[a.name] for a in kernel.arguments}
+        bound = self._idle.pop((kernel.program, name), None)
+        if bound is None:
+            return kernel.bind(**named)
+        bound.bind(**named)
+        return bound
+
+    def put_back(self, bound: device.BoundKernel) -> None:
+        """Take a kernel that is out of use: PyOpenCL takes half a millisecond for another."""
+        self._idle[bound.kernel.program, bound.kernel.name] = bound
+
+    def tidy(self) -> None:
+        """Drop what kernels out of use hold, and kernels that have been so for long."""
+        while len(self._idle) > MOST_IDLE:
+            self._idle.popitem(last=False)
+        for bound in self._idle.values():
+            bound.forget()
 
 
 @dataclass(frozen=True)
@@ -186,6 +204,8 @@ class BounceLoop:
     def bind_again(self) -> None:
         """Bind the kernels that are in use to the present buffers."""
         has_stages, has_loop = self._stages is not None, self._loop is not None
+        if self._loop is not None:
+            self.kernels.put_back(self._loop)
         self._stages = self._loop = None
         if has_stages:
             _ = self.stages

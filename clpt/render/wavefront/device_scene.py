@@ -31,7 +31,8 @@ class Trees:
     offsets: where each of them begins, (n, 2) uint32, see clpt.bvh.build_parts; boxes: the trees
     over analytic shapes, "shape", and over instances, "instance"; order: (k,) uint32, the instance
     in each leaf; rows: (k,) of INSTANCE.dtype, the rows of the instances in that order, as they
-    were last written by the host; instances: their buffer; seconds: of the builds.
+    were last written by the host; instances: their buffer; seconds: of the builds; shared: whether
+    they are another scene's, which releases the buffer.
     """
 
     triangles: bvh.Bvh
@@ -41,6 +42,7 @@ class Trees:
     rows: NDArray[Any]
     instances: cl.Buffer
     seconds: float
+    shared: bool = False
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -81,8 +83,9 @@ def build(
         counts = [len(lowered.faces) - sum(instances.triangles), *instances.triangles]
         runs = bvh.Runs(counts, (1, *instances.keys), lowered.vertices)
         points = vertices if len(lowered.faces) else lowered.vertices
+        building = bvh.Building(buffers.device, limit=buffers.available)
         triangles, offsets = bvh.build_parts(
-            buffers.device, points, lowered.faces, lowered.tags, runs, layout, quality
+            building, points, lowered.faces, lowered.tags, runs, layout, quality
         )
     else:
         triangles, offsets = former.triangles, former.offsets

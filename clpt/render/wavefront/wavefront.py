@@ -209,9 +209,11 @@ class Wavefront:
         """Bind all kernels to the present buffers; rebuilt: build their programs again too."""
         if rebuilt:
             self.kernels.programs.clear()
+        self.kernels.put_back(self._accumulate)
         self._bind_film()
         for loop in self._all_loops:
             loop.bind_again()
+        self.kernels.tidy()
 
     def show_in(self, picture: device.DeviceArray) -> None:
         """Put the picture of the film into the memory of another picture of the same size."""

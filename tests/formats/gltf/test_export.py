@@ -3,38 +3,26 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import clpt
 from clpt import transforms
-from clpt.cli import cli
-from clpt.geometry import triangles
 from clpt.scene import Film, Scene, cameras, lights, materials, media, phases, shapes
 from clpt.scene.gltf_material import ONE_SIDE
 from clpt.scene.motion import Deformation, Keys, Shutter
 from clpt.scene.params import fields_of, params
 from clpt.scene.textures import Bitmap, Checkerboard, Graph, MeshAttribute, Product
 from clpt.spectra import RGB, RGBIlluminant, RGBUnbounded
+from tests.formats.written import MATERIALS, SHAPES, TURN, assert_same_triangles
 
-TURN = transforms.translate(0.5, 1.0, -2.0) @ transforms.rotate([1.0, 2.0, 3.0], 40.0)
 CAMERA = cameras.Perspective(
     to_world=transforms.look_at([0, 1, 5], [0, 0, 0], [0, 1, 0]), fov=40.0, fov_axis="y"
 )
 RNG = np.random.default_rng(5)
-MATERIALS = [
-    cls
-    for _, cls in inspect.getmembers(materials, inspect.isclass)
-    if issubclass(cls, materials.Material)
-    and not inspect.isabstract(cls)
-    and cls is not materials.Material
-    and cls.__module__.startswith("clpt.scene.materials")
-]
 
 
 def again(
@@ -130,33 +118,13 @@ def test_milk_in_a_glass_comes_back(tmp_path: Path) -> None:
     assert surface_of(read).ior.sample(lines) == pytest.approx(wanted, abs=3e-4)
 
 
-SHAPES = {
-    "mesh": shapes.Mesh(
-        vertices=np.random.default_rng(1).normal(size=(9, 3)).astype(np.float32),
-        faces=np.arange(9, dtype=np.uint32).reshape(3, 3), to_world=TURN,
-    ),
-    "rectangle": shapes.Rectangle(to_world=TURN),
-    "flipped": shapes.Rectangle(to_world=TURN, flip_normals=True),
-    "mirrored": shapes.Cube(to_world=TURN @ transforms.scale([1.0, -2.0, 1.0])),
-    "sdf": shapes.SdfGrid(to_world=TURN),
-}  # fmt: skip
-
-
 @pytest.mark.parametrize("name", SHAPES)
 def test_triangles_come_back(name: str, tmp_path: Path) -> None:
     image = Bitmap(image=np.ones((2, 2, 3), np.float32))
     shape = dataclasses.replace(SHAPES[name], material=materials.Diffuse(reflectance=image))
     read, lost = again(with_shape(shape), tmp_path)
     assert lost == []
-    wanted, found = (triangles.triangulate(s) for s in (shape, read.shapes[0]))
-    corners = [np.sort(v[f].reshape(-1, 9), axis=0) for v, f, _, _ in (wanted, found)]
-    assert np.allclose(*corners, atol=1e-5)
-    fronts = [
-        np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]]) for v, f, *_ in (wanted, found)
-    ]
-    assert np.allclose(fronts[0].sum(0), fronts[1].sum(0), atol=1e-4)
-    if wanted[3] is not None:
-        assert np.allclose(np.sort(wanted[3], axis=0), np.sort(found[3], axis=0), atol=1e-6)
+    assert_same_triangles(shape, read.shapes[0])
 
 
 def test_groups_and_balls_are_nodes(tmp_path: Path) -> None:
@@ -273,57 +241,6 @@ def test_patterns_become_images_and_colors_of_vertices_stay(tmp_path: Path) -> N
     )  # fmt: skip
     read, lost = again(with_shape(mesh), tmp_path)
     assert lost == [] and np.allclose(read.shapes[0].attributes["vertex_color"], colors)
-
-
-def test_pictures_are_equal(tmp_path: Path) -> None:
-    """The Cornell box and its glTF, in rgb: its lamp is all its light."""
-    scene = clpt.load("scenes/cornell_box")
-    pictures = []
-    for shown in (scene, again(scene, tmp_path)[0]):
-        shown.film = dataclasses.replace(shown.film, width=24, height=24, mode="rgb")
-        with clpt.Renderer(shown) as renderer:
-            renderer.run(64)
-            pictures.append(np.asarray(renderer.image())[..., :3])
-    before, after = (picture.mean(axis=(0, 1)) for picture in pictures)
-    assert after == pytest.approx(before, rel=0.02)
-
-
-SOURCES = {
-    "a.xml": '<scene version="3.0.0"><shape type="cube"/></scene>',
-    "a.pbrt": 'WorldBegin\nShape "trianglemesh" "point3 P" [0 0 0 1 0 0 0 1 0]\n'
-    '"integer indices" [0 1 2]\n',
-    "a.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
-    "a.usda": '#usda 1.0\ndef Cube "c" {}\n',
-    "a.json": '{"camera": {"type": "perspective"}, "shapes": [{"type": "cube"}]}',
-}
-
-
-@pytest.mark.parametrize("name", SOURCES)
-def test_formats_are_converted(name: str, tmp_path: Path) -> None:
-    """Scenes of five formats to each that is written, and again, with the same triangles."""
-    if name.endswith(".usda"):
-        pytest.importorskip("pxr")
-    (tmp_path / name).write_text(SOURCES[name])
-
-    def corners(file: Path) -> np.ndarray[Any, Any]:
-        parts = [
-            triangles.triangulate(s)[:2] for s in clpt.load(file).shapes if s.name != "backdrop"
-        ]
-        rows = np.concatenate([v[f].reshape(-1, 3) for v, f in parts])
-        return np.asarray(rows[np.lexsort(rows.round(4).T)])
-
-    wanted = corners(tmp_path / name)
-    targets = ["b.glb", "b.gltf", "b.json"]
-    try:
-        import pxr  # noqa: F401
-
-        targets += ["b.usdc", "b.usdz"]
-    except ImportError:
-        pass
-    for target in targets:
-        told = CliRunner().invoke(cli, ["convert", str(tmp_path / name), str(tmp_path / target)])
-        assert told.exit_code == 0, told.output
-        assert np.allclose(corners(tmp_path / target), wanted, atol=1e-4), target
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".gltf"])

@@ -15,7 +15,7 @@ from clpt.scene import Film, Scene
 from clpt.scene.cameras import Orthographic
 from clpt.scene.integrators import Path
 from clpt.scene.lights import Area, Constant, Directional, Envmap, Goniometric, Point, Spot
-from clpt.scene.materials import Diffuse
+from clpt.scene.materials import Diffuse, Null
 from clpt.scene.shapes import Rectangle, Shape
 from tests.formats.usd.conftest import SQUARE, Loader
 
@@ -265,3 +265,75 @@ def test_the_pole_of_a_dome(stage: Loader, tmp_path: File) -> None:
         0
     ]
     assert np.allclose(lying.to_world[:3, 1], [0, 1, 0])
+
+
+def test_a_dome_of_blender_has_its_middle_at_x(stage: Loader, tmp_path: File) -> None:
+    """To version 5.0 Blender writes no turn; its Cycles shows the middle of the image at +x."""
+    write(tmp_path / "sky.exr", np.ones((4, 8, 3), np.float32))
+    dome = 'def DomeLight "L" { asset inputs:texture:file = @./sky.exr@ }'
+    made = stage(MESH + dome, 'upAxis = "Z"\ndoc = "Blender v5.0.1"').lights[0]
+    assert np.allclose(made.to_world[:3, :3], np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]]))
+
+
+GLOWING = """def Material "Glow" {
+    token outputs:surface.connect = </Glow/S.outputs:surface>
+    def Shader "S" {
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:emissiveColor = (0.5, 1, 2)
+        token outputs:surface }
+}
+"""
+
+
+def shining(attributes: str, bound: str = "rel material:binding = </Glow>") -> str:
+    square = SQUARE.replace("1, 1, 0", "1, 2, 0").replace("0, 1, 0", "0, 2, 0")
+    schemas = '(prepend apiSchemas = ["MeshLightAPI", "MaterialBindingAPI"])'
+    return f'{GLOWING} def Mesh "M" {schemas} {{ {square}\n {bound}\n {attributes} }}'
+
+
+def test_a_mesh_shines(stage: Loader) -> None:
+    """As its material glows, tinted; or by itself alone, with or without its material."""
+    strength = "float inputs:intensity = 3\n color3f inputs:color = (1, 0.5, 0)"
+    plain = lamp(stage(shining(strength, bound="")))
+    assert rgb(plain.emission.radiance) == (3.0, 1.5, 0.0)
+    assert not plain.emission.two_sided and not isinstance(plain.material, Null)
+    tinted = lamp(stage(shining(strength))).emission.radiance
+    assert rgb(tinted) == (1.5, 1.5, 0.0)
+    mode = f"{strength}\n uniform token light:materialSyncMode = "
+    alone = lamp(stage(shining(mode + '"independent"\n uniform bool doubleSided = 1')))
+    assert rgb(alone.emission.radiance) == (3.0, 1.5, 0.0) and alone.emission.two_sided
+    assert not isinstance(alone.material, Null)
+    bare = lamp(stage(shining(mode + '"noMaterialResponse"')))
+    assert isinstance(bare.material, Null) and rgb(bare.emission.radiance) == (3.0, 1.5, 0.0)
+
+
+def test_a_normalized_mesh_divides_by_its_area(stage: Loader) -> None:
+    scene = stage(shining(f"bool inputs:normalize = 1\n{SCALED}", bound=""), "metersPerUnit = 10")
+    assert rgb(lamp(scene).emission.radiance) == pytest.approx((1.0 / 8.0,) * 3)
+
+
+def test_an_image_that_glows_is_tinted(stage: Loader, tmp_path: File) -> None:
+    """The picture of the mesh is its image times the light, in each color."""
+    write(tmp_path / "glow.exr", np.full((2, 2, 3), (0.5, 1.0, 2.0), np.float32))
+    view = """def Camera "V" {
+        token projection = "orthographic"
+        float horizontalAperture = 5
+        float verticalAperture = 5
+        double3 xformOp:translate = (0.5, 1, 4)
+        uniform token[] xformOpOrder = ["xformOp:translate"] }"""
+    text = shining("float inputs:intensity = 3\n color3f inputs:color = (1, 0.5, 0)").replace(
+        "color3f inputs:emissiveColor = (0.5, 1, 2)",
+        "color3f inputs:emissiveColor.connect = </Glow/T.outputs:rgb>",
+    )
+    texture = """def Shader "T" {
+            uniform token info:id = "UsdUVTexture"
+            asset inputs:file = @glow.exr@
+            token inputs:wrapS = "clamp"
+            token inputs:wrapT = "clamp"
+            float3 outputs:rgb }
+        token outputs:surface.connect"""
+    scene = stage(text.replace("token outputs:surface.connect", texture, 1) + view)
+    scene.film = Film(width=2, height=2)
+    scene.integrator = Path(max_depth=1)
+    mean = clpt.render(scene, mode="rgb", spp=4).mean(axis=(0, 1))
+    assert mean == pytest.approx((1.5, 1.5, 0.0), abs=3e-3)
