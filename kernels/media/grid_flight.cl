@@ -240,9 +240,7 @@ inline mask grid_collide(Scene scene, integer name, Medium m, Medium own, GridWa
  * A GPU reads these again in each brick, as in lights/sky.cl. */
 inline real brick_weight(Scene scene, Slab path, uint at, integer row, mask active, real t)
 {
-#if LANES == 1
-    at = row <= scene.settings->light_count ? at : 0u;
-#endif
+    if (LANES == 1) at = any(row > scene.settings->light_count) ? 0u : at;
     real pdf = load_path_pdf(path, at), w_met = 1.0f;
     mask sought = active & (row > 0) & (pdf >= 0.0f);
     if (any(sought)) {
