@@ -327,3 +327,19 @@ def test_a_panorama_is_that_of_cycles(tmp_path: Path) -> None:
         for quarter in np.split(rows, 2, axis=2):
             mine, theirs = quarter.mean(axis=(1, 2, 3))
             assert mine == pytest.approx(theirs, rel=0.02, abs=1e-3)
+
+
+def test_a_bad_ies_file_is_a_line(tmp_path: Path) -> None:
+    """One that is missing counts as 1; a damaged one is an error that names it."""
+    floor_and_camera()
+    lamp = bpy.data.lights.new("lamp", "POINT")
+    lamp.shadow_soft_size, lamp.use_nodes = 0.0, True
+    node = lamp.node_tree.nodes.new("ShaderNodeTexIES")
+    lamp.node_tree.links.new(node.outputs[0], lamp.node_tree.nodes["Emission"].inputs["Strength"])
+    link("lamp", lamp, (0.3, 0.2, 2.0), (0.0, 0.0, 0.0))
+    file = tmp_path / "lamp.ies"
+    node.mode, node.filepath = "EXTERNAL", str(file)
+    assert picture("CLPT", tmp_path, 4).mean() > 0.0
+    file.write_text("no table")
+    with pytest.raises(RuntimeError, match=r"lamp\.ies"):
+        picture("CLPT", tmp_path, 4)
