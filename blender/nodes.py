@@ -245,19 +245,24 @@ def _principled(tree: Tree, at: Site) -> tuple[Json, Any]:
     }
     if through != 0.0:
         values["transmission_tint"] = color
-    thickness = tree.number(at, "Thin Film Thickness")
     metal = _filmed_metal(tree, at, values)
-    bare = values["base_metalness"] == 1.0 and not METAL_FILMS
-    if thickness != 0.0 and not bare:
-        values |= {
-            "thin_film_weight": 1.0, "thin_film_ior": tree.single(at, "Thin Film IOR", 1.33),
-            "thin_film_thickness": tree.made(lambda e: e.input(at, "Thin Film Thickness") * 1e-3),
-        }  # fmt: skip
+    if METAL_FILMS or values["base_metalness"] != 1.0:
+        values |= _thin_film(tree, at)
     material = tree.bent(at, metal or {"type": "openpbr", **_plain(values)})
     alpha = tree.share(at, "Alpha", 1.0)
     if alpha != 1.0:
         material = {"type": "mask", "material": material, "opacity": alpha}
     return _both(material, through), tree.light(at, "Emission Color", "Emission Strength")
+
+
+def _thin_film(tree: Tree, at: Site) -> Json:
+    """Return the thin film of OpenPBR, {} without one."""
+    if tree.number(at, "Thin Film Thickness") == 0.0:
+        return {}
+    return {
+        "thin_film_weight": 1.0, "thin_film_ior": tree.single(at, "Thin Film IOR", 1.33),
+        "thin_film_thickness": tree.made(lambda e: e.input(at, "Thin Film Thickness") * 1e-3),
+    }  # fmt: skip
 
 
 def _films(tree: Tree, at: Site) -> Json:
@@ -277,7 +282,8 @@ def _filmed_metal(tree: Tree, at: Site, values: Json) -> Json | None:
     colors = values["base_color"], values["specular_color"]
     if not plain or not all(isinstance(color, list) for color in colors):
         return None
-    films = _films(tree, at) if METAL_FILMS else {}
+    even = METAL_FILMS and isinstance(tree.number(at, "Thin Film Thickness"), float)
+    films = _films(tree, at) if even else {}
     if not films:
         return None
     r, tint = np.minimum(colors[0], 0.999), np.array(colors[1])
@@ -352,7 +358,9 @@ def _metallic(tree: Tree, at: Site) -> tuple[Json, Any]:
         **_stretched(tree, at, "Anisotropy", "Rotation"),
     }  # fmt: skip
     metal = _filmed_metal(tree, at, values)
-    return _open(tree, at, **values) if metal is None else (_both(tree.bent(at, metal)), None)
+    if metal is None:
+        return _open(tree, at, **values, **_thin_film(tree, at))
+    return _both(tree.bent(at, metal)), None
 
 
 def _conductor(tree: Tree, at: Site, values: Json) -> Json:

@@ -145,6 +145,14 @@ class ClptCamera(bpy.types.PropertyGroup):
     lens: _named("Lens", measured.LENSES, "", "A real lens, or its file; empty: the ideal one")
 
 
+def _turbidity(world: Any) -> float:
+    return measured.turbidity(world.haze)
+
+
+def _set_turbidity(world: Any, value: float) -> None:
+    world.haze = measured.haze(value)
+
+
 class ClptWorld(bpy.types.PropertyGroup):
     """A clear sky by the physics of air."""
 
@@ -154,8 +162,7 @@ class ClptWorld(bpy.types.PropertyGroup):
     haze: _number("Haze", 0.1, 0.0, 2.0, "Optical depth straight up at 550 nm")
     turbidity: bpy.props.FloatProperty(
         name="Turbidity", description="The same haze as in other skies", min=1.0, max=20.0,
-        get=lambda world: measured.turbidity(world.haze),
-        set=lambda world, value: setattr(world, "haze", measured.haze(value)),
+        get=_turbidity, set=_set_turbidity,
     )  # fmt: skip
     ozone: _number("Ozone", 300.0, 0.0, 1000.0, "Column of ozone [Dobson units]")
     altitude: _number("Altitude", 0.0, 0.0, 60000.0, unit="LENGTH")

@@ -192,6 +192,12 @@ def flips_handedness(matrix: ArrayLike) -> bool:
     return bool(np.linalg.det(np.asarray(matrix, np.float64)[:3, :3]) < 0.0)
 
 
+def unmirrored(matrix: ArrayLike) -> Matrix:
+    """Return a transform without its scale, (4, 4); along x it is turned back if it mirrors."""
+    turned = np.diag([-1.0, 1.0, 1.0, 1.0]) if flips_handedness(matrix) else np.eye(4)
+    return rigid(np.asarray(matrix, np.float64) @ turned)
+
+
 def _single(arguments: tuple[ArrayLike, ...]) -> Any:
     """Return the only argument, or all arguments."""
     return arguments[0] if len(arguments) == 1 else arguments

@@ -48,6 +48,20 @@ class Surface:
     both: bool = False
 
 
+def of_lamp(material: m.Material, emits: bool, warn: Warn) -> m.Material:
+    """Return the material of a shape, black where it emits and does not stop light.
+
+    What is not there does not emit in OpenPBR and glTF.
+    """
+    if not (emits and isinstance(material, m.Null)):
+        return material
+    warn("that light passes through lamps; they are black")
+    return m.Diffuse(reflectance=0.0, name=material.name)
+
+
+MIRRORED = "that the picture is mirrored, left for right"
+
+
 @singledispatch
 def surface(material: m.Material, warn: Warn) -> Surface:
     """Return a material as OpenPBR. warn: is told what is approximated, or left out."""

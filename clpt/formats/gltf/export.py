@@ -20,7 +20,7 @@ from clpt.arrays import Floats, on_host
 from clpt.errors import SceneError
 from clpt.files import output_files
 from clpt.formats import as_meshes
-from clpt.formats.as_openpbr import rgb, split
+from clpt.formats.as_openpbr import MIRRORED, rgb, split
 from clpt.formats.gltf.cameras_lights import FROM_GLTF, LIGHTS
 from clpt.formats.gltf.export_materials import MaterialWriter
 from clpt.geometry import lamps
@@ -316,6 +316,8 @@ class _Writer:
             self.warn(f"the camera {camera.kind}")
             return
         to_world, aspect = np.asarray(camera.to_world, float), film.width / film.height
+        if transforms.flips_handedness(to_world):
+            self.warn(MIRRORED)
         planes = {"znear": max(float(camera.near), 1e-6), "zfar": float(camera.far)}
         if isinstance(camera, Orthographic):
             wide = float(np.linalg.norm(to_world[:3, 0]))
@@ -331,7 +333,7 @@ class _Writer:
             if isinstance(camera, ThinLens) and camera.aperture_radius > 0.0:
                 self.warn("the camera's depth of field")
         self.lists["cameras"].append(row)
-        self.node(transforms.rigid(to_world) @ FROM_GLTF, camera.motion, camera=0)
+        self.node(transforms.unmirrored(to_world) @ FROM_GLTF, camera.motion, camera=0)
 
 
 def _surface_of(shape: Shape) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from clpt.arrays import Floats, Floats32
 from clpt.formats.as_gltf import surface
-from clpt.formats.as_openpbr import Surface, dispersion, rgb, split, two_by_two
+from clpt.formats.as_openpbr import Surface, dispersion, of_lamp, rgb, split, two_by_two
 from clpt.formats.gltf.textures import FLIP, WRAPS
 from clpt.formats.pbrt.scattering import body_albedo
 from clpt.images import colour, screen_files
@@ -80,6 +80,7 @@ class MaterialWriter:
     def _material(
         self, material: Material, emission: Area | None, interior: Medium | None
     ) -> dict[str, Any]:
+        material = of_lamp(material, emission is not None, self.warn)
         leaf, around, culled = surface(material, self.warn)
         row: dict[str, Any] = {"name": leaf.name or material.name or material.kind}
         row["doubleSided"] = emission.two_sided if emission is not None else not culled

@@ -16,7 +16,7 @@ from clpt.arrays import Floats, on_host
 from clpt.errors import SceneError
 from clpt.files import output_files
 from clpt.formats import as_meshes
-from clpt.formats.as_openpbr import rgb, split
+from clpt.formats.as_openpbr import MIRRORED, rgb, split
 from clpt.formats.gltf.cameras_lights import FROM_GLTF
 from clpt.formats.usd.export_materials import MaterialWriter, unused
 from clpt.formats.usd.lights import TURNED
@@ -314,6 +314,8 @@ class _Writer:
         path = "/World/camera"
         prim = UsdGeom.Camera.Define(self.stage, path)
         to_world = np.asarray(camera.to_world, float)
+        if transforms.flips_handedness(to_world):
+            self.warn(MIRRORED)
         aspect = film.height / film.width
         if isinstance(camera, Orthographic):
             width = 20.0 * float(np.linalg.norm(to_world[:3, 0]))
@@ -338,7 +340,7 @@ class _Writer:
         if shutter is not None and shutter.close > shutter.open:
             prim.CreateShutterOpenAttr(shutter.open * RATE)
             prim.CreateShutterCloseAttr(shutter.close * RATE)
-        self.place(prim, transforms.rigid(to_world) @ FROM_GLTF, camera.motion)
+        self.place(prim, transforms.unmirrored(to_world) @ FROM_GLTF, camera.motion)
         return path
 
 

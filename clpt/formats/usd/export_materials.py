@@ -65,6 +65,7 @@ class MaterialWriter:
     ) -> UsdShade.Material:
         path = unused(self.stage, "/Materials", material.name or material.kind)
         prim = UsdShade.Material.Define(self.stage, path)
+        material = as_openpbr.of_lamp(material, emission is not None, self.warn)
         surface = as_openpbr.surface(material, self.warn)
         network = Network(self, path)
         shader = network.shader("surface", "open_pbr_surface_surfaceshader", "surfaceshader")
