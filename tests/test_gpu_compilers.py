@@ -109,6 +109,7 @@ def test_the_longest_texts_of_each_stage() -> None:
 def test_what_is_kept_spills_nothing() -> None:
     """Stack is for traversal alone; trees of wide8, which spill on AMD's, are for NVIDIA's.
 
+    Shadow rays through mixtures within mixtures also have the scene there, for a function.
     Some of Intel's spill still: see docs/gpus.md. They may not get worse, as below.
     """
     assert ROWS
@@ -116,9 +117,9 @@ def test_what_is_kept_spills_nothing() -> None:
         assert "failed" not in kept, kept
         if FIRST[kept["device"]].name == "Intel":
             continue
-        traverses = any(name in kept["stage"] for name in ("intersect", "shadow", "splat"))
+        most = {"intersect": 256, "shadow": 576, "splat": 256}
         if "wide8" not in kept["stage"] or FIRST[kept["device"]].name == "NVIDIA":
-            assert kept["stack"] <= (256 if traverses else 0), kept
+            assert kept["stack"] <= most.get(kept["stage"].split()[0], 0), kept
         others = "wide8" in kept["stage"] and FIRST[kept["device"]].name != "NVIDIA"
         assert kept["spilled"] == 0 or others, kept
 

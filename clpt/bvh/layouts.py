@@ -162,8 +162,7 @@ def _wide_over_boxes(
     building: Building, count: int, boxes: cl.Buffer, spare: bool = False
 ) -> tuple[tree.Collapse, tree.Figures, dict[str, cl.Buffer]]:
     """Return a wide tree and its buffers; spare: leave room for later trees over the boxes."""
-    items, parts = tree.items_of_boxes(building, count, boxes)
-    chosen = tree.collapse(building, tree.over(building, count, items, parts, 1))
+    chosen = tree.collapse(building, _over_boxes(building, count, boxes, heaped=spare))
     figures = tree.figures(building, chosen)
     room = figures.nodes + figures.nodes // 4 + 8 if spare else figures.nodes
     nodes, indices = building.allocate(256 * room), building.allocate(4 * count)
@@ -184,8 +183,7 @@ def compact(building: Building, mesh: Mesh) -> Packed:
 
 def compact_boxes(building: Building, count: int, boxes: cl.Buffer) -> Packed:
     """Build like `wide8_boxes`, with compressed nodes."""
-    items, parts = tree.items_of_boxes(building, count, boxes)
-    built = tree.over(building, count, items, parts, 1)
+    built = _over_boxes(building, count, boxes, heaped=False)
     indices = building.allocate(4 * count)
     nodes, part, stats = _compact_nodes(building, built, indices, None)
     source = {"vertices": None, "faces": None, "boxes": boxes, "indices": indices}
@@ -286,6 +284,14 @@ def _binary_tree(
     if mesh.quality == "fast":
         return tree.over_runs(building, mesh.count, items, parts, leaf_size)
     return tree.over(building, mesh.count, items, parts, leaf_size, at_once)
+
+
+def _over_boxes(building: Building, count: int, boxes: cl.Buffer, heaped: bool) -> tree.Tree:
+    """Return a tree to collapse; heaped: it will be refitted by its heap of ranges."""
+    items, parts = tree.items_of_boxes(building, count, boxes)
+    if building.grain.upward and not heaped:
+        return tree.upward(building, count, items, parts, 1, _RADIUS["high"], collapses=True)
+    return tree.over(building, count, items, parts, 1)
 
 
 def _round_up(nbytes: int) -> int:

@@ -24,6 +24,7 @@ inline real perlin_noise(Scene scene, vec3 p)
     real dx, dy, dz;
     integer x = noise_cell(p.x, &dx), y = noise_cell(p.y, &dy), z = noise_cell(p.z, &dz);
     real wx = noise_weight(dx), wy = noise_weight(dy), wz = noise_weight(dz), sum = 0.0f;
+    ROLLED
     for (int corner = 0; corner < 8; corner++) {
         int i = corner & 1, j = (corner >> 1) & 1, k = corner >> 2;
         real g = noise_gradient(scene, x + i, y + j, z + k, dx - (float)i, dy - (float)j, dz - (float)k);

@@ -7,8 +7,9 @@ inline void infinite_light(Scene scene, int row, vec3 p, Receiver receiver, vec3
 {
     LightRow l = light_at(scene, (integer)(row));
     LightView view = light_view(scene, (integer)(row), l, p, receiver.hemisphere);
+    real pmf = light_pmf(scene, (integer)(row), l, p, receiver);
     infinite_case(scene, l, view.hemisphere, light_view_direction(view, d), lambdas, radiance, pdf);
-    *pdf *= light_pmf(scene, (integer)(row), l, p, receiver);
+    *pdf *= pmf;
 }
 
 /* Radiance of a single infinite light for a path that leaves the scene along d [W m^-2 sr^-1 nm^-1], and its MIS weight
@@ -23,19 +24,6 @@ inline Spectrum infinite_met(Scene scene, int row, vec3 p, Receiver receiver, ve
     infinite_light(scene, row, p, receiver, d, lambdas, &radiance, &other);
     *w = infinite_weight(scene, row, p, d, pdf, other, mis_ratio);
     return radiance;
-}
-
-/* Radiance of all infinite lights, weighted. */
-inline Spectrum infinite_gather(Scene scene, vec3 p, Receiver receiver, vec3 d, real pdf, real mis_ratio,
-                                Wavelengths lambdas)
-{
-    Spectrum sum = spectrum_of(0.0f);
-    for (int row = 0; row < scene.settings->infinite_count; row++) {
-        real w;
-        Spectrum radiance = infinite_met(scene, row, p, receiver, d, pdf, mis_ratio, lambdas, &w);
-        sum = spectrum_madd(radiance, w, sum);
-    }
-    return sum;
 }
 
 /* Step weight: the MIS weight of an infinite light, against next-event estimation and light paths. */

@@ -48,7 +48,8 @@ inline real light_tree_importance(LightNode n, vec3 p, Receiver receiver, real l
     return sel(n.radius < 0.0f, n.power, importance);
 }
 
-/* The importance and the child of each node of a group; returns the sum of the importance. */
+/* The importance and the child of each node of a group; returns the sum of the importance. A GPU takes node by node:
+ * the words of four nodes at once, and arrays that are indexed, need too many registers. */
 inline real light_tree_group(Scene scene, integer group, vec3 p, Receiver receiver, real value[LIGHT_TREE_WIDTH],
                              integer child[LIGHT_TREE_WIDTH])
 {
@@ -57,10 +58,20 @@ inline real light_tree_group(Scene scene, integer group, vec3 p, Receiver receiv
     integer at = group * (LIGHT_TREE_WIDTH * LIGHT_NODE_WORDS);
     real lift = sel(hemisphere_given(receiver.hemisphere), (real)(0.0f), (real)(1.0f)), sum = 0.0f;
     mask placed = mask_of(0), everywhere = mask_of(0); /* of the root's group: the first and the middle node */
+    ROLLED
     for (int i = 0; i < LIGHT_TREE_WIDTH; i++) {
         LightNode n = light_node_row(nodes + i * LIGHT_NODE_WORDS, at);
-        value[i] = light_tree_importance(n, p, receiver, lift);
-        child[i] = n.child;
+        real own = light_tree_importance(n, p, receiver, lift);
+        if (LANES > 1) {
+            value[i] = own;
+            child[i] = n.child;
+        } else {
+            UNROLLED
+            for (int k = 0; k < LIGHT_TREE_WIDTH; k++) {
+                value[k] = k < i ? value[k] : own;
+                child[k] = k < i ? child[k] : n.child;
+            }
+        }
         if (i == 0) placed = n.radius >= 0.0f;
         if (i == LIGHT_TREE_WIDTH / 2) everywhere = n.radius < 0.0f;
     }
@@ -68,6 +79,7 @@ inline real light_tree_group(Scene scene, integer group, vec3 p, Receiver receiv
     mask apart = placed & everywhere & (near > 0.0f) & (far > 0.0f);
     value[0] = sel(apart, max_r(near, LIGHT_TREE_LEAST * far), near);
     value[LIGHT_TREE_WIDTH / 2] = sel(apart, max_r(far, LIGHT_TREE_LEAST * near), far);
+    UNROLLED
     for (int i = 0; i < LIGHT_TREE_WIDTH; i++) sum += value[i];
     return sum;
 }
@@ -87,6 +99,7 @@ inline integer light_tree_pick(Scene scene, vec3 p, Receiver receiver, real *u, 
         real sum = light_tree_group(scene, max_i(at, (integer)(0)), p, receiver, value, child);
         real target = min_r(*u, (real)(0.9999998f)) * sum, below = 0.0f, part = value[0], above = value[0];
         integer next = child[0];
+        UNROLLED
         for (int i = 1; i < LIGHT_TREE_WIDTH; i++) {
             mask beyond = target >= above;
             below = sel(beyond, above, below);
@@ -124,6 +137,7 @@ inline real light_tree_pmf(Scene scene, integer row, vec3 p, Receiver receiver)
     while (any(open)) {
         real sum = light_tree_group(scene, max_i(at, (integer)(0)), p, receiver, value, child), part = value[0];
         integer slot = as_integer(trail & (LIGHT_TREE_WIDTH - 1)), next = child[0];
+        UNROLLED
         for (int i = 1; i < LIGHT_TREE_WIDTH; i++) {
             part = sel(slot == i, value[i], part);
             next = sel_i(slot == i, child[i], next);

@@ -23,7 +23,6 @@ inline integer flight_medium(Scene scene, Slab path, Slab hit, uint at, mask ali
 }
 
 /* Step grids: distance sampling in media on grids, which replaces that in homogeneous media. */
-#include "generated/grid_origin.cl"
 
 /* No flight in a grid aims at a lamp (media/equiangular.cl). */
 inline real flight_near_share(integer name, real share) { return sel((name & MEDIUM_GRID) != 0, (real)(0.0f), share); }
@@ -34,9 +33,8 @@ inline void flight_grids(Scene scene, Slab path, uint at, mask flies, integer na
     mask gridded = flies & ((name & MEDIUM_GRID) != 0);
     if (any(gridded)) {
         natural key = grid_key(scene, load_path_pixel_key(path, at), load_path_sample(path, at), r.vertex);
-        GridOrigin origin = {(real)(0.0f)};
-        grid_origin_load(path, at, r, &origin);
-        GridFlight own = grid_flight(scene, name, *m, r.o, r.d, r.end, ratio, r.u, key, gridded, lambdas, origin);
+        GridFlight own = grid_flight(scene, name, *m, r.o, r.d, r.end, ratio, r.u, key, gridded, lambdas, path,
+                                     at);
         *light = spectrum_sel(gridded, own.light, *light);
         *weight = spectrum_sel(gridded, own.weight, *weight);
         *collides = sel_i(gridded, own.collides, *collides);

@@ -15,18 +15,21 @@ typedef struct {
     integer phase;  /* material word of the colliding part's phase function */
 } GridFlight;
 
-/* The density of a flight's direction (see Path.pdf) and where it was sampled, for grids that emit. */
-typedef struct {
-    real pdf, before; /* [1/sr]; [m] from there to the flight's origin */
-    vec3 from;
-    Receiver receiver;
-} GridOrigin;
-
 #include "generated/flight_steps_of_grids.cl"
+
+/* The same medium. Compilers do not know that a walk is always below nx: what follows from the coefficients is computed
+ * in each turn of a loop, and not kept in registers. */
+inline Medium grid_medium_again(Medium m, GridWalk w)
+{
+    mask below = w.x < w.nx;
+    m.sigma_t = spectrum_sel(below, m.sigma_t, spectrum_of(0.0f));
+    m.sigma_s = spectrum_sel(below, m.sigma_s, spectrum_of(0.0f));
+    return m;
+}
 
 /* A flight from o along d through the medium `name`, at most t metres; u: random numbers of its first segment. */
 inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 d, real t, Spectrum ratio, vec2 u,
-                              natural key, mask active, Wavelengths lambdas, GridOrigin origin)
+                              natural key, mask active, Wavelengths lambdas, Slab path, uint at)
 {
     GridFlight f = {mask_of(0), mask_of(0), t, spectrum_of(1.0f), ratio, spectrum_of(0.0f), m.phase};
     natural ways = 0u;
@@ -39,12 +42,13 @@ inline GridFlight grid_flight(Scene scene, integer name, Medium m, vec3 o, vec3 
     real left = -log_r(max_r(1.0f - u.x, (real)(1e-9f))) / sigma;
     natural count = 0u;
     while (any(active)) {
+        if (LANES == 1) m = grid_medium_again(m, w);
         GridBrick b = grid_brick(scene, w, active);
         real thick = b.most * (b.exit - w.t);
         mask meets = active & (thick > left);
         real to = sel(meets, min_r(w.t + left / max_r(b.most, (real)(1e-30f)), b.exit), b.exit);
         natural gathers = hash_natural(key ^ (0x9b05688cu + ways * 0x85ebca6bu));
-        grid_gather(scene, name, m, w, b, to, passed, dims, gathers, active, &f, lambdas, origin);
+        grid_gather(scene, name, m, w, b, to, passed, dims, gathers, active, &f, lambdas, path, at);
         ways++;
         passed += sel(active & !dims, sel(meets, left, thick), (real)(0.0f));
         w.t = sel(active, sel(meets, min_r(w.t + left / max_r(b.most, (real)(1e-30f)), b.exit), b.exit), w.t);
@@ -119,24 +123,24 @@ inline void grid_weigh_end(Medium m, real thickness, mask active, GridFlight *f)
 
 /* Adds the emission of a brick from w.t to `to`; passed: see grid_flight. */
 inline void grid_gather(Scene scene, integer name, Medium m, GridWalk w, GridBrick b, real to, real passed, mask dims,
-                        natural bits, mask active, GridFlight *f, Wavelengths lambdas, GridOrigin origin)
+                        natural bits, mask active, GridFlight *f, Wavelengths lambdas, Slab path, uint at)
 {
     integer row = grid_light_row(scene, name, w, active);
     active = active & (row != 0) & (to > w.t);
     if (!any(active)) return;
     real way = to - w.t, part = unit_interval(hash_natural(bits ^ 0x3c6ef372u)) * way;
     w.t = sel(active, w.t + part, w.t);
+    real w_met = brick_weight(scene, path, at, row, active, w.t);
     Spectrum light = grid_emission(scene, name, m, w, b, active, hash_natural(bits ^ 0xdaa66d2bu), lambdas);
     GridFlight here = *f;
     grid_weigh(m, passed + sel(dims, (real)(0.0f), b.most * part), spectrum_of(1.0f), spectrum_of(1.0f), active, &here);
-    real w_met = brick_weight(scene, row, active, origin, w.t);
     light = spectrum_scale(spectrum_mul(here.weight, light), way * w_met);
     f->light = spectrum_sel(active, spectrum_add(f->light, light), f->light);
 }
 
 /* Twin, where no grid emits. */
 inline void grid_gather(Scene scene, integer name, Medium m, GridWalk w, GridBrick b, real to, real passed, mask dims,
-                        natural bits, mask active, GridFlight *f, Wavelengths lambdas, GridOrigin origin) {}
+                        natural bits, mask active, GridFlight *f, Wavelengths lambdas, Slab path, uint at) {}
 
 /* Step collision: collisions in grids whose colours differ from point to point, and that are no mixtures. Real and
  * null collisions are weighed over a path's wavelengths, as distances are: the choice by the hero wavelength alone
@@ -231,31 +235,25 @@ inline mask grid_collide(Scene scene, integer name, Medium m, Medium own, GridWa
     return real_one;
 }
 
-/* Step origin: the origin and density of a flight's direction, for the MIS weights of emission from grids. */
-inline void grid_origin_load(Slab path, uint at, FlightRay r, GridOrigin *origin)
-{
-    origin->pdf = load_path_pdf(path, at);
-    origin->before = load_path_null_distance(path, at) - r.ray_offset;
-    origin->from = madd3(r.d, -origin->before, r.o);
-    origin->receiver = path_receiver(path, at);
-}
-
-/* Twin, where no grid emits. */
-inline void grid_origin_load(Slab path, uint at, FlightRay r, GridOrigin *origin) {}
-
 /* Step brick_weight: the MIS weight of emission that a flight gathers in a brick at distance t, against next-event
- * estimation; row: 1 + the brick's row of `lights`. */
-inline real brick_weight(Scene scene, integer row, mask active, GridOrigin origin, real t)
+ * estimation, by the density of the flight's direction and where it was sampled; row: 1 + the brick's row of `lights`.
+ * A GPU reads these again in each brick, as in lights/sky.cl. */
+inline real brick_weight(Scene scene, Slab path, uint at, integer row, mask active, real t)
 {
-    mask sought = active & (row > 0) & (origin.pdf >= 0.0f);
-    real w_met = 1.0f;
+    if (LANES == 1) at = any(row > scene.settings->light_count) ? 0u : at;
+    real pdf = load_path_pdf(path, at), w_met = 1.0f;
+    mask sought = active & (row > 0) & (pdf >= 0.0f);
     if (any(sought)) {
+        real ray_offset = sel(active, load_path_ray_offset(path, at), (real)(0.0f));
+        vec3 d = load_path_d(path, at), o = madd3(d, -ray_offset, load_path_o(path, at));
+        real before = load_path_null_distance(path, at) - ray_offset;
         integer one = sel_i(sought, row - 1, (integer)(0));
-        real pdf = brick_light_pdf(scene, one, origin.from, origin.receiver, origin.before + t);
-        w_met = sel(sought, mis_weight(origin.pdf, pdf), w_met);
+        vec3 from = madd3(d, -before, o);
+        real own = brick_light_pdf(scene, one, from, path_receiver(path, at), before + t);
+        w_met = sel(sought, mis_weight(pdf, own), w_met);
     }
     return w_met;
 }
 
 /* Twin, where no brick is a light. */
-inline real brick_weight(Scene scene, integer row, mask active, GridOrigin origin, real t) { return (real)(1.0f); }
+inline real brick_weight(Scene scene, Slab path, uint at, integer row, mask active, real t) { return (real)(1.0f); }

@@ -59,8 +59,8 @@ inline SampleBegin sample_begin(Scene scene, Slab path, uint at, mask go, intege
 inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end, integer part, integer pixel_index,
                        integer sample)
 {
+    Spectrum radiance = sky_gather(scene, path, at, end);
     Wavelengths lambdas = load_path_lambdas(path, at);
-    Spectrum radiance = sky_gather(scene, path, at, end, lambdas, load_path_radiance(path, at));
     sky_layers(scene, path, at, end, lambdas LIGHT_LAYER_PASSED);
     lambdas = seen_wavelengths(scene, path, at, lambdas);
     mask finished = end.ended & end.begun;

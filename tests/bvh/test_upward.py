@@ -64,6 +64,14 @@ def test_hits_are_those_of_planes(device, gpu, trace, shape, layout, lanes):
     assert shape == "points" or (planes["prim"] != MISS).mean() > 0.1
 
 
+@pytest.mark.parametrize("count", [1, 2, 9, 300])
+def test_trees_over_boxes(gpu, count):
+    """Of instances; trees over shapes are by planes everywhere."""
+    test_build.test_wide_tree_over_boxes(gpu, count)
+    for layout in ("wide8", "compact"):
+        test_refit.test_a_tree_over_boxes_follows_them(gpu, building.Building(gpu), layout, count)
+
+
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 127, 128, 129, 511, 512, 513, 2047, 2049])
 def test_any_number_of_triangles(device, gpu, trace, count):
     """Tiles, groups and rounds end at each of these numbers."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from clpt.render.wavefront.bounce_loop import LEAST_ITEMS
 from clpt.scene import Film, Scene, cameras, integrators, lights, materials, shapes
 from clpt.transforms import look_at
 from tests.device.bad_device import CODE, BadDevice, Launch, driver_error, no_images
+from tests.test_other_compilers import of_every_material, texts_of
 
 MIB = 1 << 20
 LOST = CODE.DEVICE_NOT_AVAILABLE
@@ -270,3 +272,33 @@ def test_no_kernel_asks_for_the_size_of_sub_groups() -> None:
     """Devices have them of 8, 16, 32 or 64 work-items; nothing hangs on that."""
     for path in device.kernels_folder().rglob("*.cl"):
         assert "sub_group" not in path.read_text(encoding="utf-8"), path
+
+
+def constant_bytes(text: str) -> int:
+    """Of tables whose entries have four bytes."""
+    return 4 * sum(map(int, re.findall(r"(?m)^(?:static )?constant \w+ \w+\[(\d+)\] =", text)))
+
+
+def test_a_device_with_little_constant_memory(
+    scene: Scene, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """4 KiB are enough but for rough coats, whose tables have 38 KiB: OpenCL promises 64."""
+    build = native_programs.build
+
+    def refuse(context: Any, on: Any, code: Any, options: Any = ()) -> Any:
+        if isinstance(code, str) and constant_bytes(code) > 4096:
+            raise driver_error(CODE.BUILD_PROGRAM_FAILURE)
+        return build(context, on, code, options)
+
+    monkeypatch.setattr(native_programs, "build", refuse)
+    monkeypatch.setattr(building, "_known", lambda *_: None)
+    assert np.array_equal(rendered(scene, BadDevice()), picture)
+    coat = materials.RoughPlastic(alpha=0.2)
+    with pytest.raises(clpt.KernelBuildError, match=r"shade\.cl. did not build"):
+        rendered(dataclasses.replace(scene, shapes=[shapes.Sphere(material=coat)]), BadDevice())
+
+
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+def test_constants_fit_what_opencl_promises(mode: str) -> None:
+    sizes = [constant_bytes(text) for text in texts_of(of_every_material(mode), (1,))]
+    assert 4096 < max(sizes) <= 64 << 10

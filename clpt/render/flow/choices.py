@@ -171,9 +171,6 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         f.lights.bodies, "media/flight.cl#emission_weight"
     ),
     "generated/aim_cone.cl": lambda f, _: either(f.media.aim_cones, "media/equiangular.cl#cone"),
-    "generated/grid_origin.cl": lambda f, _: either(
-        f.media.grids.emissive, "media/grid_flight.cl#origin"
-    ),
     "generated/flight_medium.cl": lambda f, _: either(f.media.bodies, "media/flight.cl#medium"),
     "generated/flight_steps.cl": lambda f, _: (
         *either(f.media.bodies, "media/flight.cl#medium"),

@@ -43,17 +43,17 @@ _ALONE: device.Virtual = {
 # and fewer work-items run at once. A program within a limit that does not spill has at most 4 %
 # more instructions: `python -m bench.gpu_compilers` uses them.
 _REGISTERS: dict[str, tuple[int, ...]] = {
-    "generate": (96, 112),
+    "generate": (80, 96, 112),
     "flight": (128, 144),
     "intersect": (96, 128),
-    "shadow": (80, 96),
-    "splat": (80, 96),
+    "shadow": (72, 80, 96),
+    "splat": (72, 80, 96),
     "shade_diffuse": (80, 96, 112),
-    "shade_dielectric": (112,),
+    "shade_dielectric": (96, 112, 144),
     "shade_plastic": (96, 112),
     "shade_rough_conductor": (112, 128),
-    "shade_rough_plastic": (112, 128),
-    "shade_rough_dielectric": (112, 128),
+    "shade_rough_plastic": (112, 128, 136, 144),
+    "shade_rough_dielectric": (112, 128, 144),
 }
 _REGISTERS_OF_AMD = {
     **dict.fromkeys(("generate", "emit", "shadow", "splat"), 128),

@@ -222,8 +222,8 @@ def _infinite_text(features: Features) -> list[str]:
         rows += masked(
             test,
             f"{RECORDS[kind].name} light = {row};",
-            f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
             f"*pdf = sel(m, {kind}_pdf(light, scene, hemisphere, d), *pdf);",
+            f"*radiance = spectrum_sel(m, {kind}_radiance(light, scene, d, lambdas), *radiance);",
         )
     head = (
         "void infinite_case(Scene scene, LightRow l, vec3 hemisphere, vec3 d, Wavelengths lambdas, "
