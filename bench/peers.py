@@ -66,7 +66,7 @@ numpy.save(out, total / spp)
 APART = 0.03  # of two renderers' means: beyond, they have no common reference
 FIRST_SEED = 1000  # Mitsuba adds the samples to it
 SAMPLERS = {"mitsuba": None, "mitsuba best": "multijitter"}
-FILMS = {"preview": (200, 32, 8), "final": (640, 96, 1)}
+FILMS = {"preview": (200, 32, 4), "final": (640, 96, 1)}
 """Width, samples a pixel, and how many times as many are timed."""
 TIMED = 2  # renders
 PLAIN = ("--integrator", "path", "--light-paths", "0")
