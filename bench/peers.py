@@ -5,7 +5,7 @@
 with its best sampler (multijitter; clpt reads either as Sobol). Renderers are whole processes that
 take turns with each seed. `--film preview` is 200 pixels wide and has 32 samples, `final` 640 and
 96. Time is processor time of all threads, which neighbours on the machine disturb less than the
-clock: the least of all seeds, and of previews an eighth of eight times the samples. The time of a
+clock: the least of all seeds, and of previews a quarter of four times the samples. The time of a
 picture of single samples is subtracted, and reported apart (of guiding that of `path`, since a
 guide is learnt before the first sample).
 
