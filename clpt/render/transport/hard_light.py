@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,8 @@ THIN, DENSE = 0.3, 5.0  # optical depths from a light to the camera, see bench/n
 ALL_AROUND = 0.49 * np.pi  # [rad] from a light's axis: a light that reaches it is no spot
 
 Ball = tuple[NDArray[np.float64], float]  # centre and radius
+# Its name, its place [m], its share in the power of all lights, its rows in `lights`.
+Small = tuple[str, NDArray[np.float64] | None, float, slice]
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,23 @@ class Lit:
     sources: Sources
     sphere: Ball
     extinction: NDArray[np.float64]
+
+    @cached_property
+    def eye(self) -> NDArray[np.float64]:
+        """Where the camera is in the middle of the shutter's time (3,) [m]."""
+        index, shutter = self.index, self.index.motions.shutter
+        middle = (shutter.open + shutter.close) / 2.0
+        return surroundings.camera_origin(index.camera, index.film, middle)
+
+    @cached_property
+    def bounds(self) -> light_bounds.Bounds:
+        """The bounds of all rows of `lights`."""
+        return light_bounds.concatenated([source.bounds for source in self.sources.every])
+
+    @cached_property
+    def small(self) -> tuple[Small, ...]:
+        """The small lights: those off all shapes, then shapes."""
+        return tuple(_small_lights(self))
 
 
 def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str]:
@@ -156,14 +176,14 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
         return without, "nothing is specular"
     if not _has_diffuse(index.shapes):
         return without, "there is nothing dull for a caustic to be seen on"
-    small = list(_small_lights(lit))
-    if not small:
+    if not lit.small:
         return without, "no light is small"
-    reason = f"{shapes.where(sharp)} is specular, and {small[0][0]} is a small light"
-    if sum(share for *_, share in small) < MOSTLY:
+    reason = f"{shapes.where(sharp)} is specular, and {lit.small[0][0]} is a small light"
+    if sum(share for _, _, share, _ in lit.small) < MOSTLY:
         return Path(light_paths=FEW), f"{reason}, though most light is of large ones"
     number = SOME
-    if sum(share for _, place, share in small if _is_enclosed(geometry, place)) >= MOSTLY:
+    enclosed = (s for _, place, s, _ in lit.small if _is_enclosed(geometry, place))
+    if sum(enclosed) >= MOSTLY:
         number, reason = MANY, f"{reason}, in a bulb"
     if not _sees_clear(index, geometry):
         reason = f"{reason}; the camera sees little glass and few mirrors"
@@ -197,13 +217,10 @@ def _in_fog(lit: Lit) -> tuple[Integrator, str] | None:
     if not lit.extinction.any():
         return None
     share = lit.sources.power / max(lit.sources.power.sum(), 1e-300)
-    bounds = light_bounds.concatenated([source.bounds for source in lit.sources.every])
-    spots = bounds.theta_o + bounds.theta_e < ALL_AROUND
-    index, shutter = lit.index, lit.index.motions.shutter
-    eye = surroundings.camera_origin(index.camera, index.film, (shutter.open + shutter.close) / 2.0)
+    spots = lit.bounds.theta_o + lit.bounds.theta_e < ALL_AROUND
     small = []
-    for name, place, _, rows in _small_rows(lit):
-        far = 0.0 if place is None else float(np.linalg.norm(place - eye))
+    for name, place, _, rows in lit.small:
+        far = 0.0 if place is None else float(np.linalg.norm(place - lit.eye))
         depth = far * lit.extinction[rows]
         pays = np.isnan(depth) | (depth > np.where(spots[rows], 0.0, THIN)) & (depth < DENSE)
         small.append((name, share[rows][pays].sum()))
@@ -280,15 +297,11 @@ def _has_shades(lit: Lit) -> bool:
     These are small and bright, as irradiance falls with the square of the distance. Paths from the
     camera seldom meet them, and light paths all do. Instances and analytic shapes do not count.
     """
-    index, shutter = lit.index, lit.index.motions.shutter
-    eye = surroundings.camera_origin(index.camera, index.film, (shutter.open + shutter.close) / 2.0)
-    bounds = light_bounds.concatenated([source.bounds for source in lit.sources.every])
-    placed = [(share, place, rows) for _, place, share, rows in _small_rows(lit) if share > 0.0]
     shaded = 0.0
-    for share, place, rows in sorted(placed, key=lambda lamp: -lamp[0])[:LAMPS]:
+    for _, place, share, rows in sorted(lit.small, key=lambda light: -light[2])[:LAMPS]:
         if place is not None:
-            near = SHADE * float(np.linalg.norm(eye - place))
-            met = _covered(_nearby(lit.geometry, place, near), place, _directions(bounds[rows]))
+            near = SHADE * float(np.linalg.norm(lit.eye - place))
+            met = _covered(_nearby(lit.geometry, place, near), place, _directions(lit.bounds[rows]))
             shaded += share * (len(np.unique(met)) >= SHADED * DIRECTIONS)
     return shaded >= SHADED
 
@@ -311,7 +324,9 @@ def _nearby(geometry: Geometry, place: NDArray[np.float64], near: float) -> NDAr
     ends = [*starts[1:], (None, geometry.world_vertices, world)]
     for (shape, vertex, face), (_, last_vertex, last_face) in zip(starts, ends, strict=True):
         corners = geometry.vertices[vertex:last_vertex]
-        if not len(corners) or shape.emission is not None or not _is_diffuse(shape.material):
+        if face >= world or not len(corners):  # of a group, or analytic
+            continue
+        if shape.emission is not None or not _is_diffuse(shape.material):
             continue
         if _apart(corners.min(axis=0), corners.max(axis=0), place) > near:
             continue
@@ -357,14 +372,7 @@ def _is_diffuse(material: mt.Material) -> bool:
     return not material.delta and not is_sharp(material)
 
 
-def _small_lights(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, float]]:
-    """Yield small lights: name, place [m] and share in the power of all lights."""
-    for name, place, share, _ in _small_rows(lit):
-        yield name, place, share
-
-
-def _small_rows(lit: Lit) -> Iterator[tuple[str, NDArray[np.float64] | None, float, slice]]:
-    """Yield small lights as `_small_lights` does, each with its rows in `lights`."""
+def _small_lights(lit: Lit) -> Iterator[Small]:
     motions, geometry = lit.index.motions, lit.geometry
     sources, (middle, radius) = lit.sources, lit.sphere
     lamps, share = lit.index.lights, sources.power / max(sources.power.sum(), 1e-300)

@@ -220,6 +220,13 @@ def test_more_light_paths_for_lights_in_shades(near: list[Shape], number: float)
     assert lowered.features.dull_paths_end == (number == FEW)
 
 
+def test_a_group_is_no_shade_where_it_is_described() -> None:
+    boxes = [Cube(to_world=tf.translate([0.0, y, 0.0]) @ tf.scale(0.03)) for y in (0.8, -0.8)]
+    group = Group(shapes=boxes)
+    away = [Instance(group=group, to_world=tf.translate([x, -1.5, 0.0])) for x in (0.0, 0.5)]
+    assert chosen(scene_of(ROOM, BALL, *away))[0] == FEW
+
+
 def test_a_shade_behind_a_lamp_is_none() -> None:
     lamp = flat(tf.translate([0.0, 0.8, 0.0]) @ tf.scale(0.05), emission=Area())
     for height, number in ((0.77, STREWN), (0.83, FEW)):
