@@ -263,7 +263,7 @@ def _under_gloss(
 
 
 def _saturated(color: Textured, index: float, warn: Warn) -> Textured:
-    """Return what leaves a coat of a base's color, with all reflections between them.
+    """Return the color of a base below a coat, with all reflections between base and coat.
 
     Of diffuse light within, the share F = 1 - (1 - F outside) / index^2 is reflected at the coat.
     """

@@ -1,4 +1,4 @@
-"""Maps of which few points are measured: the others are interpolated where the map is smooth.
+"""Maps with few measured points; other points are interpolated where the map is smooth.
 
 A cell is a rectangle of the map between four measured corners. The middles of its sides and of the
 cell are measured too, and compared with the bilinear interpolation of the corners. Where all agree,

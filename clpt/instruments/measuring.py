@@ -180,7 +180,7 @@ class Meter:
         )  # fmt: skip
 
     def _read(self, renderer: Renderer, shape: tuple[int, ...]) -> Measurement:
-        """Add samples until the errors are small enough; return what an instrument measures."""
+        """Add samples until the errors are small enough; return the measured values."""
         count, error = math.prod(shape), self.error
         turns = len(AXES) if self.kind.everywhere else 1
         most = max(1, math.ceil(self.samples / (REPLICAS * turns)))

@@ -312,7 +312,7 @@ def content(
 def _alike(
     prims: Shown, inherited: UsdShade.Material | None, *, in_world: bool
 ) -> Iterator[tuple[Usd.Prim, UsdShade.Material | None, list[Usd.Prim]]]:
-    """Yield prototypes and the materials of what binds none in them, with their instances."""
+    """Yield a prototype, the material of its shapes that bind none, and its instances."""
     instances, alike = prims["instances"], defaultdict[tuple[Usd.Prim, str], list[Usd.Prim]](list)
     # Nothing in the world is bound unless a prim of it binds.
     binds = prims["bindings"] or not in_world

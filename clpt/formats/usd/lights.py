@@ -65,9 +65,7 @@ def light(document: Document, prim: Usd.Prim, placement: Matrix) -> Lit:
     return Lit([], [])
 
 
-def on_mesh(
-    document: Document, prim: Usd.Prim, look: Surface, both: bool, area: Callable[[], float]
-) -> Surface:
+def on_mesh(document: Document, prim: Usd.Prim, look: Surface, both: bool, area: float) -> Surface:
     """Return the surface of a mesh with MeshLightAPI.
 
     look: that of its material. both: its back emits too. area: of the mesh, in units of the stage.
@@ -77,7 +75,7 @@ def on_mesh(
     _tell(document, prim)
     rgb = emitted(document, prim)
     if document.value(prim, "inputs:normalize", False):
-        rgb = rgb / max(area(), 1e-30)
+        rgb = rgb / max(area, 1e-30)
     if _is_shaped(document, prim):
         document.warn("shaping is left out of a mesh", prim.GetPath())
     mode = str(document.value(prim, "light:materialSyncMode", "materialGlowTintsLight"))

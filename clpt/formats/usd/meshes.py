@@ -178,12 +178,11 @@ def _all(document: Document, prim: Usd.Prim, material: UsdShade.Material | None)
     polygons = _polygons(document, prim, topology)
     both, parts = bool(document.value(prim, "doubleSided", False)), []
     shines = prim.HasAPI(UsdLux.MeshLightAPI)
+    area = _area(document, prim, polygons) if shines else 0.0
     for faces, bound in _subsets(document, prim, len(topology.counts), material):
         look = surface(document, bound, prim, both=both)
         if shines:
-            look = lights.on_mesh(
-                document, prim, look, both, lambda: _area(document, prim, polygons)
-            )
+            look = lights.on_mesh(document, prim, look, both, area)
         part = _mesh(document, prim, polygons, faces, look)
         parts += [] if part is None else [part]
     return parts
