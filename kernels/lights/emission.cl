@@ -153,7 +153,7 @@ inline real light_nee_pdf(Scene scene, integer row, vec3 p, Receiver receiver, v
 {
     LightRow l = light_at(scene, row);
     LightView view = light_view_along(light_view(scene, row, l, p, receiver.hemisphere), wi, t, n);
-    real pdf = nee_case(scene, l, view);
+    real pdf = with_openings(scene, l, p, receiver.hemisphere, wi, nee_case(scene, l, view));
     return GLOSS_BEFORE ? pdf : pdf * light_pmf(scene, row, l, p, receiver);
 }
 

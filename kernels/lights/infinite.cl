@@ -9,7 +9,7 @@ inline void infinite_light(Scene scene, int row, vec3 p, Receiver receiver, vec3
     LightView view = light_view(scene, (integer)(row), l, p, receiver.hemisphere);
     real pmf = light_pmf(scene, (integer)(row), l, p, receiver);
     infinite_case(scene, l, view.hemisphere, light_view_direction(view, d), lambdas, radiance, pdf);
-    *pdf *= pmf;
+    *pdf = with_openings(scene, l, p, receiver.hemisphere, d, *pdf) * pmf;
 }
 
 /* Radiance of a single infinite light for a path that leaves the scene along d [W m^-2 sr^-1 nm^-1], and its MIS weight

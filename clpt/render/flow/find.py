@@ -27,6 +27,7 @@ from clpt.render.geometry.surroundings import (
 )
 from clpt.render.lights.aims import aims
 from clpt.render.lights.find import Sources, sources_of
+from clpt.render.lights.openings import Openings, openings_around
 from clpt.render.media.bodies import escape_lamps, matter_of, sealed_media
 from clpt.render.media.light_media import NOWHERE, LightMedia, light_media
 from clpt.render.records.tables import LoweringCache
@@ -46,7 +47,8 @@ class Analysis:
     and radius of a sphere around the scene [m]; sources: emission of its lights; sealed: media that
     rays to lights cannot leave; light_media: media around lights; around: the media, or the matter
     of bodies, at the camera; camera_index: of refraction there, 1 where light is not sorted by
-    time; aims (k, 5): spheres that paths aim at, see `aims` and `escape_lamps`; warnings: of media.
+    time; aims (k, 5): spheres that paths aim at, see `aims` and `escape_lamps`; openings: of a
+    room, for infinite lights; warnings: of media.
     """
 
     index: SceneIndex
@@ -59,6 +61,7 @@ class Analysis:
     around: tuple[Any, ...]
     camera_index: float
     aims: NDArray[np.float32]
+    openings: Openings
     warnings: tuple[str, ...]
 
 
@@ -68,12 +71,14 @@ def analyse(
     former: Integrator | None = None,
     *,
     lit_before: bool | None = None,
+    openings: Openings | None = None,
     shared: bool = False,
 ) -> Analysis:
     """Return the facts about a scene; cache: with results of the analysis before.
 
     former: the integrator before an edit, which stays: its film has sums for light paths, or none;
-    lit_before: whether light paths were ghosts of a lens then; shared: see `SceneIndex`.
+    lit_before: whether light paths were ghosts of a lens then; openings: the ones then, which stay;
+    shared: see `SceneIndex`.
 
     Raises SceneError for an invalid scene; it names the shape, light or material.
     """
@@ -99,6 +104,7 @@ def analyse(
         light_media=lit,
         around=around,
         camera_index=index_around(scene, cache) if index.timed else 1.0,
+        openings=openings_around(index, geometry, cache) if openings is None else openings,
         aims=_aims(index, geometry, sphere[1], sealed, cache),
         warnings=(*warnings, *surroundings.warnings_of_holes(index, cache)),
     )

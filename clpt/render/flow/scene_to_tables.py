@@ -35,6 +35,7 @@ from clpt.render.geometry.find import Geometry, Owner, spheres_move
 from clpt.render.geometry.surroundings import for_rays
 from clpt.render.lights.encode import LightRows, has_tree, light_rows
 from clpt.render.lights.find import is_whole
+from clpt.render.lights.openings import Openings
 from clpt.render.materials.encode import MaterialWords, gloss_word
 from clpt.render.materials.encoder import Encoder
 from clpt.render.media.bodies import BodyWords
@@ -78,11 +79,12 @@ class Lowered:
     instances: the input of trees, see `Geometry`. tables: every other read-only array by name; the
     roots of instances' trees are filled in when trees are built. zero_copy: tables that are the
     caller's buffers. owners: of each row of `shapes`. layer_names: names in the film's layers.
-    glass_rows: of the camera, see `encode_camera`. integrator: of the scene, or the choice; reason:
-    of the choice, "" without a choice; candidates: see `SceneIndex`; samples: of the whole film, as
-    the scene demands. encoder: of the tables, for edited values. cache: for the next lowering.
-    around: media at the camera, or the matter of bodies. device_grids: densities whose bricks
-    kernels put into `images`. files: identities of the files of images.
+    glass_rows: of the camera, see `encode_camera`. openings: of a room. integrator: of the scene,
+    or the choice; reason: of the choice, "" without a choice; candidates: see `SceneIndex`;
+    samples: of the whole film, as the scene demands. encoder: of the tables, for edited values.
+    cache: for the next lowering. around: media at the camera, or the matter of bodies.
+    device_grids: densities whose bricks kernels put into `images`. files: identities of the files
+    of images.
     """
 
     features: Features
@@ -97,6 +99,7 @@ class Lowered:
     owners: tuple[Owner, ...]
     layer_names: LayerNames
     glass_rows: tuple[int, ...]
+    openings: Openings
     warnings: tuple[str, ...]
     integrator: Integrator
     reason: str
@@ -146,12 +149,15 @@ def lower(
     has left.
     """
     cache = LoweringCache(former.cache if former else None, beside.cache if beside else None)
-    integrator = lit_ghosts = None
+    integrator = lit_ghosts = openings = None
     if former is not None and not anew:
         integrator, lit_ghosts = former.integrator, former.features.transport.lit_ghosts
+        openings = former.openings
     with budget.resumed(scene.account):
         files = ImageFiles.of(named_files(scene), former.files if former else ImageFiles())
-        analysis = analyse(scene, cache, integrator, lit_before=lit_ghosts, shared=shared)
+        analysis = analyse(
+            scene, cache, integrator, lit_before=lit_ghosts, openings=openings, shared=shared
+        )
         lowered = encode(analysis, cache, texture_budget)
         files.check()
     return replace(lowered, files=files)
@@ -188,6 +194,7 @@ def encode(analysis: Analysis, cache: LoweringCache, texture_budget: int | None 
         owners=geometry.owners,
         layer_names=names,
         glass_rows=tables.glass_rows,
+        openings=analysis.openings,
         warnings=warnings,
         integrator=index.integrator,
         reason=analysis.reason,
@@ -238,6 +245,7 @@ class _Tables:
         self.store.append("shapes", shape_words(self.geometry.rows))
         self.glass_rows = self._append_camera()
         self.ambient = self._append_ambient()
+        self.openings = self.store.append("light_params", analysis.openings.words())
 
     def features(self, motion_row: int, layers: LayerFeatures) -> Features:
         """Return the features of the scene; append tangents of meshes."""
@@ -260,7 +268,9 @@ class _Tables:
                 alpha=index.film.alpha,
             ),
             transport=self._transport_features(aimed=bool(index.balanced) and aimed),
-            lights=self.lights.features(self.materials.gloss_before),
+            lights=self.lights.features(
+                self.materials.gloss_before, openings=bool(analysis.openings.rectangles)
+            ),
             media=media_features(index, self.materials, self.near, analysis.sealed, escapes=aimed),
             motion=motion_features(index, self.geometry, motion_row),
             geometry=geometry_features(index, self.geometry, self.materials, textures, self.store),
@@ -293,6 +303,9 @@ class _Tables:
             layers, disperses,
         )  # fmt: skip
         settings["aims"], settings["aim_count"] = self.aims, len(self.analysis.aims)
+        settings["openings"] = self.openings
+        settings["opening_count"] = len(self.analysis.openings.rectangles)
+        settings["opening_share"] = self.analysis.openings.share
         for name, word in zip(("bodies", "medium", "around"), self.around, strict=True):
             settings[f"camera_{name}"] = word
         settings["second_u"], settings["second_v"] = self.encoder.textures.second_uv

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -98,6 +98,15 @@ class Geometry:
     def keyed(self) -> bool:
         """Whether vertices have a row for each of several keys."""
         return any(count > 1 for count in self.keys.values())
+
+    def meshes(self) -> Iterator[tuple[Shape, slice, slice]]:
+        """Yield the shapes of triangles outside of groups, with their vertices and faces."""
+        starts = [(shape, vertex, face) for _, shape, vertex, face in self.owners]
+        world = len(self.faces) - sum(self.instances.triangles)
+        ends = [*starts[1:], (None, self.world_vertices, world)]
+        for (shape, vertex, face), (_, last_vertex, last_face) in zip(starts, ends, strict=True):
+            if face < last_face <= world:
+                yield shape, slice(vertex, last_vertex), slice(face, last_face)
 
     def bounding_sphere(self) -> tuple[NDArray[np.float64], float]:
         """Return centre and radius of a sphere around the scene; the unit sphere if it is empty.

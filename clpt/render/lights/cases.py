@@ -82,6 +82,7 @@ def dispatch_text(features: Features, densities: str = "") -> str:
     present = kinds_of(features)
     rows = [*_numbers(features, present), *included(*_includes(features))]
     rows += _tree_text() if features.lights.tree else included("lights/light.cl#by_power")
+    rows += [*_infinite_case(features), *_openings_text(features)]
     if present:
         rows += [_lamps_text(features), *_areas_text(features)]
     rows += included(either(present, "lights/sampling.cl"))
@@ -90,7 +91,8 @@ def dispatch_text(features: Features, densities: str = "") -> str:
         rows += included(f"lights/kinds/{BRICK}.cl#chosen")
     if BODY in present:
         rows += included(f"lights/kinds/{BODY}.cl#chosen")
-    return "\n".join([*rows, *_infinite_text(features), ""])
+    infinite = included("lights/infinite.cl") if features.lights.infinite else []
+    return "\n".join([*rows, *infinite, ""])
 
 
 def _numbers(features: Features, present: list[str]) -> list[str]:
@@ -211,11 +213,12 @@ def _areas_text(features: Features) -> list[str]:
     return [*([points_of.text()] * bool(surfaces)), pdf.text(), *areas]
 
 
-def _infinite_text(features: Features) -> list[str]:
+def _infinite_case(features: Features) -> list[str]:
     """Return `infinite_case`: radiance and density of an infinite light, where it was lowered."""
     kinds = [kind for kind in others_of(features) if kind in INFINITE]
     if not kinds:
         return []
+    tests = " | ".join(f"(l.kind == LIGHT_{kind.upper()})" for kind in kinds)
     rows = ["*radiance = spectrum_of(0.0f);", "*pdf = 0.0f;"]
     for kind in kinds:
         row = row_text(features, kind, test := kind_test(kind, kinds))
@@ -229,7 +232,16 @@ def _infinite_text(features: Features) -> list[str]:
         "void infinite_case(Scene scene, LightRow l, vec3 hemisphere, vec3 d, Wavelengths lambdas, "
         "Spectrum *radiance, real *pdf)"
     )
-    return [function(head, *rows), *included("lights/infinite.cl")]
+    return [function(head, *rows), f"#define light_is_infinite(l) ({tests})"]
+
+
+def _openings_text(features: Features) -> list[str]:
+    """Return the openings of a room, and their record."""
+    if not features.lights.openings:
+        return included(f"lights/openings.cl{TWIN}")
+    opening = light_records.OPENING
+    words = f"#define OPENING_WORDS {opening.words}"
+    return [opening.row_text(), words, *included("lights/openings.cl")]
 
 
 def emission_text(features: Features) -> str:

@@ -165,8 +165,8 @@ class LightRows:
         """The kinds that occur, in their order."""
         return tuple(KINDS[i] for i in sorted({*self.rows["kind"].tolist()}))
 
-    def features(self, gloss: int = 0) -> LightFeatures:
-        """Return the features of these rows; gloss: see `LightFeatures`."""
+    def features(self, gloss: int = 0, *, openings: bool = False) -> LightFeatures:
+        """Return the features of these rows; gloss, openings: see `LightFeatures`."""
         modes = self.rows["emission_mode"]
         shine = (self.rows["shape"] >= 0) & (modes & (ALONG | UNSEEN) == 0)
         infinite = self.sources.infinite > 0
@@ -180,6 +180,7 @@ class LightRows:
             tree=self.tree is not None,
             few=len(self.rows) <= FEW_LIGHTS,
             gloss=gloss,
+            openings=openings,
         )
 
 

@@ -215,6 +215,16 @@ NODE = Record(
     products=("vec3", "mean of the normals' y z, z x and x y"),
     child=("integer", "the group of its children; below 0: -1 - the row in `lights`"),
 )
+OPENING = Record(
+    "Opening",
+    "A rectangle that the light of infinite lights comes through.",
+    center=("vec3", "[m]"),
+    x=("vec3", "half an edge, over its square: 1 at the border [1/m]"),
+    y=("vec3", ""),
+    n=("vec3", "unit normal"),
+    area=("real", "[m^2]"),
+    reach=("real", "half the diagonal [m]"),
+)
 WIDTH = 4  # nodes of a group
 LINE = 16  # words; the first group begins at a multiple of it
 
@@ -265,6 +275,7 @@ class LightFeatures:
     directed: bool = False  # the light of some shape depends on its direction
     tree: bool = False  # a tree chooses among the lights
     gloss: int = 0  # the gloss stands so many words before a material's row; 0: no gloss
+    openings: bool = False  # of a room, for infinite lights
     few: bool = flag("FEW_LIGHTS", True)  # a single random number chooses a light and a point
 
     @property

@@ -319,18 +319,13 @@ def _directions(bounds: light_bounds.Bounds) -> NDArray[np.float64]:
 def _nearby(geometry: Geometry, place: NDArray[np.float64], near: float) -> NDArray[np.float64]:
     """Return pieces (n, 10) of diffuse shapes that emit no light, close to a place [m]."""
     found = [np.zeros((0, 10))]
-    starts = [(shape, vertex, face) for _, shape, vertex, face in geometry.owners]
-    world = len(geometry.faces) - sum(geometry.instances.triangles)
-    ends = [*starts[1:], (None, geometry.world_vertices, world)]
-    for (shape, vertex, face), (_, last_vertex, last_face) in zip(starts, ends, strict=True):
-        corners = geometry.vertices[vertex:last_vertex]
-        if face >= world or not len(corners):  # of a group, or analytic
-            continue
+    for shape, vertices, faces in geometry.meshes():
+        corners = geometry.vertices[vertices]
         if shape.emission is not None or not _is_diffuse(shape.material):
             continue
         if _apart(corners.min(axis=0), corners.max(axis=0), place) > near:
             continue
-        triangles_ = geometry.vertices[geometry.faces[face:last_face]].astype(np.float64)
+        triangles_ = geometry.vertices[geometry.faces[faces]].astype(np.float64)
         close = _apart(triangles_.min(axis=1), triangles_.max(axis=1), place) <= near
         found.append(np.pad(triangles_[close].reshape(-1, 9), ((0, 0), (0, 1))))
     return np.concatenate(found)
