@@ -1,4 +1,4 @@
-"""Whole scenes beside Cycles: that of Blender's exporters, an arm that bends, all nodes at once."""
+"""Whole scenes beside Cycles: that of Blender's exporters, and ten frames of an arm that bends."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.blender.test_nodes import documented, kinds
-from tests.blender.test_surfaces import SIZE, pictures, stage
+from tests.blender.test_surfaces import pictures, stage
 
 bpy: Any = pytest.importorskip("bpy")
 
@@ -115,61 +114,3 @@ def test_the_scene_of_the_exporters(assets: Path, tmp_path: Path) -> None:
     ours, cycles = pictures(tmp_path, 256, 12)
     assert quarters(ours) == pytest.approx(quarters(cycles), rel=0.05)
     assert ours.mean() == pytest.approx(cycles.mean(), rel=0.03)
-
-
-def test_every_node_in_one_scene(tmp_path: Path) -> None:
-    """A ball for each shader and for ten other nodes together; those glow, and are as in Cycles."""
-    page, rows = documented(), kinds()
-    balls, same, other = [], [], []
-    for label, (_, name) in rows.items():
-        node = bpy.data.materials["all"].node_tree.nodes.new(name)
-        if node.outputs and node.outputs[0].type == "SHADER":
-            balls.append([name])
-        elif node.outputs:
-            (same if page.get(label, "").startswith("the same") else other).append(name)
-    glowing = [part[i : i + 10] for part in (same, other) for i in range(0, len(part), 10)]
-    for number, names in enumerate([*glowing, *balls]):
-        place = number % 6 - 2.5, number // 6 - 2.5
-        bpy.ops.mesh.primitive_uv_sphere_add(radius=0.5, location=(*place, 0.0))
-        bpy.context.object.data.materials.append(together(names, glow=number < len(glowing)))
-    scene = lit(300.0)
-    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 6.0
-    scene.camera.location, scene.camera.rotation_euler = (0.0, 0.0, 5.0), (0.0, 0.0, 0.0)
-    shown = pictures(tmp_path, 64)
-    edge = SIZE // 6
-    for number in range((len(same) + 9) // 10):
-        x, y = number % 6 * SIZE // 6, (5 - number // 6) * SIZE // 6
-        ours, cycles = (part[y : y + edge, x : x + edge].mean() for part in shown)
-        assert ours == pytest.approx(cycles, rel=0.02), glowing[number]
-    assert np.isfinite(shown[0]).all()
-    assert shown[0].mean() == pytest.approx(shown[1].mean(), rel=0.05)
-
-
-def together(names: list[str], *, glow: bool) -> Any:
-    """Return a material of a shader, or one that glows with the mean of nodes at its places."""
-    material = bpy.data.materials.new("m")
-    material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
-    end, place = (tree.nodes.new(f"ShaderNode{n}") for n in ("OutputMaterial", "TexCoord"))
-    parts = [tree.nodes.new(name) for name in names]
-    if not glow:
-        volume = parts[0].name.startswith(("Volume", "Principled Volume"))
-        tree.links.new(parts[0].outputs[0], end.inputs["Volume" if volume else "Surface"])
-        return material
-    total = None
-    for part in parts:
-        for socket in part.inputs:
-            if socket.name == "Vector" and socket.enabled:
-                tree.links.new(place.outputs["Generated"], socket)
-        step = tree.nodes.new("ShaderNodeVectorMath")
-        step.operation = "MULTIPLY_ADD"
-        step.inputs[1].default_value = (1.0 / len(parts),) * 3
-        tree.links.new(next(s for s in part.outputs if s.enabled), step.inputs[0])
-        if total is not None:
-            tree.links.new(total.outputs[0], step.inputs[2])
-        total = step
-    emission = tree.nodes.new("ShaderNodeEmission")
-    tree.links.new(total.outputs[0], emission.inputs["Color"])
-    tree.links.new(emission.outputs[0], end.inputs["Surface"])
-    return material

@@ -158,19 +158,25 @@ def painted(width: int = 64) -> Any:
     return image
 
 
-@pytest.mark.parametrize("how", ["plain", "placed", "bent", "packed", "file", "missing", "none"])
+@pytest.mark.parametrize(
+    "how", ["plain", "placed", "bent", "packed", "file", "encoded", "missing", "none"]
+)
 def test_images(how: str, tmp_path: Path) -> None:
-    """Images in memory and in files, at coordinates that nodes compute, and those that are lost."""
+    """Images in memory and in files, at coordinates that nodes compute, and those that are lost.
+
+    Blender 5 writes an .exr as sRGB, and says so in it: Blender then has it in linear values.
+    """
     image = painted()
-    if how in ("packed", "file", "missing"):
+    if how in ("packed", "file", "encoded", "missing"):
         image.filepath_raw, image.file_format = str(tmp_path / "painted.exr"), "OPEN_EXR"
         image.save()
         bpy.data.images.remove(image)
         image = bpy.data.images.load(str(tmp_path / "painted.exr"))
-        image.colorspace_settings.name = "Linear Rec.709"
+        if how != "encoded":
+            image.colorspace_settings.name = "Linear Rec.709"
         if how == "packed":
             image.pack()
-        if how != "file":
+        if how not in ("file", "encoded"):
             (tmp_path / "painted.exr").unlink()
         image.name = "renamed"
         if how == "missing":
