@@ -252,7 +252,7 @@ def _crosses(vertices: NDArray[Any], faces: Faces) -> NDArray[Any]:
 
 
 def _cross_columns(vertices: NDArray[Any], faces: Faces) -> NDArray[Any]:
-    """The same as columns (3, m): numpy is slow along short axes."""
+    """Return cross products as columns (3, m): numpy is slow along short axes."""
     columns = np.ascontiguousarray(vertices.T)
     first, second, third = (columns.take(faces[:, i], axis=1) for i in range(3))
     (ax, ay, az), (bx, by, bz) = second - first, third - first

@@ -122,9 +122,7 @@ class DeviceFilm:
         )
         self._opened: Wavefront | None = None
         self.beside = beside if in_turn else None
-        self._spare: OrderedDict[tuple[float, ...], Wavefront] | None = None
-        if in_turn:
-            self._spare = OrderedDict()
+        self._spare = OrderedDict[tuple[float, ...], Wavefront]() if in_turn else None
         lowered = self.lower(scene, share, former, anew=True)
         self.seconds["lower"] = time.perf_counter() - start
         self._opened = first = self.create(lowered)
