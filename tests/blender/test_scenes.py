@@ -95,8 +95,8 @@ def test_ten_frames_of_a_bent_arm(shine: float, frames: Sequence[int], tmp_path:
 def test_the_scene_of_the_exporters(assets: Path, tmp_path: Path) -> None:
     """Shaders, hair, instances, four lamps, a dome and motion of Blender's own USD file.
 
-    Without what Cycles does in another way: it blends texels before it decodes sRGB, clamps light
-    and blurs caustics.
+    Without what Cycles does in another way: it blends texels before it decodes sRGB, clamps light,
+    blurs caustics, and loses light of the blurred border of a small sun.
     """
     folder, scene = assets / "blender", bpy.context.scene
     bpy.ops.wm.usd_import(filepath=str(folder / "materialx.usdc"))
@@ -105,6 +105,7 @@ def test_the_scene_of_the_exporters(assets: Path, tmp_path: Path) -> None:
     scene.world.use_nodes = True
     tree = scene.world.node_tree
     sky = tree.nodes.new("ShaderNodeTexEnvironment")
+    sky.interpolation = "Closest"
     sky.image = bpy.data.images.load(str(folder / "sky.exr"))
     tree.links.new(sky.outputs["Color"], tree.nodes["Background"].inputs["Color"])
     for node in bpy.data.materials["floor"].node_tree.nodes:
@@ -112,5 +113,5 @@ def test_the_scene_of_the_exporters(assets: Path, tmp_path: Path) -> None:
             node.interpolation = "Closest"
     scene.cycles.sample_clamp_indirect = scene.cycles.blur_glossy = 0.0
     ours, cycles = pictures(tmp_path, 256, 12)
-    assert quarters(ours) == pytest.approx(quarters(cycles), rel=0.05)
-    assert ours.mean() == pytest.approx(cycles.mean(), rel=0.03)
+    assert quarters(ours) == pytest.approx(quarters(cycles), rel=0.03)
+    assert ours.mean() == pytest.approx(cycles.mean(), rel=0.02)
