@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from pxr import Sdf, Usd, UsdShade
+from pxr import Sdf, Tf, Usd, UsdShade
 
 from clpt import images
 from clpt.files import input_files
@@ -103,14 +103,12 @@ def _sided(inner: Material) -> Material:
 def _bound(document: Document, material: UsdShade.Material, both: bool) -> Surface:
     """Return a material that a prim binds: that of MaterialX, else its universal surface."""
     name, path = material.GetPrim().GetName(), str(material.GetPath())
-    uses = Uses(document)
-    network: Any = _network(document, material)
-    if network is None:
-        network, uses = _of_document(document, material) or (None, uses)
+    network = _network(document, material) or _of_document(document, material)
     if network is not None:
-        read = materialx.surface(network, uses, name)
+        read = materialx.surface(*network, name)
         found = Surface(read.material, read.emission, interior=read.interior)
-        return _told(document, path, found, uses, both)
+        return _told(document, path, found, network[1], both)
+    uses = Uses(document)
     shader = material.ComputeSurfaceSource("")[0]
     node = Node(document, shader) if shader else None
     if node is None or node.kind != PREVIEW:
@@ -137,7 +135,7 @@ def stand_in(file: Path) -> Sdf.Layer:
     layer = Sdf.Layer.CreateAnonymous(f"{file.name}.usda")
     layer.defaultPrim = MATERIALX
     for name in materialx.networks(file)[0]:
-        place = Sdf.Path(f"/{MATERIALX}/Materials/{name}")
+        place = Sdf.Path(f"/{MATERIALX}/Materials/{Tf.MakeValidIdentifier(name)}")
         prim = Sdf.CreatePrimInLayer(layer, place)
         for path in place.GetPrefixes():
             layer.GetPrimAtPath(path).specifier = Sdf.SpecifierDef
@@ -148,7 +146,7 @@ def stand_in(file: Path) -> Sdf.Layer:
 
 @dataclass
 class _DocumentUses(Uses):
-    """What a material of a document of MaterialX uses: its images lie beside the document."""
+    """The uses of a material in a document of MaterialX, beside which its images lie."""
 
     folder: Path = Path()
 
@@ -157,23 +155,26 @@ class _DocumentUses(Uses):
         return super().image(Sdf.AssetPath(named, str(self.folder / named)), path)
 
 
-def _of_document(document: Document, material: UsdShade.Material) -> tuple[Any, Uses] | None:
-    """Return the shader of a material of a `stand_in`, and what it uses; None for others."""
+def _of_document(
+    document: Document, material: UsdShade.Material
+) -> tuple[materialx.Node, Uses] | None:
+    """Return the shader of a material of a `stand_in`, and its uses; None for others."""
     told = material.GetPrim().GetCustomData()
     if FILE not in told:
         return None
     file = input_files.named("usd", document.file.parent, Path(str(told[FILE])))
     found, _ = document.once(("materialx", str(file)), lambda: materialx.networks(file))
-    return found[str(told[NAME])], _DocumentUses(document, folder=file.parent)
+    node = found.get(str(told.get(NAME)))
+    return None if node is None else (node, _DocumentUses(document, folder=file.parent))
 
 
-def _network(document: Document, material: UsdShade.Material) -> Node | None:
-    """Return the surface shader of MaterialX that a material has; None without one."""
+def _network(document: Document, material: UsdShade.Material) -> tuple[materialx.Node, Uses] | None:
+    """Return the shader of MaterialX that a material has, and its uses; None without one."""
     for context in CONTEXTS:
         found = material.ComputeSurfaceSource(context)[0]
         node = Node(document, found) if found else None
         if node is not None and node.kind.startswith("ND_") and "UsdPreview" not in node.kind:
-            return node
+            return node, Uses(document)
     return None
 
 
