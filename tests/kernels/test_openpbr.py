@@ -100,7 +100,17 @@ FURNACE = {
     "coat": ({"coat_weight": 1.0, "coat_roughness": 0.3}, 0.012),
     "coated metal": ({"coat_weight": 1.0, "coat_roughness": 0.3, "base_metalness": 1.0}, 0.04),
     "fuzz": ({"fuzz_weight": 1.0}, 0.03),
-    "film": ({"thin_film_weight": 1.0}, 0.08),
+    "film": ({"thin_film_weight": 1.0}, 0.06),
+    "bubble": (
+        {
+            "transmission_weight": 1.0,
+            "thin_film_weight": 1.0,
+            "specular_roughness": 0.05,
+            "specular_ior": 1.0,
+            "thin_walled": 1,
+        },
+        0.006,
+    ),
 }
 
 
