@@ -103,7 +103,7 @@ class Geometry:
         """Yield the shapes of triangles outside of groups, with their vertices and faces."""
         starts = [(shape, vertex, face) for _, shape, vertex, face in self.owners]
         world = len(self.faces) - sum(self.instances.triangles)
-        ends = [*starts[1:], (None, self.world_vertices, world)]
+        ends = [*starts, (None, self.world_vertices, world)][1:]
         for (shape, vertex, face), (_, last_vertex, last_face) in zip(starts, ends, strict=True):
             if face < last_face <= world:
                 yield shape, slice(vertex, last_vertex), slice(face, last_face)
