@@ -53,6 +53,8 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     store_path_cone(path, at, on, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
     path_scatters(scene, path, at, on, null, &v, scatter, mis_ratio, bs, onward);
     store_path_eta(path, at, on, eta);
+    real slope = load_path_slope(path, at) + slope_across(scene, v.row, scatter.lambdas, scatter.wo, bs.wi);
+    store_path_slope(path, at, on, slope);
     vertex_end(path, at, met, on, null, v.state + path_escapes(scene, path, shadow, at, next, v, scatter, bs, onward));
     store_path_ratio(path, at, on, ratio);
 }
