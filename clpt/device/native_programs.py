@@ -24,6 +24,7 @@ from pyopencl import _cl
 log = logging.getLogger(__name__)
 
 REGISTERS_VERBOSE = "-cl-nv-verbose"
+_STANDARD = "-cl-std"
 _USED = re.compile(r"Used (\d+) registers")
 _SPILLED = re.compile(r"(\d+) bytes spill stores")
 _P = TypeVar("_P")
@@ -36,19 +37,25 @@ def build(
 
     Raises pyopencl.Error with the driver's log.
     """
-    if isinstance(code, str):
-        program = _cl._Program(context, code)
-    else:
-        program = _cl._Program(context, [device], [code])
-    return _tried(program, device, lambda: program._build(_joined(options), [device]))
+    source = (code,) if isinstance(code, str) else ([device], [code])
+
+    def attempt(flags: bytes) -> cl.Program:
+        program = _cl._Program(context, *source)
+        return _tried(program, device, lambda: program._build(flags, [device]))
+
+    return _with_or_without_standard(options, attempt)
 
 
 def compile_part(
     context: cl.Context, device: cl.Device, text: str, options: Sequence[str] = ()
 ) -> cl.Program:
     """Compile a text for linking. Raises pyopencl.Error with the driver's log."""
-    program = _cl._Program(context, text)
-    return _tried(program, device, lambda: program.compile(_joined(options), [device], []))
+
+    def attempt(flags: bytes) -> cl.Program:
+        program = _cl._Program(context, text)
+        return _tried(program, device, lambda: program.compile(flags, [device], []))
+
+    return _with_or_without_standard(options, attempt)
 
 
 def binary(program: cl.Program) -> bytes:
@@ -112,5 +119,21 @@ def with_fewest_registers(
     return program, 0 if used else None
 
 
-def _joined(options: Sequence[str]) -> bytes:
-    return " ".join(options).encode()
+def _with_or_without_standard(options: Sequence[str], attempt: Callable[[bytes], _P]) -> _P:
+    """Return the result of `attempt`; if the driver refuses `-cl-std`, leave that option out.
+
+    By OpenCL's specification a compiler then takes the latest version of 1.x that it has.
+    """
+    try:
+        return attempt(" ".join(options).encode())
+    except cl.Error as error:
+        others = [option for option in options if not option.startswith(_STANDARD)]
+        if len(others) == len(options) or not _refuses_standard(error):
+            raise
+        log.debug("the driver refuses %s: %s", _STANDARD, error)
+    return attempt(" ".join(others).encode())
+
+
+def _refuses_standard(error: cl.Error) -> bool:
+    refused = (cl.status_code.INVALID_BUILD_OPTIONS, cl.status_code.INVALID_COMPILER_OPTIONS)
+    return error.code in refused or _STANDARD in str(error)
