@@ -3,19 +3,28 @@
 /* Step. */
 #include "transport/light_path.cl#sampler"
 
-/* Stores the shadow ray from a point of a surface, or of infinity, to the camera. */
-inline void connect_camera(Slab shadow, uint at, mask active, mask shine, Surface s, CameraPoint c, Spectrum value)
+/* Stores where the shadow ray from a point of a surface, or of infinity, to the camera runs, in the lanes `kept`; returns
+ * its length. */
+inline real connect_camera_aim(Slab shadow, uint at, mask kept, Surface s, CameraPoint c)
 {
     LightSample ls;
     ls.wi = neg3(c.d);
     ls.t = c.t;
-    shadow_toward(shadow, at, active, shine, s, ls, value);
-    mask away = shine & (c.t >= FAR);
+    real t = shadow_aim(shadow, at, kept, s, ls);
+    mask away = kept & (c.t >= FAR);
     if (any(away)) {
         store_shadow_o(shadow, at, away, c.o);
         store_shadow_d(shadow, at, away, c.d);
     }
-    store_shadow_film(shadow, at, shine, c.film);
+    store_shadow_film(shadow, at, kept, c.film);
+    return t;
+}
+
+/* Stores the length and the value of the ray in the lanes that `shine`, and no ray in other active lanes. */
+inline void connect_camera(Slab shadow, uint at, mask active, mask shine, real t, Spectrum value)
+{
+    store_shadow_t(shadow, at, active, sel(shine, t, (real)(-1.0f)));
+    store_shadow_value(shadow, at, LANES == 1 ? active : shine, value);
 }
 
 /* Step sampler: the random numbers of paths from lights. */
