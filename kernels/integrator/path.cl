@@ -35,7 +35,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
         v.state += next_event_keep(scene, path, shadow, at, active, v, event);
         scatter.wo = to_frame(scatter.shading.frame, neg3(load_path_d(path, at)));
     }
-    BsdfSample bs = onward_sample(scatter, guided, &ratio MERGE_PASSED);
+    BsdfSample bs = onward_sample(scene, path, at, scatter, guided, &ratio MERGE_PASSED);
     if (LANES > 1) v.state += next_event_keep(scene, path, shadow, at, active, v, event);
 
     mask null = vertex_is_null(bs.lobe);
@@ -45,6 +45,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
         v.state = layers_record(scene, path, at, met & !null, v, scatter, v.state LAYER_PASSED);
     }
     vec3 onward = normalize3(to_world(scatter.shading.frame, bs.wi));
+    if (LANES == 1 && BSDF_DELTA) v.beta = vertex_beta_again(scene, path, at, active, v);
     Spectrum beta = spectrum_scale(spectrum_mul(v.beta, bs.weight), shading_frame_share(scatter.shading, onward));
     real eta = load_path_eta(path, at) * bs.eta;
     mask on = path_roulette(scene, path, at, next, null, v, scatter, guided, eta, &beta);

@@ -1,6 +1,6 @@
 /* Adds the light of photons around a vertex, where they are merged. Afterwards a GPU reads the path's throughput and
  * wavelengths again, so that compilers do not keep them, and what follows from them, in registers while photons are
- * weighed: they do not know that a scene with photons has light paths. */
+ * weighed. */
 inline void merge_at_vertex(Scene scene, Slab path, uint at, mask met, Vertex *v, Scattering *scatter,
                             MisRatio mis_ratio, Spectrum ratio SHADE_ARGS)
 {
@@ -9,11 +9,9 @@ inline void merge_at_vertex(Scene scene, Slab path, uint at, mask met, Vertex *v
         integer sample = load_path_sample(path, at);
         Spectrum merged = merge_photons(scene, merges, *v, *scatter, mis_ratio, ratio, sample MERGE_PASSED);
         if (LANES == 1) {
-            uint again = at + (scene.settings->light_paths < 0.0f);
-            scatter->lambdas = load_path_lambdas(path, again);
+            scatter->lambdas = load_path_lambdas(path, at_again(scene, at));
             if (!BSDF_FLUORESCES) v->lambdas = scatter->lambdas;
-            v->beta = load_path_beta(path, again);
-            v->beta = vertex_arriving(scene, path, again, merges, *v);
+            v->beta = vertex_beta_again(scene, path, at, merges, *v);
         }
         /* This light has been at a specular vertex and at this vertex, so its depth is 2. Its group is unknown. */
         light_layers_add(scene, path, at, merges, (integer)(2), (integer)(0), (real)(0.0f),
