@@ -182,7 +182,7 @@ inline integer light_joined(Scene scene, Slab shadow, uint at, mask ended, mask 
     /* A ray from infinity is traced from the camera. */
     store_shadow_through(shadow, at, shine, sel_i(r.away, camera_through(scene), light_through(scene, lit)));
     r.seen = medium_dims(scene, medium, c.t, lambdas, r.seen);
-    real t = connect_camera_aim(shadow, at, shine, s, c);
+    real t = connect_camera_aim(shadow, at, LANES == 1 ? ended : shine, s, c);
     connect_camera(shadow, at, ended, shine, t, spectrum_scale(r.seen, cosine * c.importance));
     return sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 }
