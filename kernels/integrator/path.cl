@@ -1,7 +1,6 @@
-/* A vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on. Light
- * is found both by meeting it and by choosing it; the two are weighted by the power heuristic (Veach 1997, 9.2.4), and
- * against paths from lights where a scene has them (transport/mis_ratio.cl). Steps that a scene or a material does not
- * have do nothing. */
+/* A vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on. Light is
+ * found by meeting it and by choosing it, with weights of the power heuristic (Veach 1997, 9.2.4), also against paths
+ * from lights (transport/mis_ratio.cl). Steps that a scene or a material does not have do nothing. */
 #include "lights/light.cl#met"
 #include "generated/ghosts.cl"
 #include "generated/light_layers.cl"
@@ -35,7 +34,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
         v.state += next_event_keep(scene, path, shadow, at, active, v, event);
         scatter.wo = to_frame(scatter.shading.frame, neg3(load_path_d(path, at)));
     }
-    BsdfSample bs = onward_sample(scene, path, at, scatter, guided, &ratio MERGE_PASSED);
+    BsdfSample bs = onward_sample(scene, path, at, met, &v, scatter, guided, &ratio MERGE_PASSED);
     if (LANES > 1) v.state += next_event_keep(scene, path, shadow, at, active, v, event);
 
     mask null = vertex_is_null(bs.lobe);
@@ -45,7 +44,6 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
         v.state = layers_record(scene, path, at, met & !null, v, scatter, v.state LAYER_PASSED);
     }
     vec3 onward = normalize3(to_world(scatter.shading.frame, bs.wi));
-    if (LANES == 1 && BSDF_DELTA) v.beta = vertex_beta_again(scene, path, at, active, v);
     Spectrum beta = spectrum_scale(spectrum_mul(v.beta, bs.weight), shading_frame_share(scatter.shading, onward));
     real eta = load_path_eta(path, at) * bs.eta;
     mask on = path_roulette(scene, path, at, next, null, v, scatter, guided, eta, &beta);

@@ -103,28 +103,15 @@ inline real light_begins_pdf(Scene scene, integer row, vec3 p, Receiver receiver
     return light_emit_pdf(scene, row, wi, t);
 }
 
-/* Step next_event: the shadow ray of a vertex. */
-
-/* Stores the ray's origin and direction in the lanes `kept`; returns its length. It runs from the offset point to the
- * light's point, because a ray along ls.wi would miss that point. */
+/* Step next_event: stores where a shadow ray runs, in the lanes `kept`; returns its length. It runs from the offset
+ * point to the light's point, because a ray along ls.wi would miss that point. */
 inline real shadow_aim(Slab shadow, uint at, mask kept, Surface s, LightSample ls)
 {
     vec3 from = surface_offset(s, ls.wi), to = sub3(madd3(ls.wi, ls.t, s.p), from);
     real t = sqrt(dot3(to, to));
-    mask near = ls.t < FAR;
     store_shadow_o(shadow, at, kept, from);
-    store_shadow_d(shadow, at, kept, sel3(near, scale3(to, 1.0f / t), ls.wi));
-    return sel(near, t, ls.t) * SHADOW_SHORTER;
-}
-
-/* Stores a shadow ray in the lanes that `shine`, and none in other active lanes. On a GPU all active lanes store: a
- * condition would cost registers. */
-inline void shadow_toward(Slab shadow, uint at, mask active, mask shine, Surface s, LightSample ls, Spectrum value)
-{
-    mask kept = LANES == 1 ? active : shine;
-    real t = shadow_aim(shadow, at, kept, s, ls);
-    store_shadow_t(shadow, at, active, sel(shine, t, (real)(-1.0f)));
-    store_shadow_value(shadow, at, kept, value);
+    store_shadow_d(shadow, at, kept, sel3(ls.t < FAR, scale3(to, 1.0f / t), ls.wi));
+    return sel(ls.t < FAR, t, ls.t) * SHADOW_SHORTER;
 }
 
 /* Step met: the mis_ratio of a camera path that meets a light. */

@@ -3,9 +3,9 @@
 /* Step. */
 #include "transport/light_path.cl#sampler"
 
-/* Stores where the shadow ray from a point of a surface, or of infinity, to the camera runs, in the lanes `kept`; returns
- * its length. */
-inline real connect_camera_aim(Slab shadow, uint at, mask kept, Surface s, CameraPoint c)
+/* Stores where the shadow ray from a point of a surface, or of infinity, to the camera runs, in the lanes `kept`.
+ * Returns its length. */
+inline real connect_camera(Slab shadow, uint at, mask kept, Surface s, CameraPoint c)
 {
     LightSample ls;
     ls.wi = neg3(c.d);
@@ -18,13 +18,6 @@ inline real connect_camera_aim(Slab shadow, uint at, mask kept, Surface s, Camer
     }
     store_shadow_film(shadow, at, kept, c.film);
     return t;
-}
-
-/* Stores the length and the value of the ray in the lanes that `shine`, and no ray in other active lanes. */
-inline void connect_camera(Slab shadow, uint at, mask active, mask shine, real t, Spectrum value)
-{
-    store_shadow_t(shadow, at, active, sel(shine, t, (real)(-1.0f)));
-    store_shadow_value(shadow, at, LANES == 1 ? active : shine, value);
 }
 
 /* Step sampler: the random numbers of paths from lights. */
