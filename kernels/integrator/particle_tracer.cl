@@ -49,8 +49,7 @@ inline void light_path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask
     v.state += join_camera(scene, shadow, at, active, v, scatter, mis_ratio, joint, arrives);
 
     vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);
-    BsdfSample bs = bsdf_sample(scatter.bsdf, scatter.wo, v3(uv.x, uv.y, scatter.choice.y));
-    bs = hero_sample(scatter.bsdf, scatter.wo, bs, &ratio);
+    BsdfSample bs = hero_sample(scatter.bsdf, scatter.wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
     mask null = vertex_is_null(bs.lobe), next = active & (bs.pdf > 0.0f) & vertex_continues(scene, v, null);
     vec3 onward = normalize3(to_world(scatter.shading.frame, bs.wi));
     Spectrum carried = adjoint_weight(v, scatter, bs, next, VERTEX_COSINE(v.s.n, onward) * arrives);

@@ -1,6 +1,6 @@
-/* A vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on. Light is
- * found by meeting it and by choosing it, with weights of the power heuristic (Veach 1997, 9.2.4), also against paths
- * from lights (transport/mis_ratio.cl). Steps that a scene or a material does not have do nothing. */
+/* A vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on. Light
+ * is found by meeting it and by choosing it, with weights of the power heuristic (Veach 1997, 9.2.4), against paths from
+ * lights too (transport/mis_ratio.cl). Steps that a scene or a material does not have do nothing. */
 #include "lights/light.cl#met"
 #include "generated/ghosts.cl"
 #include "generated/light_layers.cl"
@@ -34,7 +34,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
         v.state += next_event_keep(scene, path, shadow, at, active, v, event);
         scatter.wo = to_frame(scatter.shading.frame, neg3(load_path_d(path, at)));
     }
-    BsdfSample bs = onward_sample(scene, path, at, met, &v, scatter, guided, &ratio MERGE_PASSED);
+    BsdfSample bs = onward_sample(scatter, guided, &ratio MERGE_PASSED);
     if (LANES > 1) v.state += next_event_keep(scene, path, shadow, at, active, v, event);
 
     mask null = vertex_is_null(bs.lobe);

@@ -31,8 +31,7 @@ inline integer whitted_light(Scene scene, Slab shadow, uint at, mask active, Ver
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(own, f), ls.radiance), w);
     value = vertex_beyond(scene, v, ls.wi, ls.t, scatter.lambdas, value);
     mask kept = LANES == 1 ? active : shine;
-    real t = shadow_aim(shadow, at, kept, v.s, ls);
-    store_shadow_t(shadow, at, active, sel(shine, t, (real)(-1.0f)));
+    store_shadow_t(shadow, at, active, sel(shine, shadow_aim(shadow, at, kept, v.s, ls), (real)(-1.0f)));
     store_shadow_value(shadow, at, kept, value);
     store_shadow_into(shadow, at, shine, volume_medium(scene, sel_i(shine, ls.row, (integer)(0))));
     store_shadow_through(shadow, at, shine, vertex_through(v, ls.wi));
@@ -70,7 +69,7 @@ inline void integrator_vertex(Scene scene, Slab path, Slab hit, Slab shadow, uin
 #else
     vec2 uv = sampler_pair(sampler, scatter.dimension + DIMENSION_BSDF);
     Spectrum ratio = load_path_ratio(path, at);
-    BsdfSample bs = hero_sample(m, wo, bsdf_sample(m, wo, v3(uv.x, uv.y, scatter.choice.y)), &ratio);
+    BsdfSample bs = hero_sample(m, wo, v3(uv.x, uv.y, scatter.choice.y), &ratio);
     vec3 wi = bs.wi;
     beta = spectrum_mul(beta, bs.weight);
     mask next = active & (bs.pdf > 0.0f);

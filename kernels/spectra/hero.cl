@@ -43,12 +43,14 @@ inline void hero_goes_alone(BsdfSample *s, Spectrum *ratio)
 /* Twin, where directions hold for all wavelengths. */
 inline void hero_goes_alone(BsdfSample *s, Spectrum *ratio) {}
 
-/* Step sample: a sample whose pdf and weight are those of the four. A direction that is not finite has a pdf of 0. */
+/* Step sample: bsdf_sample, its pdf and weight those of the four together. A direction that is not finite has a pdf of
+ * 0, so that the path ends: it would leave the scene, and no sky knows where. */
 #include "generated/hero_steps.cl"
 #include "generated/pair.cl"
 
-inline BsdfSample hero_sample(Bsdf m, vec3 wo, BsdfSample s, Spectrum *ratio)
+inline BsdfSample hero_sample(Bsdf m, vec3 wo, vec3 u, Spectrum *ratio)
 {
+    BsdfSample s = bsdf_sample(m, wo, u);
     s.pdf = sel(dot3(s.wi, s.wi) < 4.0f, s.pdf, (real)(0.0f)); /* NaN fails the comparison */
     hero_weighs(m, wo, &s, ratio);
     hero_goes_alone(&s, ratio);

@@ -66,19 +66,6 @@ inline Vertex vertex_load(Scene scene, Slab path, Slab hit, uint at, mask active
     return v;
 }
 
-#if BSDF_DELTA || BSDF_MERGES
-/* The slot, by which a GPU reads again what it read before: compilers then do not keep that in registers. They do not
- * know that it is `at`. */
-inline uint at_again(Scene scene, uint at) { return at + (scene.settings->max_depth < 0); }
-/* Vertex.beta, read again. */
-inline Spectrum vertex_beta_again(Scene scene, Slab path, uint at, mask active, Vertex v)
-{
-    uint again = at_again(scene, at);
-    v.beta = load_path_beta(path, again);
-    return vertex_arriving(scene, path, again, active, v);
-}
-#endif
-
 /* Loads the material. Where it fluoresces, the `active` paths take the wavelengths of the incident light. */
 inline Scattering vertex_scattering(Scene scene, Slab path, uint at, mask active, Vertex v, Sampler sampler)
 {

@@ -1,6 +1,5 @@
-/* Adds the light of photons around a vertex, where they are merged. Afterwards a GPU reads the path's throughput and
- * wavelengths again, so that compilers do not keep them, and what follows from them, in registers while photons are
- * weighed. */
+/* Adds the light of photons around a vertex, where they are merged. A GPU then reads throughput and wavelengths again,
+ * in a slot that compilers do not know to be `at`: else they keep them in registers while photons are weighed. */
 inline void merge_at_vertex(Scene scene, Slab path, uint at, mask met, Vertex *v, Scattering *scatter,
                             MisRatio mis_ratio, Spectrum ratio SHADE_ARGS)
 {
@@ -9,9 +8,11 @@ inline void merge_at_vertex(Scene scene, Slab path, uint at, mask met, Vertex *v
         integer sample = load_path_sample(path, at);
         Spectrum merged = merge_photons(scene, merges, *v, *scatter, mis_ratio, ratio, sample MERGE_PASSED);
         if (LANES == 1) {
-            scatter->lambdas = load_path_lambdas(path, at_again(scene, at));
+            uint again = at + (scene.settings->max_depth < 0);
+            scatter->lambdas = load_path_lambdas(path, again);
             if (!BSDF_FLUORESCES) v->lambdas = scatter->lambdas;
-            v->beta = vertex_beta_again(scene, path, at, merges, *v);
+            v->beta = load_path_beta(path, again);
+            v->beta = vertex_arriving(scene, path, again, merges, *v);
         }
         /* This light has been at a specular vertex and at this vertex, so its depth is 2. Its group is unknown. */
         light_layers_add(scene, path, at, merges, (integer)(2), (integer)(0), (real)(0.0f),

@@ -151,7 +151,7 @@ inline BsdfSample guide_sample(global const uint *guide, Guided g, Bsdf m, Frame
                                real chance, Spectrum *ratio)
 {
     Spectrum before = *ratio;
-    BsdfSample s = hero_sample(m, wo, bsdf_sample(m, wo, u), ratio);
+    BsdfSample s = hero_sample(m, wo, u, ratio);
     mask known = g.light > 0.0f;
     if (!any(known)) return s;
     mask delta = (s.lobe & LOBE_DELTA) != 0;

@@ -18,8 +18,7 @@ typedef struct {
 inline real guided_pdf(Guided guided, vec3 d, real p MERGE_ARGS) { return guide_pdf(guide, guided, d, p); }
 
 /* Samples the next direction by guide and material. */
-inline BsdfSample onward_sample(Scene scene, Slab path, uint at, mask active, Vertex *v, Scattering scatter,
-                                Guided guided, Spectrum *ratio MERGE_ARGS)
+inline BsdfSample onward_sample(Scattering scatter, Guided guided, Spectrum *ratio MERGE_ARGS)
 {
     vec2 uv = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_BSDF);
     /* The hero wavelength must not depend on the other candidate, so the random numbers differ. */
@@ -46,16 +45,8 @@ inline Guided guide_at(Scene scene, Surface s, vec3 d MERGE_ARGS) { Guided g = {
 inline real guided_pdf(Guided guided, vec3 d, real p MERGE_ARGS) { return p; }
 inline mask guided_plays(Slab path, uint at, Guided guided, Spectrum beta, Scattering scatter, mask *next,
                          Spectrum *after) { return mask_of(0); }
-inline BsdfSample onward_sample(Scene scene, Slab path, uint at, mask active, Vertex *v, Scattering scatter,
-                                Guided guided, Spectrum *ratio MERGE_ARGS)
+inline BsdfSample onward_sample(Scattering scatter, Guided guided, Spectrum *ratio MERGE_ARGS)
 {
     vec2 uv = sampler_pair(scatter.sampler, scatter.dimension + DIMENSION_BSDF);
-    BsdfSample s = bsdf_sample(scatter.bsdf, scatter.wo, v3(uv.x, uv.y, scatter.choice.y));
-#if BSDF_DELTA
-    if (LANES == 1) { /* a GPU has too few registers to hold these while films are computed */
-        *ratio = load_path_ratio(path, at_again(scene, at));
-        v->beta = vertex_beta_again(scene, path, at, active, *v);
-    }
-#endif
-    return hero_sample(scatter.bsdf, scatter.wo, s, ratio);
+    return hero_sample(scatter.bsdf, scatter.wo, v3(uv.x, uv.y, scatter.choice.y), ratio);
 }
