@@ -1,6 +1,6 @@
 /* A vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on. Light
- * is found by meeting it and by choosing it, with weights of the power heuristic (Veach 1997, 9.2.4), against paths from
- * lights too (transport/mis_ratio.cl). Steps that a scene or a material does not have do nothing. */
+ * is found by meeting and by choosing it, with weights of the power heuristic (Veach 1997, 9.2.4), against paths from
+ * lights (transport/mis_ratio.cl). Steps that a scene or a material does not have do nothing. */
 #include "lights/light.cl#met"
 #include "generated/ghosts.cl"
 #include "generated/light_layers.cl"
