@@ -32,6 +32,7 @@ Boxes = NDArray[np.float32]  # (n, 2, 3): lowest and highest corners
 Balls = NDArray[np.float32]  # (n, 4): centre and radius
 
 LARGEST = float(np.finfo(np.float32).max)  # number of a parameter, as kernels have float32
+SINGLE_ENDS = np.float64(2.0**128 - 2.0**103)  # numbers from here on round to infinity as float32
 _PYTHON = {"b": bool, "i": int, "u": int, "f": float}  # by the kinds of NumPy's types
 
 
@@ -128,7 +129,7 @@ def vectors(values: ArrayLike, where: str) -> Floats:
 
 def fits_single(values: ArrayLike) -> bool:
     """Return whether values are finite as float32 too."""
-    return bool(np.isfinite(single(values)).all())
+    return bool((np.abs(values) < SINGLE_ENDS).all())
 
 
 def plain(value: object) -> Any:
@@ -166,6 +167,8 @@ def number(value: object, where: str | None = None, words: str = "a number") -> 
 
     words: what messages call it.
     """
+    if type(value) is float and -LARGEST <= value <= LARGEST:
+        return value
     number = real(value, where, words)
     if not math.isfinite(number):
         raise SceneError(f"must be finite, not {number}", where=where)

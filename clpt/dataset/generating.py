@@ -25,7 +25,6 @@ from clpt.dataset.truth import Truth, ground_truth, truth_scene
 from clpt.dataset.writers import WRITERS, Writer
 from clpt.errors import ClptError, SceneError, UnknownKindError
 from clpt.files import output_files
-from clpt.render.film_renderer import maker_of
 from clpt.render.flow.scene_to_tables import lower
 from clpt.render.options import RenderOptions
 from clpt.render.records import Features
@@ -192,14 +191,13 @@ class Renderers:
         if self.open:
             self.open[0].update(scene=scene)
         else:
-            self.open.append(Renderer(scene, self.device, **self.options))
-            maker_of(self.open[0]).home.keep_forms()
+            self.open.append(Renderer(scene, self.device, in_turn=True, **self.options))
 
     def _for_truth(self, scene: Scene) -> Renderer:
         if len(self.open) == 1:
             light = self.open[0]
-            self.open.append(Renderer(truth_scene(scene), light.device, beside=light))
-            maker_of(self.open[1]).home.beside = maker_of(light).home
+            bare = truth_scene(scene)
+            self.open.append(Renderer(bare, light.device, beside=light, in_turn=True))
         return self.open[1]
 
 

@@ -20,7 +20,7 @@ from clpt.scene import materials as mt
 from clpt.scene.cameras import Calibrated, Perspective
 from clpt.scene.conventions import calibrated, pose
 from clpt.scene.integrators import Box, Path
-from clpt.scene.motion import decomposed, rotation
+from clpt.scene.motion import rotations
 from clpt.scene.shapes import Shape
 from clpt.scene.studio import shape_bounds
 
@@ -114,7 +114,7 @@ def _read(renderer: Renderer, scene: Scene, bare: Scene, silhouettes: bool) -> T
     camera = pose(np.asarray(scene.camera.to_world, np.float64), "opencv")
     hit = layers["shape_id"] >= 0
     depth = np.where(hit, layers["position"] @ camera[2, :3] + camera[2, 3], 0.0)
-    placed = [_placed([scene.shapes[i] for i in shapes]) for shapes in rows.values()]
+    poses, sizes = _placed([[scene.shapes[i] for i in shapes] for shapes in rows.values()])
     alone = None
     if silhouettes:
         alone = np.zeros((len(rows), *hit.shape), bool)
@@ -125,8 +125,7 @@ def _read(renderer: Renderer, scene: Scene, bare: Scene, silhouettes: bool) -> T
         names=tuple(rows), categories=tuple(map(category, rows)), instances=instances,
         depth=depth, position=layers["position"], normal=layers["geometric_normal"],
         camera=camera, matrix=_intrinsics(scene),
-        poses=np.array([matrix for matrix, _ in placed]).reshape(-1, 4, 4),
-        sizes=np.array([size for _, size in placed]).reshape(-1, 2, 3),
+        poses=poses, sizes=sizes,
         visible=np.bincount(instances.ravel(), minlength=len(rows) + 1)[1:], silhouettes=alone,
     )  # fmt: skip
 
@@ -168,7 +167,7 @@ def _plain(shape: Shape, hide_lights: bool) -> Shape:
     bounds = shape.interior is not None or shape.exterior is not None  # of a medium
     if hidden or bounds or not isinstance(shape.material, OPAQUE):
         return shape
-    return dataclasses.replace(shape, material=WHITE, emission=None)
+    return shape.altered(material=WHITE, emission=None)
 
 
 def _layers(renderer: Renderer, bare: Scene) -> dict[str, Floats]:
@@ -181,15 +180,16 @@ def _layers(renderer: Renderer, bare: Scene) -> dict[str, Floats]:
     }
 
 
-def _placed(shapes: list[Shape]) -> tuple[Floats, Floats]:
-    """Return the rigid pose (4, 4) of an object, and its lowest and highest corners (2, 3)."""
-    shift, turn, _ = decomposed(np.asarray(shapes[0].to_world, np.float64))
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = rotation(turn), shift
-    back = np.linalg.inv(matrix)
-    boxes = [shape_bounds(shape.placed(back @ np.asarray(shape.to_world))) for shape in shapes]
-    low, high = zip(*boxes, strict=True)
-    return matrix, np.array([np.min(low, axis=0), np.max(high, axis=0)])
+def _placed(by_object: list[list[Shape]]) -> tuple[Floats, Floats]:
+    """Return rigid poses (n, 4, 4) of objects, and their lowest and highest corners (n, 2, 3)."""
+    placed = [np.asarray(shapes[0].to_world, np.float64) for shapes in by_object]
+    poses, sizes = np.array(placed).reshape(-1, 4, 4), np.zeros((len(placed), 2, 3))
+    poses[:, :3, :3] = rotations(poses[:, :3, :3])
+    for back, shapes, size in zip(np.linalg.inv(poses), by_object, sizes, strict=True):
+        boxes = [shape_bounds(shape.placed(back @ np.asarray(shape.to_world))) for shape in shapes]
+        low, high = zip(*boxes, strict=True)
+        size[:] = np.min(low, axis=0), np.max(high, axis=0)
+    return poses, sizes
 
 
 def _intrinsics(scene: Scene) -> Floats | None:

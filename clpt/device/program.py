@@ -10,6 +10,7 @@ import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import astuple, dataclass
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -53,9 +54,15 @@ class Argument:
     type: str
     space: str
 
-    @property
+    @cached_property
     def by_value(self) -> bool:
         return self.space == "private" and not self.type.endswith("*")
+
+    @cached_property
+    def _scalar(self) -> tuple[str, int]:
+        """The scalar type, and the length of a vector, 0 of a scalar."""
+        vector = _VECTOR.match(self.type)
+        return (vector[1], int(vector[2])) if vector else (self.type, 0)
 
     def value(self, value: Any) -> Any:
         """Return a value in the driver's form: scalars and vectors in the argument's type.
@@ -68,19 +75,17 @@ class Argument:
             return value
         if isinstance(value, (np.void, np.ndarray)):
             return value
-        vector = _VECTOR.match(self.type)
-        name = vector[1] if vector else self.type
+        name, length = self._scalar
         base = _SCALARS.get(name)
         if base is None:  # a struct, an image or a sampler
             return value
         if name in _LIMITS:  # NumPy before 2 truncates silently
             least, most = _LIMITS[name]
-            numbers = value if vector else (value,)
+            numbers = value if length else (value,)
             if not all(least <= number <= most for number in numbers):
                 raise OverflowError(f"it goes from {least} to {most}")
-        if vector is None:
+        if not length:
             return base(value)
-        length = int(vector[2])
         packed = np.zeros(4 if length == 3 else length, base)
         packed[:length] = value
         return packed

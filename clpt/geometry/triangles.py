@@ -236,8 +236,8 @@ def _solid(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
     """Return which faces have a cross product whose square is not zero in float32."""
     has_area, vertices = np.empty(len(faces), np.bool_), _wide(vertices)
     for first in range(0, len(faces), CHUNK):
-        crosses = _crosses(vertices, faces[first : first + CHUNK])
-        has_area[first : first + CHUNK] = (np.abs(crosses) > LEAST_CROSS).any(axis=1)
+        x, y, z = np.abs(_cross_columns(vertices, faces[first : first + CHUNK])) > LEAST_CROSS
+        has_area[first : first + CHUNK] = x | y | z
     return has_area
 
 
@@ -248,9 +248,15 @@ def _wide(vertices: NDArray[Any]) -> NDArray[Any]:
 
 def _crosses(vertices: NDArray[Any], faces: Faces) -> NDArray[Any]:
     """Cross products of the edges at each triangle's first vertex, (m, 3) like the vertices."""
-    v0, v1, v2 = (vertices[faces[:, i]] for i in range(3))
-    (ax, ay, az), (bx, by, bz) = (v1 - v0).T, (v2 - v0).T
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+    return _cross_columns(vertices, faces).T
+
+
+def _cross_columns(vertices: NDArray[Any], faces: Faces) -> NDArray[Any]:
+    """Return cross products as columns (3, m): numpy is slow along short axes."""
+    columns = np.ascontiguousarray(vertices.T)
+    first, second, third = (columns.take(faces[:, i], axis=1) for i in range(3))
+    (ax, ay, az), (bx, by, bz) = second - first, third - first
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def triangle_areas(vertices: Points, faces: Faces) -> NDArray[np.float64]:

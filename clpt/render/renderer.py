@@ -30,7 +30,9 @@ class Renderer(ResumableRenderer):
     device: where to render, a name or index (see clpt.device.choose), or a clpt.device.Device.
     progress: called when a step has ended, in a thread of the driver. beside: another renderer, of
     a similar scene, such as the same in another size: shared parts are prepared once, so an array
-    that both scenes have must hold the same values. options: see `RenderOptions`.
+    that both scenes have must hold the same values. in_turn: many scenes follow each other, so
+    memory is kept for kinds of paths that come again; `beside` then gets the same shapes before
+    each `update` of this renderer, which renders by its trees. options: see `RenderOptions`.
 
     It may be used from several threads, whose calls exclude each other. With `with`, `close`, or
     when it is dropped, it gives the device's memory back.
@@ -48,12 +50,15 @@ class Renderer(ResumableRenderer):
         *,
         progress: OnProgress | None = None,
         beside: Renderer | None = None,
+        in_turn: bool = False,
         **options: Unpack[RenderOptions],
     ):
         check_scene(scene)
         check_options(scene, options)
-        former = None if beside is None else beside._maker.home.wavefront.scene.lowered
-        home = DeviceFilm(scene, open_device(device, options), options, former=former)
+        near = None if beside is None else beside._maker.home
+        former = None if near is None else near.wavefront.scene.lowered
+        on = open_device(device, options)
+        home = DeviceFilm(scene, on, options, former=former, beside=near, in_turn=in_turn)
         super().__init__(DeviceMaker(home), home.denoise, options.get("first_sample", 0))
         self._progress_of_steps = progress
 

@@ -181,18 +181,19 @@ def named_files(whole: object) -> set[str]:
     waiting: list[tuple[Any, str]] = [(whole, "")]
     while waiting:
         part, form = waiting.pop()
-        if isinstance(part, NAMELESS) or id(part) in seen:
+        if id(part) in seen:
             continue
         seen[id(part)] = part
         if form in FILES and isinstance(part, (str, os.PathLike)):
             paths.add(os.fspath(part))
         elif hasattr(part, "__dataclass_fields__"):
             fields = fields_of(part)
-            waiting += [(fields[name], form) for name, form in _plan(part.__class__)]
+            below = ((fields[name], form) for name, form in _plan(part.__class__))
+            waiting += [each for each in below if not isinstance(each[0], NAMELESS)]
         elif isinstance(part, dict):
             waiting += [(value, form) for value in part.values()]
         elif isinstance(part, (list, tuple)) and form not in ARRAYS:
-            waiting += [(value, form) for value in part]
+            waiting += [(value, form) for value in part if not isinstance(value, NAMELESS)]
     return paths
 
 

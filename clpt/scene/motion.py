@@ -261,11 +261,15 @@ def decomposed(
 
     The linear part is R S, S symmetric (polar decomposition); S takes a mirror image along.
     """
-    u, sizes, v = np.linalg.svd(matrix[:3, :3])
-    turn, stretch = u @ v, (v.T * sizes) @ v
-    if np.linalg.det(turn) < 0.0:
-        turn, stretch = -turn, -stretch
-    return matrix[:3, 3], quaternion(turn), stretch
+    turn = rotations(matrix[None, :3, :3])[0]
+    return matrix[:3, 3], quaternion(turn), turn.T @ matrix[:3, :3]
+
+
+def rotations(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rotations in linear maps (n, 3, 3) by polar decomposition."""
+    u, _, v = np.linalg.svd(linear)
+    turn = u @ v
+    return turn * np.where(np.linalg.det(turn) < 0.0, -1.0, 1.0)[:, None, None]
 
 
 def quaternion(r: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -36,7 +36,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from operator import attrgetter
 from types import MappingProxyType
-from typing import Any, ClassVar, Literal, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, cast
 
 import numpy as np
 
@@ -47,6 +47,10 @@ from clpt.scene import roles
 from clpt.scene.roles import HostForm, Param
 from clpt.spectra import Constant, Spectrum
 
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+PLAIN = {bool, int, float, str, type(None)}  # types of most values
 MOST_PARTS, MOST_NESTED = 1000, 64  # of a material, texture, light or medium
 
 
@@ -227,7 +231,8 @@ class KindType(type):
             raise TypeError(message)
         try:
             plain = _spelled_out(kind, arguments)
-            return super().__call__(**{name: in_memory(value) for name, value in plain.items()})
+            held = {n: v if type(v) in PLAIN else in_memory(v) for n, v in plain.items()}
+            return super().__call__(**held)
         except SceneError as error:
             name, where = arguments.get("name"), error.where or kind.kind
             if name and isinstance(name, str) and where.startswith(kind.kind):
@@ -298,12 +303,17 @@ class Kind(metaclass=KindType):
 
     def __post_init__(self) -> None:
         parts, depth, textured = 1, 0, False
-        valid = _valid_defaults(type(self))
-        for name, param in params(type(self)).items():
-            value = getattr(self, name)
+        valid, read = _valid_defaults(type(self)), _fields(type(self))[1]
+        declared = params(type(self))
+        for name, value in zip(_fields(type(self))[0], read(self), strict=False):
+            if name not in declared:
+                continue
+            param = declared[name]
             if valid.get(name, valid) is not value:
                 value = _checked(value, param, f"{self.kind}.{name}")
                 object.__setattr__(self, name, value)
+            if type(value) in PLAIN:
+                continue
             for inner in value if isinstance(value, tuple) else (value,):
                 if isinstance(inner, Kind):
                     seen = param.role.place != "host"  # by kernels
@@ -320,6 +330,12 @@ class Kind(metaclass=KindType):
 
     def check(self) -> None:
         """Raise SceneError where the parameters contradict each other."""
+
+    def altered(self, **values: object) -> Self:
+        """Return a copy with other values, which are valid: nothing is checked again."""
+        other = object.__new__(type(self))
+        vars(other).update(vars(self), **values)
+        return other
 
     def __repr__(self) -> str:
         """Return the class, and the parameters that differ from their defaults."""
@@ -413,6 +429,8 @@ def interior_params(cls: type[Kind]) -> Mapping[str, Param]:
 
 
 def _checked(value: object, param: Param, where: str) -> Any:
+    if type(value) in PLAIN:
+        return param.role.check(value, param, where)
     if isinstance(value, Kind) and value.is_texture and param.role.place != "host":
         if not param.textured:
             raise SceneError("cannot be a texture", where=where)

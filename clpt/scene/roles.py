@@ -51,6 +51,9 @@ class Role:
     place: Literal["row", "inside", "host"] = "row"
     advice: str = ""
 
+    def __hash__(self) -> int:
+        return hash(self.name)
+
     def __str__(self) -> str:
         return self.name
 
@@ -161,6 +164,7 @@ class Data(Role):
 
     cls: type[Any] = object
     words: str = ""
+    __hash__ = Role.__hash__
 
     def check(self, value: object, param: Param, where: str | None) -> Any:
         if not isinstance(value, (self.cls, type(None))):
@@ -184,6 +188,7 @@ class Spectral(Role):
     names: Callable[[str], Spectrum] | None = None
     measured: bool = False
     grey: bool = False
+    __hash__ = Role.__hash__
 
     def check(self, value: object, param: Param, where: str | None) -> Any:
         if isinstance(value, str) and self.codes and value.startswith("#"):

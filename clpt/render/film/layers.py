@@ -233,8 +233,10 @@ def _near_one(words: Words) -> NDArray[np.float64]:
 
 
 def _long(words: Words) -> NDArray[np.float64]:
+    """Return sums of four words each; two words lie 24 bits apart, so two are a whole number."""
     parts = words.view(np.int32).reshape(-1, len(LONG_UNITS), *words.shape[1:])
-    return np.tensordot(np.array(LONG_UNITS), parts.astype(np.float64), (0, 1))
+    whole = (parts[:, ::2].astype(np.int64) << 24) + parts[:, 1::2]
+    return whole[:, 0] * LONG_UNITS[1] + whole[:, 1] * LONG_UNITS[3]
 
 
 def viewable(name: str, layer: Image) -> Image:

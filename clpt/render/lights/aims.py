@@ -20,11 +20,15 @@ CLUSTERS = 256  # most clusters into which specular pieces are cut
 CELLS = 16  # along each side of a grid that merges many pieces cell by cell
 GAP = 0.05  # of the span of pieces along an axis: wider gaps are cut first
 PRICE = 1e-3  # of a sphere, over the area of all: a cut that gains less is not made
+COMPACT = 0.5  # of the area of its surface, of the disk of a shape that no cut improves: a ball's
+# has .25, a cube's .39, that of a ring with a tenth of its radius .96, a square's 1.57
 PAD = 1.01  # radius over the radius of the pieces inside
 ROUNDING = 4e-6  # of the scene's coordinates, added to a radius
 
-# Pieces are (n, 10): three corners of a triangle, and how far a piece reaches beyond it [m]. Cuts
-# use columns (16, n), with the lowest and highest coordinates: numpy is slow along short axes.
+# Pieces are (n, 11): three corners of a triangle, how far a piece reaches beyond it [m], and the
+# area of its surface [m^2]. Cuts use columns (21, n), with the lowest and highest coordinates, and
+# the number and the middle of the shape: numpy is slow along short axes.
+LOW, HIGH, SHAPE, MIDDLE = slice(11, 14), slice(14, 17), 17, slice(18, 21)
 
 
 def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[np.float32]:
@@ -41,7 +45,7 @@ def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[
     pieces = [part for part in by_shape if len(part)]
     if not pieces:
         return none
-    spheres = _spheres(np.concatenate(pieces))
+    spheres = _spheres(pieces)
     centre, radius = np.split(spheres[np.argsort(spheres[:, 3], kind="stable")], [3], axis=1)
     if len(radius) == 1 and radius[0] > LARGE * scene_radius:
         return none
@@ -96,8 +100,10 @@ def sharp_pieces(
             yield _fewer(pieces if prototype < 0 else _placed(geometry, pieces, prototype, moving))
 
 
-def _pieces(middles: NDArray[np.float64], reach: NDArray[np.float64]) -> Floats:
-    return np.hstack([middles, middles, middles, reach[:, None]])
+def _pieces(middles: Floats, reach: Floats, areas: Floats | None = None) -> Floats:
+    """Return pieces around points; areas: by default those of balls that a cut may part."""
+    areas = 2 * np.pi * reach * reach if areas is None else areas
+    return np.column_stack([middles, middles, middles, reach, areas])
 
 
 def _in_boxes(boxes: NDArray[np.float64], round_: bool) -> Floats:
@@ -107,8 +113,12 @@ def _in_boxes(boxes: NDArray[np.float64], round_: bool) -> Floats:
 
 
 def _of_triangles(geometry: Geometry, face: int, end: int) -> Floats:
-    corners = geometry.vertices[geometry.faces[face:end]].astype(np.float64)
-    return np.hstack([corners.reshape(-1, 9), np.zeros((len(corners), 1))])
+    corners = geometry.vertices[geometry.faces[face:end]].astype(np.float64).reshape(-1, 9)
+    ax, ay, az, bx, by, bz = np.hstack([corners[:, 3:6], corners[:, 6:]]).T - np.tile(
+        corners[:, :3].T, (2, 1)
+    )
+    squares = (ay * bz - az * by) ** 2 + (az * bx - ax * bz) ** 2 + (ax * by - ay * bx) ** 2
+    return np.column_stack([corners, np.zeros(len(corners)), 0.5 * np.sqrt(squares)])
 
 
 def _placed(geometry: Geometry, pieces: Floats, prototype: int, moving: Collection[int]) -> Floats:
@@ -125,20 +135,22 @@ def _placed(geometry: Geometry, pieces: Floats, prototype: int, moving: Collecti
     return placed
 
 
-def _columns(pieces: Floats) -> Floats:
-    columns = np.empty((16, len(pieces)))
-    columns[:10] = pieces.T
+def _columns(pieces: Floats, shape: int = 0) -> Floats:
+    columns = np.empty((21, len(pieces)))
+    columns[:11] = pieces.T
     (a, b, c), reach = columns[:9].reshape(3, 3, -1), columns[9]
-    columns[10:13] = np.minimum(np.minimum(a, b), c) - reach
-    columns[13:] = np.maximum(np.maximum(a, b), c) + reach
+    columns[LOW] = low = np.minimum(np.minimum(a, b), c) - reach
+    columns[HIGH] = high = np.maximum(np.maximum(a, b), c) + reach
+    columns[SHAPE] = shape
+    columns[MIDDLE] = ((low.min(axis=1) + high.max(axis=1)) / 2)[:, None]
     return columns
 
 
 def _around(columns: Floats, runs: Integers) -> Floats:
     """Return spheres (k, 4) about the middles of the boxes of runs; runs: their first pieces."""
     sizes = np.diff(runs, append=columns.shape[1])
-    low = np.minimum.reduceat(columns[10:13], runs, axis=1)
-    centre = (low + np.maximum.reduceat(columns[13:], runs, axis=1)) / 2
+    low = np.minimum.reduceat(columns[LOW], runs, axis=1)
+    centre = (low + np.maximum.reduceat(columns[HIGH], runs, axis=1)) / 2
     squares = (columns[:9].reshape(3, 3, -1) - np.repeat(centre, sizes, axis=1)) ** 2
     away = np.sqrt(squares[:, 0] + squares[:, 2] + squares[:, 1])
     radius = np.maximum.reduceat((away + columns[9]).max(axis=0), runs)
@@ -149,9 +161,9 @@ def _cuts(columns: Floats, runs: Integers) -> tuple[Integers, Integers, NDArray[
     """Return an order of the pieces in which each run is cut, its first part, and whether by a gap.
 
     Pieces stay in their runs. The first part has a number of pieces (k,), 0 of a single piece.
-    Without a wide gap along an axis, the longest axis is halved.
+    Without a wide gap along an axis, the longest axis is halved, whole shapes on each side.
     """
-    lows, highs = columns[10:13], columns[13:]
+    lows, highs = columns[LOW], columns[HIGH]
     sizes = np.diff(runs, append=columns.shape[1])
     run = np.repeat(np.arange(len(runs)), sizes)
     low = np.minimum.reduceat(lows, runs, axis=1)
@@ -163,7 +175,7 @@ def _cuts(columns: Floats, runs: Integers) -> tuple[Integers, Integers, NDArray[
     axis = gaps.argmax(axis=0)
     each = np.arange(len(runs))
     has_gap = gaps[axis, each] > GAP
-    middles = (lows + highs) / 2
+    middles = np.where(_several(columns, runs)[run], columns[MIDDLE], (lows + highs) / 2)
     least = np.minimum.reduceat(middles, runs, axis=1)
     most = np.maximum.reduceat(middles, runs, axis=1)
     longest = (most - least).argmax(axis=0)
@@ -174,6 +186,12 @@ def _cuts(columns: Floats, runs: Integers) -> tuple[Integers, Integers, NDArray[
     left = np.where(left == 0, sizes // 2, left)  # all at the same point
     order = np.where(has_gap[run], np.array(orders)[axis[run], np.arange(len(run))], halved)
     return order, np.where(has_gap, np.array(places)[axis, each] - runs + 1, left), has_gap
+
+
+def _several(columns: Floats, runs: Integers) -> NDArray[np.bool_]:
+    """Return whether runs are of several shapes (k,)."""
+    shapes_ = columns[SHAPE]
+    return np.asarray(np.minimum.reduceat(shapes_, runs) < np.maximum.reduceat(shapes_, runs))
 
 
 def _widest_gaps(
@@ -202,7 +220,7 @@ def _fewer(pieces: Floats) -> Floats:
     if len(pieces) <= CELLS**3:
         return pieces
     columns = _columns(pieces)
-    lows, highs = columns[10:13], columns[13:]
+    lows, highs = columns[LOW], columns[HIGH]
     middles = (lows + highs) / 2
     least = middles.min(axis=1, keepdims=True)
     span = np.maximum(np.ptp(middles, axis=1, keepdims=True), 1e-30)
@@ -212,13 +230,16 @@ def _fewer(pieces: Floats) -> Floats:
     firsts = np.flatnonzero(np.diff(cells[order], prepend=-1))
     low = np.minimum.reduceat(lows[:, order], firsts, axis=1)
     high = np.maximum.reduceat(highs[:, order], firsts, axis=1)
-    return _in_boxes(np.stack([low.T, high.T], axis=1), False)
+    reach = np.linalg.norm(high - low, axis=0) / 2
+    areas = np.add.reduceat(pieces[order, 10], firsts)
+    return _pieces((low + high).T / 2, reach, areas)
 
 
 class _Clusters:
     """Clusters of pieces by number: the sphere around each, and the two into which it is cut.
 
-    Each is a run of `columns`; pieces of a cluster stand in the order of its parts.
+    Each is a run of `columns`; pieces of a cluster stand in the order of its parts. bounds: its
+    first column, that of its second part, and its end; the first two are the same if it stays.
     """
 
     def __init__(self, columns: Floats):
@@ -229,20 +250,28 @@ class _Clusters:
         self._add(np.array([[0, columns.shape[1]]]))
 
     def _add(self, bounds: Integers) -> None:
-        """Add clusters, from their first columns to their ends (k, 2)."""
+        """Add clusters, from their first columns to their ends (k, 2); order those to be cut."""
         sizes = bounds[:, 1] - bounds[:, 0]
         runs = np.cumsum(sizes) - sizes
         rows = np.arange(sizes.sum()) + np.repeat(bounds[:, 0] - runs, sizes)
         columns = self.columns[:, rows]
-        order, left, gaps = _cuts(columns, runs)
-        self.columns[:, rows] = columns[:, order]
+        spheres = _around(columns, runs)
+        compact = spheres[:, 3] ** 2 <= COMPACT / np.pi * np.add.reduceat(columns[10], runs)
+        parted = (sizes > 1) & (_several(columns, runs) | ~compact)
+        left, gaps = np.zeros(len(runs), np.int64), np.zeros(len(runs), bool)
+        if parted.any():
+            of_parted = np.repeat(parted, sizes)
+            rows, columns = rows[of_parted], columns[:, of_parted]
+            ends = np.cumsum(sizes[parted])
+            order, left[parted], gaps[parted] = _cuts(columns, ends - sizes[parted])
+            self.columns[:, rows] = columns[:, order]
         added = np.column_stack([bounds[:, 0], bounds[:, 0] + left, bounds[:, 1]])
         self.bounds = np.concatenate([self.bounds, added])
-        self.spheres = np.concatenate([self.spheres, _around(columns, runs)])
+        self.spheres = np.concatenate([self.spheres, spheres])
         self.gaps = np.concatenate([self.gaps, gaps])
 
     def cut(self, numbers: Integers) -> Integers:
-        """Cut clusters of several pieces; return the numbers of their parts."""
+        """Cut clusters; return the numbers of their parts."""
         new = len(self.spheres) + np.arange(2 * len(numbers))
         pairs = zip(new[::2].tolist(), new[1::2].tolist(), strict=True)
         self.parts |= dict(zip(numbers.tolist(), pairs, strict=True))
@@ -267,12 +296,16 @@ class _Clusters:
         return costs[0], numbers
 
 
-def _spheres(pieces: Floats) -> NDArray[np.float64]:
-    """Return at most MOST spheres (k, 4) around pieces, whose disks have little area together."""
-    clusters = _Clusters(_columns(pieces))
+def _spheres(by_shape: list[Floats]) -> NDArray[np.float64]:
+    """Return at most MOST spheres (k, 4) around the pieces of shapes, whose disks are small.
+
+    Compact shapes are not cut: their parts would have more disks of the same area together.
+    """
+    columns = [_columns(pieces, number) for number, pieces in enumerate(by_shape)]
+    clusters = _Clusters(np.concatenate(columns, axis=1))
     leaves = np.zeros(1, np.int64)
     while len(leaves) < CLUSTERS:  # those with gaps come first, then the largest
-        several = leaves[np.ptp(clusters.bounds[leaves][:, ::2], axis=1) > 1]
+        several = leaves[np.ptp(clusters.bounds[leaves][:, :2], axis=1) > 0]
         order = np.lexsort((-clusters.spheres[several, 3], ~clusters.gaps[several]))
         chosen = several[order[: min(CLUSTERS - len(leaves), -(-len(leaves) // 2))]]
         if not len(chosen):

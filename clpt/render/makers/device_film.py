@@ -81,8 +81,8 @@ class DeviceFilm:
     `RenderOptions`. share: values of several devices; without it the
     scene may have arrays in the memory of the device. former: a similar lowered scene. moving: the
     shapes that have moved on the device; blurred: whether the tables have keys of motion that
-    `scene` does not have; successors: of the shapes and materials of the first scene. beside: a
-    film on the same device, whose scene has the same shapes: trees and lowered parts are shared.
+    `scene` does not have; successors: of the shapes and materials of the first scene. beside,
+    in_turn: see `Renderer`; beside stays None unless films get scenes in turn.
 
     Raises as `Renderer` does.
     """
@@ -94,6 +94,8 @@ class DeviceFilm:
         options: RenderOptions,
         share: Once | None = None,
         former: Lowered | None = None,
+        beside: DeviceFilm | None = None,
+        in_turn: bool = False,
     ):
         self.start = start = time.perf_counter()
         self.seconds: dict[str, float] = {}
@@ -119,8 +121,8 @@ class DeviceFilm:
             halves=options.get("halves", False) or needs.halves(denoise, scene.noise),
         )
         self._opened: Wavefront | None = None
-        self.beside: DeviceFilm | None = None
-        self._spare: OrderedDict[tuple[float, ...], Wavefront] | None = None
+        self.beside = beside if in_turn else None
+        self._spare = OrderedDict[tuple[float, ...], Wavefront]() if in_turn else None
         lowered = self.lower(scene, share, former, anew=True)
         self.seconds["lower"] = time.perf_counter() - start
         self._opened = first = self.create(lowered)
@@ -243,10 +245,6 @@ class DeviceFilm:
         chosen = {name: origin.settings.get(name) for name in WAY}
         alike = replace(present, settings={**present.settings, **chosen})
         return None if alike.differences(origin) else origin.chosen_integrator
-
-    def keep_forms(self) -> None:
-        """Keep replaced wavefronts from now on, for scenes that ask for their forms again."""
-        self._spare = OrderedDict()
 
     def spare(self, lowered: Lowered) -> Wavefront | None:
         """Return a replaced wavefront whose kinds of paths are those of a lowered scene, or None.

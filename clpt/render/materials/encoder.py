@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable
+from functools import cache
 from typing import Any, cast
 
 import numpy as np
@@ -121,11 +122,10 @@ class Encoder:
     def kind_words(self, kind: Kind) -> Words:
         """Return the words of a kind's parameters that kernels read."""
         parts: list[Words] = []
-        read = {**device_params(type(kind)), **interior_params(type(kind))}
         values = fields_of(kind)
-        for name, param in read.items():
+        for name, param in _read(type(kind)):
             value = values[name]
-            self._note_reach(value, place_of(kind, name))
+            self._note_reach(value, kind, name)
             encoded, source = self.param_words(value, param, kind)
             if param.lobe and value in (0.0, *BLACK):
                 source = "none"
@@ -133,13 +133,13 @@ class Encoder:
             self._sources[kind.kind][name].add(source)
         return np.concatenate(parts) if parts else np.zeros(1, np.uint32)
 
-    def _note_reach(self, value: object, where: str) -> None:
+    def _note_reach(self, value: object, kind: Kind, name: str) -> None:
         """Warn of a tabulated spectrum outside of the film's wavelengths."""
         if isinstance(value, Tabulated) and not self.spectra.reaches(value):
             low, high = self.spectra.range
             self.warnings.add(
-                f"{where}: its table from {value.lambdas[0]:g} to {value.lambdas[-1]:g} nm has"
-                f" nothing within the film's {low:g} to {high:g} nm"
+                f"{place_of(kind, name)}: its table from {value.lambdas[0]:g} to"
+                f" {value.lambdas[-1]:g} nm has nothing within the film's {low:g} to {high:g} nm"
             )
 
     def param_words(
@@ -185,7 +185,7 @@ class Encoder:
         else:
             for layer in material.layers:
                 for name in params(type(layer)):
-                    self._note_reach(getattr(layer, name), place_of(layer, name))
+                    self._note_reach(getattr(layer, name), layer, name)
             colours = thin_films.film_colours(material)
             table = self.store.append_floats("spectra", colours)
             profile, _ = self.named_words(
@@ -194,6 +194,12 @@ class Encoder:
             rows = np.array([table, colours.shape[1], *profile], np.uint32)
         first = self.store.append("materials", rows)
         return np.array([first, len(material.layers)], np.uint32), "layers"
+
+
+@cache
+def _read(cls: type[Kind]) -> tuple[tuple[str, Param], ...]:
+    """Return the parameters of a kind that kernels read, in the order of its row."""
+    return (*device_params(cls).items(), *interior_params(cls).items())
 
 
 def _spectrum(encoder: Encoder, value: Any, param: Param, owner: object) -> tuple[Words, str]:

@@ -78,6 +78,7 @@ def array_size(param: Param) -> int:
     return MEMBERS[param.role].count
 
 
+@cache
 def row_words(cls: type[Kind]) -> int:
     """Return the length of a kind's row."""
     return sum(map(words, [*device_params(cls).values(), *interior_params(cls).values()]))

@@ -165,7 +165,7 @@ class Film:
         """Return a buffer whose pixels have their words side by side as pictures, (count, h, w)."""
         stored = np.empty((self._padded_pixels, count), np.uint32)
         self.stream.read((self._held if held else self.sums)[name], stored)
-        return np.stack([path_buffers.picture(self._settings, words) for words in stored.T])
+        return np.ascontiguousarray(path_buffers.picture(self._settings, stored.T))
 
     def _planes(self, name: str, count: int, held: bool) -> Words:
         """Return the first streams of a buffer as pictures, (count, h, w) uint32."""
@@ -177,8 +177,7 @@ class Film:
         for i in range(0, count, at_once):
             stored = np.empty((min(at_once, count - i), self._padded_pixels), np.uint32)
             self.stream.read(sums[name], stored, i * size)
-            for plane, words in zip(pixels[i:], stored, strict=False):
-                plane[:] = path_buffers.picture(self._settings, words)
+            pixels[i : i + len(stored)] = path_buffers.picture(self._settings, stored)
         return pixels
 
     def set_words(self, arrays: Mapping[str, Words]) -> None:

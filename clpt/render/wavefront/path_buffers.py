@@ -41,11 +41,12 @@ def inside(settings: NDArray[np.void]) -> Integers:
 
 
 def picture(settings: NDArray[np.void], stored: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Return stored values of pixels, (padded_pixels,), as a picture, (h, w)."""
+    """Return stored values of pixels, (..., padded_pixels), as pictures, (..., h, w)."""
     across, margin = int(settings["tiles_x"]), int(settings["margin"])
-    rows = stored.reshape(-1, across, 4, 4).swapaxes(1, 2).reshape(-1, 4 * across)
+    tiles = stored.reshape(*stored.shape[:-1], -1, across, 4, 4).swapaxes(-3, -2)
+    rows = tiles.reshape(*stored.shape[:-1], -1, 4 * across)
     width, height = int(settings["width"]), int(settings["height"])
-    return rows[margin : margin + height, margin : margin + width]
+    return rows[..., margin : margin + height, margin : margin + width]
 
 
 def sampled_pixels(settings: NDArray[np.void]) -> Integers:

@@ -199,7 +199,7 @@ class Camera(Kind):
     def affine_matrix(self) -> NDArray[np.float64]:
         """Return `to_world`. Raises SceneError if it has no inverse, or projects."""
         matrix = self._invertible("to_world", self.to_world)
-        if not np.allclose(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+        if np.abs(matrix[3] - [0.0, 0.0, 0.0, 1.0]).max() > 1e-5:
             raise SceneError("its last row must be 0 0 0 1", where=f"{self.kind}.to_world")
         return matrix
 
@@ -207,7 +207,7 @@ class Camera(Kind):
         """Return `to_world`. Raises SceneError also if it scales or shears: angles would change."""
         matrix = self.affine_matrix()
         linear = matrix[:3, :3]
-        if not np.allclose(linear.T @ linear, np.eye(3), atol=1e-3):
+        if np.abs(linear.T @ linear - np.eye(3)).max() > 1e-3:
             raise SceneError("must not scale or shear", where=f"{self.kind}.to_world")
         return matrix
 

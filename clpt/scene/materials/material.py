@@ -135,6 +135,8 @@ class Material(Scatterer):
     @property
     def shared_parts(self) -> dict[str, Material]:
         """The materials that it consists of, by their parameters."""
+        if not self.is_composite:
+            return {}
         return {name: v for name, v in fields_of(self).items() if isinstance(v, Material)}
 
     @property
