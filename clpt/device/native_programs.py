@@ -24,9 +24,9 @@ from pyopencl import _cl
 log = logging.getLogger(__name__)
 
 REGISTERS_VERBOSE = "-cl-nv-verbose"
-_STANDARD = "-cl-std"
 _USED = re.compile(r"Used (\d+) registers")
 _SPILLED = re.compile(r"(\d+) bytes spill stores")
+_REFUSED = (cl.status_code.INVALID_BUILD_OPTIONS, cl.status_code.INVALID_COMPILER_OPTIONS)
 _P = TypeVar("_P")
 
 
@@ -38,24 +38,14 @@ def build(
     Raises pyopencl.Error with the driver's log.
     """
     source = (code,) if isinstance(code, str) else ([device], [code])
-
-    def attempt(flags: bytes) -> cl.Program:
-        program = _cl._Program(context, *source)
-        return _tried(program, device, lambda: program._build(flags, [device]))
-
-    return _with_or_without_standard(options, attempt)
+    return _tried(_cl._Program._build, context, device, source, options)
 
 
 def compile_part(
     context: cl.Context, device: cl.Device, text: str, options: Sequence[str] = ()
 ) -> cl.Program:
     """Compile a text for linking. Raises pyopencl.Error with the driver's log."""
-
-    def attempt(flags: bytes) -> cl.Program:
-        program = _cl._Program(context, text)
-        return _tried(program, device, lambda: program.compile(flags, [device], []))
-
-    return _with_or_without_standard(options, attempt)
+    return _tried(_cl._Program.compile, context, device, (text,), options, [])
 
 
 def binary(program: cl.Program) -> bytes:
@@ -78,12 +68,19 @@ def log_of(program: cl.Program, device: cl.Device) -> str:
     return str(program.get_build_info(device, cl.program_build_info.LOG))
 
 
-def _tried(program: Any, device: cl.Device, action: Callable[[], Any]) -> cl.Program:
-    """Run an action on a program and return it; add the build log to an error, or log it."""
+def _tried(
+    action: Callable, context: cl.Context, device: cl.Device, source: tuple, flags: Sequence[str],
+    *more: list,
+) -> cl.Program:  # fmt: skip
+    """Run an action on a new program and return it; add the build log to an error, or log it."""
+    program: Any = _cl._Program(context, *source)
     try:
-        action()
+        action(program, " ".join(flags).encode(), [device], *more)
     except cl.Error as error:
         text = program.get_build_info(device, cl.program_build_info.LOG)
+        others = [flag for flag in flags if not flag.startswith("-cl-std")]  # 1.x is the default
+        if len(others) < len(flags) and (error.code in _REFUSED or "-cl-std" in text):
+            return _tried(action, context, device, source, others, *more)
         record = _cl._ErrorRecord(msg=f"{error}\n\n{text}", code=error.code, routine=error.routine)
         raise type(error)(record) from None
     if text := program.get_build_info(device, cl.program_build_info.LOG).strip():
@@ -117,23 +114,3 @@ def with_fewest_registers(
             if registers and not spilled:
                 return limited, limit
     return program, 0 if used else None
-
-
-def _with_or_without_standard(options: Sequence[str], attempt: Callable[[bytes], _P]) -> _P:
-    """Return the result of `attempt`; if the driver refuses `-cl-std`, leave that option out.
-
-    By OpenCL's specification a compiler then takes the latest version of 1.x that it has.
-    """
-    try:
-        return attempt(" ".join(options).encode())
-    except cl.Error as error:
-        others = [option for option in options if not option.startswith(_STANDARD)]
-        if len(others) == len(options) or not _refuses_standard(error):
-            raise
-        log.debug("the driver refuses %s: %s", _STANDARD, error)
-    return attempt(" ".join(others).encode())
-
-
-def _refuses_standard(error: cl.Error) -> bool:
-    refused = (cl.status_code.INVALID_BUILD_OPTIONS, cl.status_code.INVALID_COMPILER_OPTIONS)
-    return error.code in refused or _STANDARD in str(error)
