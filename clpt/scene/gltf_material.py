@@ -10,7 +10,7 @@ import dataclasses
 import numpy as np
 
 from clpt.scene.lights import Area
-from clpt.scene.materials import Mask, Material, NormalMap, Null, TwoSided
+from clpt.scene.materials import Mask, Material, NormalMap, Null, TwoSided, parts
 from clpt.scene.textures import Bitmap, Graph, Product
 from clpt.scene.values import Texture, Textured, TexturedNumber
 from clpt.spectra import RGBUnbounded
@@ -70,13 +70,13 @@ def finished(
 
     share: of light that meets it, see `opacity`; both: its back is shown too.
     """
-    leaf = inner.material if isinstance(inner, NormalMap) else inner
+    passes = any(part.transmits for part in parts(inner))
     if share is not None:
         inner = Mask(material=inner, opacity=share)
         if emission is not None:  # absent parts of a surface emit nothing
             radiance = Product(first=emission.radiance, second=share)
             emission = dataclasses.replace(emission, radiance=radiance)
-    if leaf.transmits:
+    if passes:
         return inner, emission
     return TwoSided(front=inner, back=None if both else ONE_SIDE), emission
 

@@ -12,10 +12,17 @@ from click.testing import CliRunner
 from scipy import stats
 
 import clpt
+from clpt import transforms
 from clpt.cli import cli
+from clpt.formats import as_gltf, as_openpbr
 from clpt.geometry import triangles
-from clpt.scene import Scene
+from clpt.scene import Film, Scene
+from clpt.scene.cameras import Orthographic
+from clpt.scene.integrators import Box
 from clpt.scene.integrators import Path as Paths
+from clpt.scene.lights import Constant
+from clpt.scene.materials import Plastic, RoughPlastic
+from clpt.scene.shapes import Sphere
 
 SOURCES = {
     "a.xml": '<scene version="3.0.0"><shape type="cube"/></scene>',
@@ -115,6 +122,7 @@ CHAINS = [
     ("a.xml", "b.usda", "b.json"), ("a.xml", "b.glb"), ("a.pbrt", "b.usdz"), ("a.pbrt", "b.glb"),
     ("a.usda", "b.json", "b.usdc"), ("cornell_box", "b.usda", "b.json"), ("cornell_box", "b.glb"),
 ]  # fmt: skip
+SIDE = 16  # pixels of a ball
 SIGNIFICANCE = 1e-3 / (3 * len(CHAINS))  # of all colors of all chains together: 1 in 1,000
 MODEL = 0.02  # relative: plastics are approximated; a sphere has facets in some formats
 
@@ -140,6 +148,59 @@ def _means(scene: Scene, first_seed: int) -> np.ndarray[Any, Any]:
     for scene.seed in range(first_seed, first_seed + RUNS):
         runs.append(clpt.render(scene, spp=SAMPLES)[..., :3].mean(axis=(0, 1)))
     return np.array(runs)
+
+
+PLASTICS = [
+    Plastic(diffuse_reflectance=(0.9, 0.4, 0.05), nonlinear=True),
+    *(
+        RoughPlastic(
+            diffuse_reflectance=(0.9, 0.4, 0.05),
+            alpha=roughness**2,
+            distribution=name,
+            nonlinear=saturates,
+        )
+        for roughness in (0.3, 0.6)
+        for name in ("ggx", "beckmann")
+        for saturates in (False, True)
+    ),
+]
+
+
+def test_plastics_keep_their_albedo() -> None:
+    """Balls in even light, with parallel rays, are as bright as their material's mean albedo.
+
+    They stand far from each other. Facets of GGX reflect up to .008 less than Beckmann's, and
+    Schlick's formula of glTF .006 less than Fresnel's.
+    """
+    lost: list[str] = []
+    rows = [
+        (material, as_openpbr.surface(material, lost.append).base, as_gltf.surface(
+            material, lost.append)[0])
+        for material in PLASTICS
+    ]  # fmt: skip
+    balls = [
+        Sphere(
+            center=(2.0 * x - 2.0, 2.0 * y + 1.0 - len(rows), 40.0 * (3 * y + x)), material=material
+        )
+        for y, row in enumerate(reversed(rows))
+        for x, material in enumerate(row)
+    ]
+    view = transforms.look_at([0, 0, 2000], [0, 0, 0], [0, 1, 0])
+    scene = Scene(
+        camera=Orthographic(to_world=view @ transforms.scale([3.0, 3.0, 1.0])),
+        shapes=balls,
+        lights=[Constant(radiance=1.0)],
+        film=Film(width=3 * SIDE, height=len(rows) * SIDE, filter=Box(), mode="rgb"),
+        integrator=Paths(max_depth=3),
+    )
+    picture = clpt.render(scene, spp=128)[..., :3]
+    parts = picture.reshape(len(rows), SIDE, 3, SIDE, 3).mean(axis=(1, 3))
+    albedo = 1.0 - (1.0 - parts) * 4.0 / np.pi  # what a ball leaves of its square is white
+    before, openpbr, gltf = albedo.swapaxes(0, 1)
+    gaussian = [isinstance(m, RoughPlastic) and m.distribution == "beckmann" for m in PLASTICS]
+    allowed = 0.02 * before + np.where(gaussian, 0.008, 0.002)[:, None]
+    assert (np.abs(openpbr - before) < allowed).all(), (openpbr - before).round(3)
+    assert (np.abs(gltf - before) < allowed + 0.006).all(), (gltf - before).round(3)
 
 
 @pytest.mark.slow

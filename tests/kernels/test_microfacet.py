@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from clpt.render.materials import rough_coat_table as coats
+from clpt.scene import facets
 from tests.kernels.harness import map_text, run
 
 FILES = ("materials/fresnel.cl", "materials/microfacet.cl", "materials/rough_coat.cl")
@@ -132,7 +133,7 @@ def test_coat_transmittance_follows_its_integral():
     given = [np.repeat(row, len(cos_i)) for row in points]
     body = f"{COAT} r[0] = coat_transmittance(d, x[3], x[2]);"
     (found,) = call(body, 1, *given, np.tile(cos_i, points.shape[1]))
-    exact = [coats.transmittance(NAMES[int(d)], a, e, cos_i) for d, a, e in points.T]
+    exact = [facets.transmittance(NAMES[int(d)], a, e, cos_i) for d, a, e in points.T]
     off = np.abs(found.reshape(-1, len(cos_i)) - exact)
     assert off[points[2] >= 1.2].max() < 0.01  # all that coats are made of
     assert off[points[2] >= 1.1].max() < 0.02 and off.max() < 0.05  # at grazing angles
@@ -147,11 +148,11 @@ def test_what_a_coat_throws_back_follows_its_integral():
     body += "r[2] = coat_thrown_back(d, x[3], x[2]);"
     found = call(body, 3, *given, np.tile(cos_i, points.shape[1])).reshape(3, -1, len(cos_i))
     inside, bounce, thrown = found
-    exact = [coats.inside_reflectance(NAMES[int(d)], a, e) for d, a, e in points.T]
+    exact = [facets.inside_reflectance(NAMES[int(d)], a, e) for d, a, e in points.T]
     assert np.abs(inside[:, 0] - exact).max() < 0.01
-    exact = [coats.bounce(NAMES[int(d)], a) for d, a, _ in points.T]
+    exact = [facets.bounce(NAMES[int(d)], a) for d, a, _ in points.T]
     assert np.abs(bounce[:, 0] - exact).max() < 0.01
-    off = np.abs(thrown - [coats.thrown_back(NAMES[int(d)], a, e, cos_i) for d, a, e in points.T])
+    off = np.abs(thrown - [facets.thrown_back(NAMES[int(d)], a, e, cos_i) for d, a, e in points.T])
     assert off.max() < 0.07 and off.mean() < 0.01  # most at the critical angle, of a smooth metal
     assert off[points[1] > 0.3].max() < 0.04
 
@@ -162,6 +163,6 @@ def test_a_coats_integrals_give_no_light(name):
     cos_i = (np.arange(200) + 0.5) / 200
     for eta in (1.2, 1.5, 2.4):
         for alpha in (1e-3, 0.3, 1.0):
-            inwards = 2.0 * (cos_i * coats.transmittance(name, alpha, eta, cos_i)).mean()
-            outwards = eta**2 * (1.0 - coats.inside_reflectance(name, alpha, eta))
+            inwards = 2.0 * (cos_i * facets.transmittance(name, alpha, eta, cos_i)).mean()
+            outwards = eta**2 * (1.0 - facets.inside_reflectance(name, alpha, eta))
             assert inwards <= outwards * (1.0 + 1e-3), (alpha, eta)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from clpt import spectra
-from clpt.render.materials import rough_coat_table as coats
+from clpt.scene import facets
 from clpt.scene.materials import Openpbr
 from clpt.scene.params import device_params
 from clpt.spectra import RGBUnbounded
@@ -61,7 +61,7 @@ def test_the_index_is_that_over_the_coat() -> None:
         eta = 1.5 + (1.6 / 1.5 - 1.5) * weight
         made = _params(**base, coat_weight=weight, coat_roughness=0.0)
         bare = _params(**base, specular_ior=eta)
-        left = 1.0 - weight * coats.fresnel(np.cos(np.radians([40.0])), 1.6)[0]
+        left = 1.0 - weight * facets.fresnel(np.cos(np.radians([40.0])), 1.6)[0]
         found, expected = (probe(p, UP, wi, UP)["eval"][0, 0] for p in (made, bare))
         assert found == pytest.approx(expected * left, rel=0.02)
 
@@ -100,7 +100,17 @@ FURNACE = {
     "coat": ({"coat_weight": 1.0, "coat_roughness": 0.3}, 0.012),
     "coated metal": ({"coat_weight": 1.0, "coat_roughness": 0.3, "base_metalness": 1.0}, 0.04),
     "fuzz": ({"fuzz_weight": 1.0}, 0.03),
-    "film": ({"thin_film_weight": 1.0}, 0.08),
+    "film": ({"thin_film_weight": 1.0}, 0.06),
+    "bubble": (
+        {
+            "transmission_weight": 1.0,
+            "thin_film_weight": 1.0,
+            "specular_roughness": 0.05,
+            "specular_ior": 1.0,
+            "thin_walled": 1,
+        },
+        0.006,
+    ),
 }
 
 
@@ -119,7 +129,7 @@ def test_white_furnace(name: str) -> None:
 def _fresnel_mean(eta: float) -> float:
     nodes, weights = np.polynomial.legendre.leggauss(64)
     cosines = 0.5 * (nodes + 1.0)
-    return float((weights * cosines * coats.fresnel(cosines, eta)).sum())
+    return float((weights * cosines * facets.fresnel(cosines, eta)).sum())
 
 
 @pytest.mark.parametrize("eta", [1.3, 1.6, 2.0])
@@ -131,7 +141,7 @@ def test_a_coat_darkens_as_the_interfaced_lambertian(eta: float) -> None:
     mean, error = albedos(_probe(), _params(**matt), rng, ANGLES)
     undarkened, more = albedos(_probe(), _params(**matt, coat_darkening=0.0), rng, ANGLES)
     cosines = np.cos(np.radians(ANGLES))[:, None]
-    f = coats.fresnel(cosines, eta)
+    f = facets.fresnel(cosines, eta)
     dark = (1.0 - back) / (1.0 - base * back)
     np.testing.assert_array_less(np.abs(mean - f - base * (1.0 - f) * dark), 8e-3 + 4.0 * error)
     np.testing.assert_array_less(np.abs(undarkened - f - base * (1.0 - f)), 8e-3 + 4.0 * more)
@@ -145,7 +155,7 @@ def test_albedo_of_the_dielectric(roughness: float, ior: float) -> None:
     made = _params(base_color=colour, specular_roughness=roughness, specular_ior=ior)
     mean, error = albedos(_probe(), made, rng, ANGLES)
     cosines = np.cos(np.radians(ANGLES))
-    e = coats.reflectance("ggx", roughness**2, ior, cosines)[:, None]
+    e = facets.reflectance("ggx", roughness**2, ior, cosines)[:, None]
     np.testing.assert_array_less(np.abs(mean - e - (1.0 - e) * colour), 8e-3 + 4.0 * error)
 
 
@@ -228,7 +238,7 @@ def test_facets_leave_the_share_of_each_wavelength_to_the_base(glass: str) -> No
     black, white = (probe({**made, "base_color": c}, wo, wi, wo)["eval"] for c in (0.0, 1.0))
 
     def left(cosines: np.ndarray) -> np.ndarray:
-        return 1.0 - np.array([coats.reflectance("ggx", 0.09, eta, cosines) for eta in n]).T
+        return 1.0 - np.array([facets.reflectance("ggx", 0.09, eta, cosines) for eta in n]).T
 
     nodes, weights = np.polynomial.legendre.leggauss(16)
     cosines = 0.5 * (nodes + 1.0)

@@ -9,7 +9,9 @@ graphs need `materialx` to be installed. docs/materialx.md says what is read.
 """
 
 from clpt.formats.materialx.graph import Host, Node
-from clpt.formats.materialx.materials import load, load_material, load_materials
+from clpt.formats.materialx.materials import load, load_material, load_materials, networks
 from clpt.formats.materialx.surfaces import Surface, surface
 
-__all__ = ["Host", "Node", "Surface", "load", "load_material", "load_materials", "surface"]
+__all__ = [
+    "Host", "Node", "Surface", "load", "load_material", "load_materials", "networks", "surface",
+]  # fmt: skip

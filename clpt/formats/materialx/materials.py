@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from clpt import images
 from clpt.choices import Missing
@@ -47,6 +48,20 @@ class Folder:
         return "uv1" if name == "uv1" else "uv"
 
 
+def networks(file: Path) -> tuple[dict[str, document.Element], Any]:
+    """Return the surface shaders of a document by the names of its materials, and the document.
+
+    The library ends a document that nobody holds. Raises SceneError for a file that is no document
+    of MaterialX, and where `materialx` is not installed.
+    """
+    found, read = {}, document.read(file)
+    for material in read.getMaterialNodes():
+        shaders = document.library().getShaderNodes(material)
+        if shaders:
+            found[str(material.getName())] = document.Element(shaders[0])
+    return found, read
+
+
 def load_materials(path: str | Path) -> tuple[dict[str, Surface], list[str]]:
     """Return the surfaces of a document by the names of its materials, and warnings.
 
@@ -54,14 +69,9 @@ def load_materials(path: str | Path) -> tuple[dict[str, Surface], list[str]]:
     where `materialx` is not installed.
     """
     file = input_files.checked(Path(path))
-    read = document.read(file)
     host = Folder(file)
-    found = {}
-    for material in read.getMaterialNodes():
-        shaders = document.library().getShaderNodes(material)
-        if shaders:
-            name = material.getName()
-            found[name] = surface(document.Element(shaders[0]), host, name)
+    nodes, _held = networks(file)
+    found = {name: surface(node, host, name) for name, node in nodes.items()}
     if not found:
         raise SceneError("has no surface materials", file=file)
     return found, host.warnings

@@ -123,11 +123,14 @@ def _tell(document: Document, prim: Usd.Prim) -> None:
 
 
 def _distant(document: Document, prim: Usd.Prim, placement: Matrix) -> Light:
-    angle = document.number(prim, "inputs:angle", SUN_ANGLE)
+    normal = document.value(prim, "inputs:normalize", False)
+    # Blender 5.0 writes half of a sun's angle, and a quarter of its light.
+    whole = 2.0 if normal and _is_of_blender(document) else 1.0
+    angle = whole * document.number(prim, "inputs:angle", SUN_ANGLE)
     half = math.radians(min(max(angle, 0.0), 360.0)) / 2.0
     factor = math.pi * (math.sin(half) ** 2 if half <= 0.5 * math.pi else 2.0 - math.sin(half) ** 2)
-    if document.value(prim, "inputs:normalize", False) or half == 0.0:
-        factor = 1.0
+    if normal or half == 0.0:
+        factor = whole**2
     if angle > WIDEST:
         document.warn(f"its angle is {WIDEST:g} degrees in shadows", prim.GetPath())
     rgb = emitted(document, prim, SUN_INTENSITY) * factor
@@ -137,6 +140,10 @@ def _distant(document: Document, prim: Usd.Prim, placement: Matrix) -> Light:
         irradiance=RGBIlluminant(*rgb),
         angle=min(max(angle, 0.0), WIDEST),
     )
+
+
+def _is_of_blender(document: Document) -> bool:
+    return bool(document.stage.GetRootLayer().documentation.startswith("Blender"))
 
 
 def _dome(document: Document, prim: Usd.Prim, placement: Matrix) -> Light:
@@ -198,7 +205,7 @@ def _pole(document: Document, prim: Usd.Prim, placement: Matrix) -> Matrix:
     if not axis:
         up = placement["xyz".index(document.up), :3]
         axis = "Z" if document.up == "z" and abs(up[2]) > abs(up[1]) else "Y"
-        if axis == "Z" and document.stage.GetRootLayer().documentation.startswith("Blender"):
+        if axis == "Z" and _is_of_blender(document):
             return transforms.rotate([0.0, 0.0, 1.0], 90.0) @ Z_POLE
     return Z_POLE if axis == "Z" else np.eye(4)
 

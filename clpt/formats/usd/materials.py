@@ -5,18 +5,21 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
-from pxr import Usd, UsdShade
+from pxr import Sdf, Tf, Usd, UsdShade
 
+from clpt import images
+from clpt.files import input_files
 from clpt.formats import materialx
 from clpt.formats.usd import textures
 from clpt.formats.usd.document import Document
 from clpt.formats.usd.textures import Node, Uses
 from clpt.scene import gltf_material
 from clpt.scene.lights import Area
-from clpt.scene.materials import Blend, GltfSurface, Material, ThinDielectric, TwoSided
+from clpt.scene.materials import Blend, GltfSurface, Material, NormalMap, ThinDielectric, TwoSided
 from clpt.scene.media import Medium
 from clpt.scene.params import Kind, fields_of
 from clpt.scene.textures import Bitmap, MeshAttribute
@@ -100,12 +103,12 @@ def _sided(inner: Material) -> Material:
 def _bound(document: Document, material: UsdShade.Material, both: bool) -> Surface:
     """Return a material that a prim binds: that of MaterialX, else its universal surface."""
     name, path = material.GetPrim().GetName(), str(material.GetPath())
-    uses = Uses(document)
-    network = _network(document, material)
+    network = _network(document, material) or _of_document(document, material)
     if network is not None:
-        read = materialx.surface(network, uses, name)
+        read = materialx.surface(*network, name)
         found = Surface(read.material, read.emission, interior=read.interior)
-        return _told(document, path, found, uses, both)
+        return _told(document, path, found, network[1], both)
+    uses = Uses(document)
     shader = material.ComputeSurfaceSource("")[0]
     node = Node(document, shader) if shader else None
     if node is None or node.kind != PREVIEW:
@@ -121,13 +124,57 @@ def _bound(document: Document, material: UsdShade.Material, both: bool) -> Surfa
     return _told(document, path, Surface(*_preview(node, uses, name)), uses, both)
 
 
-def _network(document: Document, material: UsdShade.Material) -> Node | None:
-    """Return the surface shader of MaterialX that a material has; None without one."""
+MATERIALX, FILE, NAME = "MaterialX", "clpt_file", "clpt_name"  # of a document that a stage names
+
+
+def stand_in(file: Path) -> Sdf.Layer:
+    """Return a layer for a document of MaterialX: its materials, where OpenUSD's plugin has them.
+
+    The package `usd-core` lacks that plugin. Raises SceneError, see `materialx.networks`.
+    """
+    layer = Sdf.Layer.CreateAnonymous(f"{file.name}.usda")
+    layer.defaultPrim = MATERIALX
+    for name in materialx.networks(file)[0]:
+        place = Sdf.Path(f"/{MATERIALX}/Materials/{Tf.MakeValidIdentifier(name)}")
+        prim = Sdf.CreatePrimInLayer(layer, place)
+        for path in place.GetPrefixes():
+            layer.GetPrimAtPath(path).specifier = Sdf.SpecifierDef
+        prim.typeName = "Material"
+        prim.customData = {FILE: str(file), NAME: name}
+    return layer
+
+
+@dataclass
+class _DocumentUses(Uses):
+    """The uses of a material in a document of MaterialX, beside which its images lie."""
+
+    folder: Path = Path()
+
+    def image(self, asset: object, path: str) -> images.Stored | None:
+        named = str(asset or "")
+        return super().image(Sdf.AssetPath(named, str(self.folder / named)), path)
+
+
+def _of_document(
+    document: Document, material: UsdShade.Material
+) -> tuple[materialx.Node, Uses] | None:
+    """Return the shader of a material of a `stand_in`, and its uses; None for others."""
+    told = material.GetPrim().GetCustomData()
+    if FILE not in told:
+        return None
+    file = input_files.named("usd", document.file.parent, Path(str(told[FILE])))
+    found, _ = document.once(("materialx", str(file)), lambda: materialx.networks(file))
+    node = found.get(str(told.get(NAME)))
+    return None if node is None else (node, _DocumentUses(document, folder=file.parent))
+
+
+def _network(document: Document, material: UsdShade.Material) -> tuple[materialx.Node, Uses] | None:
+    """Return the shader of MaterialX that a material has, and its uses; None without one."""
     for context in CONTEXTS:
         found = material.ComputeSurfaceSource(context)[0]
         node = Node(document, found) if found else None
         if node is not None and node.kind.startswith("ND_") and "UsdPreview" not in node.kind:
-            return node
+            return node, Uses(document)
     return None
 
 
@@ -196,7 +243,14 @@ def _opacity(node: Node, inner: Material, index: float, uses: Uses) -> tuple[Mat
     if str(node.value("opacityMode", "transparent")) == "presence":
         return inner, share
     pane = ThinDielectric(int_ior=max(index, 1.0), ext_ior=1.0)
-    return Blend(first=pane, second=inner, weight=share), None
+    return Blend(first=pane, second=_sheet(inner), weight=share), None
+
+
+def _sheet(inner: Material) -> Material:
+    """Return a surface, perhaps with its normal map, whose sides are alike beside a pane."""
+    if isinstance(inner, NormalMap):
+        return dataclasses.replace(inner, material=_sheet(inner.material))
+    return dataclasses.replace(cast(GltfSurface, inner), thin=True)
 
 
 def _cut(node: Node, share: Texture, threshold: float) -> Any:

@@ -16,7 +16,7 @@ from clpt.errors import SceneError, nearest
 from clpt.files import budget, input_files
 from clpt.formats import framing
 from clpt.formats.gltf import animation
-from clpt.formats.usd import cameras, gprims, lights
+from clpt.formats.usd import cameras, gprims, lights, materials
 from clpt.formats.usd.document import Document
 from clpt.scene import Scene
 from clpt.scene.lights import Light
@@ -149,7 +149,7 @@ def _opened(path: Path) -> Usd.Stage:
 
 
 def _layers(path: Path) -> list[Sdf.Layer]:
-    """Return the layers of a stage, its root first, read anew.
+    """Return the layers of a stage, its root first, read anew; and those for MaterialX's documents.
 
     A stage would wait for ever for a pipe that a layer names, so all are asked for before. Raises
     SceneError for what is no regular file, and OpenUSD's own error for a root that is broken.
@@ -157,7 +157,7 @@ def _layers(path: Path) -> list[Sdf.Layer]:
     layers = [Sdf.Layer.FindOrOpen(str(path))]
     if layers[0] is None:
         raise SceneError("is no USD file that can be read", file=path)
-    known = {str(path)}
+    known, stands = {str(path)}, list[Sdf.Layer]()
     for layer in layers:
         layer.Reload()  # if its file has changed since this process has read it
         budget.check_time(path)
@@ -166,10 +166,15 @@ def _layers(path: Path) -> list[Sdf.Layer]:
             if inner in known or Ar.IsPackageRelativePath(inner) or not os.path.exists(inner):
                 continue
             known.add(inner)
-            input_files.checked(input_files.named("usd", path.parent, Path(inner)))
+            file = input_files.checked(input_files.named("usd", path.parent, Path(inner)))
+            if file.suffix.lower() == ".mtlx":
+                with suppress(SceneError):  # the stage tells, too
+                    stands.append(materials.stand_in(file))
+                    layer.UpdateCompositionAssetDependency(name, stands[-1].identifier)
+                continue
             with suppress(Tf.ErrorException):  # the stage tells which prim names it
                 layers += filter(None, [Sdf.Layer.FindOrOpen(inner)])
-    return layers
+    return layers + stands
 
 
 def _reason(error: Exception, path: Path) -> str:

@@ -87,6 +87,14 @@ inline OpenpbrParts openpbr_parts(Openpbr m)
     return p;
 }
 
+/* What a reflectance leaves of each color: a film's may be outside of [0, 1] in RGB mode. */
+inline Spectrum openpbr_complement(Spectrum f)
+{
+#define C(c) f.c = 1.0f - clamp_r(f.c, (real)(0.0f), (real)(1.0f));
+    SPECTRUM_EACH(C)
+#undef C
+    return f;
+}
 /* Where a film covers a share of it, its reflectance, else f. */
 inline Spectrum openpbr_filmed(Openpbr m, Spectrum f, FilmBase base, real c)
 {
@@ -167,18 +175,18 @@ inline Spectrum openpbr_under(Openpbr m, OpenpbrParts p, vec3 wo, vec3 wi, mask 
 #undef C
     }
     if (USES_OPENPBR_THIN_FILM_WEIGHT) {
-        Spectrum nothing = spectrum_of(0.0f), one = spectrum_of(1.0f);
+        Spectrum left;
         real thickness = 1000.0f * m.thin_film_thickness;
         real rough = sqr(p.even.alpha_u), flat = 1.0f - rough;
         real c_o = sqrt(rough + flat * cos_o * cos_o), c_i = sqrt(rough + flat * cos_i * cos_i); /* of facets seen */
         Spectrum f_o = iridescence(c_o, p.base_film, m.thin_film_ior, thickness, m.lambdas);
         Spectrum f_i = iridescence(c_i, p.base_film, m.thin_film_ior, thickness, m.lambdas);
-        f_o = spectrum_sub(one, spectrum_scale(layer_cover(f_o), 1.0f - openpbr_lost(p, cos_o)));
-        f_i = spectrum_sub(one, spectrum_scale(layer_cover(f_i), 1.0f - openpbr_lost(p, cos_i)));
-#define C(c) nothing.c = sel(into, sel(front, f_o.c, f_i.c), min_r(f_o.c, f_i.c));
+        f_o = openpbr_complement(spectrum_scale(f_o, 1.0f - openpbr_lost(p, cos_o)));
+        f_i = openpbr_complement(spectrum_scale(f_i, 1.0f - openpbr_lost(p, cos_i)));
+#define C(c) left.c = sel(into, sel(front, f_o.c, f_i.c), min_r(f_o.c, f_i.c));
         SPECTRUM_EACH(C)
 #undef C
-        v = spectrum_madd(spectrum_sub(nothing, v), m.thin_film_weight, v);
+        v = spectrum_madd(spectrum_sub(left, v), m.thin_film_weight, v);
     }
     return v;
 }
@@ -288,7 +296,7 @@ inline Spectrum openpbr_facets(Openpbr m, OpenpbrParts p, vec3 wo, vec3 wi, real
     real share = sel(front, (real)(1.0f), p.passed);
     if (USES_OPENPBR_TRANSMISSION_WEIGHT) {
         real scale = sel(m.thin_walled != 0, (real)(1.0f), sel(front, 1.0f / sqr(index), sqr(index)));
-        Spectrum passed = spectrum_sub(spectrum_of(1.0f), layer_cover(turned));
+        Spectrum passed = openpbr_complement(turned);
         turned = spectrum_sel(crossed, spectrum_mul(passed, m.transmission_tint), turned);
         share = sel(crossed, scale * p.passed, share);
     } else

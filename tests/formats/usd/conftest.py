@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from clpt.formats import load
+from clpt.render.flow.check import check
 from clpt.scene import Scene
 
 Loader = Callable[..., Scene]
@@ -30,11 +31,13 @@ def usda(text: str, head: str = "") -> str:
 
 @pytest.fixture
 def stage(tmp_path: Path) -> Loader:
-    """Return a function that loads a stage of a text."""
+    """Return a function that loads a stage of a text, and checks that it can be rendered."""
 
     def loaded(text: str, head: str = "", **variables: Any) -> Scene:
         file = tmp_path / "stage.usda"
         file.write_text(usda(text, head), encoding="utf-8")
-        return load(file, **variables)
+        scene = load(file, **variables)
+        check(scene)
+        return scene
 
     return loaded

@@ -62,6 +62,18 @@ def test_a_rectangle_shines_along_minus_z(stage: Loader) -> None:
     assert np.allclose(shape.to_world[:3, 2], [0, 0, -1])
 
 
+def test_suns_of_blender(stage: Loader) -> None:
+    """Blender 5.0 writes half of a sun's angle and a quarter of its strength."""
+    sun = """def DistantLight "L" {
+    float inputs:intensity = 0.375
+    float inputs:angle = 0.25
+    bool inputs:normalize = 1 }"""
+    read = stage(MESH + sun, 'doc = "Blender v5.0.1"').lights[0]
+    assert (read.irradiance.g, read.angle) == pytest.approx((1.5, 0.5))
+    read = stage(MESH + sun).lights[0]
+    assert (read.irradiance.g, read.angle) == pytest.approx((0.375, 0.25))
+
+
 def test_distant_lights_by_their_angle(stage: Loader) -> None:
     light = 'def DistantLight "L" { float inputs:intensity = 100\n float inputs:angle = 1\n %s }'
     scene = stage(MESH + light % "")

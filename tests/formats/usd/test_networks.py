@@ -92,3 +92,55 @@ def test_a_primvar(stage: Loader) -> None:
     color = _leaf(mesh).base_color
     assert isinstance(color, MeshAttribute) and color.name == "vertex_tone"
     assert np.shape(mesh.attributes["vertex_tone"]) == (4, 3)
+
+
+DOCUMENT = """<?xml version="1.0"?>
+<materialx version="1.39" colorspace="lin_rec709">
+  <nodegraph name="G">
+    <image name="i" type="color3"><input name="file" type="filename" value="tex/a.png"
+      colorspace="srgb_texture" /></image>
+    <output name="out" type="color3" nodename="i" />
+  </nodegraph>
+  <open_pbr_surface name="S" type="surfaceshader">
+    <input name="base_color" type="color3" nodegraph="G" output="out" />
+    <input name="specular_roughness" type="float" value="0.25" /></open_pbr_surface>
+  <surfacematerial name="M" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="S" /></surfacematerial>
+</materialx>
+"""
+NAMING = f"""
+def Scope "Looks" (
+    prepend references = @{{}}@</MaterialX/Materials>
+) {{{{
+}}}}
+def Mesh "A" (
+    apiSchemas = ["MaterialBindingAPI"]
+) {{{{
+    {SQUARE}
+    texCoord2f[] primvars:st = [(0, 0), (1, 0), (1, 1), (0, 1)] (
+        interpolation = "vertex"
+    )
+    rel material:binding = </Looks/M>
+}}}}
+"""
+
+
+def test_a_stage_names_a_document_of_materialx(stage: Loader, tmp_path: Path) -> None:
+    """`usd-core` has no plugin for it. A document that is not there has a warning."""
+    pytest.importorskip("MaterialX")
+    folder = tmp_path / "looks"
+    (folder / "tex").mkdir(parents=True)
+    Image.fromarray(np.full((1, 1, 3), 188, np.uint8)).save(folder / "tex/a.png")
+    (folder / "look.mtlx").write_text(DOCUMENT)
+    for _ in range(2):  # the second time the root layer is read anew
+        scene = stage(NAMING.format("looks/look.mtlx"))
+        shape = next(s for s in scene.shapes if s.name == "A")
+        surface = shape.material.front
+        assert isinstance(surface, Openpbr)
+        assert surface.name == "M"
+        assert surface.specular_roughness == 0.25
+        assert surface.base_color.pixels("reflectance").mean() == pytest.approx(0.5, abs=0.01)
+        assert shape.uvs is not None
+        assert not scene.warnings
+    (told,) = stage(NAMING.format("looks/other.mtlx")).warnings
+    assert "/Looks: Could not open asset @looks/other.mtlx@" in told.replace(str(tmp_path), "@")
