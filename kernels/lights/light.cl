@@ -104,14 +104,14 @@ inline real light_begins_pdf(Scene scene, integer row, vec3 p, Receiver receiver
 }
 
 /* Step next_event: stores where a shadow ray runs, in the lanes `kept`; returns its length. It runs from the offset
- * point to the light's point, because a ray along ls.wi would miss that point. */
-inline real shadow_aim(Slab shadow, uint at, mask kept, Surface s, LightSample ls)
+ * point to the light's point, because a ray along wi would miss that point. */
+inline real shadow_aim(Slab shadow, uint at, mask kept, Surface s, vec3 wi, real far)
 {
-    vec3 from = surface_offset(s, ls.wi), to = sub3(madd3(ls.wi, ls.t, s.p), from);
+    vec3 from = surface_offset(s, wi), to = sub3(madd3(wi, far, s.p), from);
     real t = sqrt(dot3(to, to));
     store_shadow_o(shadow, at, kept, from);
-    store_shadow_d(shadow, at, kept, sel3(ls.t < FAR, scale3(to, 1.0f / t), ls.wi));
-    return sel(ls.t < FAR, t, ls.t) * SHADOW_SHORTER;
+    store_shadow_d(shadow, at, kept, sel3(far < FAR, scale3(to, 1.0f / t), wi));
+    return sel(far < FAR, t, far) * SHADOW_SHORTER;
 }
 
 /* Step met: the mis_ratio of a camera path that meets a light. */

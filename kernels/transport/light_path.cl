@@ -3,14 +3,10 @@
 /* Step. */
 #include "transport/light_path.cl#sampler"
 
-/* Stores where the shadow ray from a point of a surface, or of infinity, to the camera runs, in the lanes `kept`.
- * Returns its length. */
+/* Stores where the ray from a point, or from infinity, to the camera runs, in the lanes `kept`; returns its length. */
 inline real connect_camera(Slab shadow, uint at, mask kept, Surface s, CameraPoint c)
 {
-    LightSample ls;
-    ls.wi = neg3(c.d);
-    ls.t = c.t;
-    real t = shadow_aim(shadow, at, kept, s, ls);
+    real t = shadow_aim(shadow, at, kept, s, neg3(c.d), c.t);
     mask away = kept & (c.t >= FAR);
     if (any(away)) {
         store_shadow_o(shadow, at, away, c.o);
