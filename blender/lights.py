@@ -196,8 +196,9 @@ def _sky_texture(node: Any, strength: float) -> Json:
         made["aerosol"] = measured.haze(node.turbidity)
     else:
         elevation, azimuth = node.sun_elevation, 0.5 * math.pi - node.sun_rotation
+        dust = node.dust_density if node.sky_type == "NISHITA" else node.aerosol_density
         made |= {
-            "aerosol": min(0.1 * node.aerosol_density, 2.0), "altitude": node.altitude,
+            "aerosol": min(0.1 * dust, 2.0), "altitude": node.altitude,
             "ozone": min(300.0 * node.ozone_density, 1000.0),
             "sun_scale": strength * SUN * node.sun_intensity if node.sun_disc else 0.0,
         }  # fmt: skip

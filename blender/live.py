@@ -19,6 +19,7 @@ import clpt
 from clpt.formats.native import read
 from clpt.scene import Film, Scene, integrators, shapes
 from clpt.scene.params import fields_of
+from clpt.view.target import smaller
 
 if TYPE_CHECKING:
     from worker import Link
@@ -164,7 +165,7 @@ class Follower:
         former, self.scene = self.scene, scene
         if scene is former and self.renderer is not None:
             return self.renderer
-        small = dataclasses.replace(scene, film=self._small(scene.film))
+        small = smaller(self.divider)(scene)
         try:
             if self.renderer is None or former is None or former.film is not scene.film:
                 self.close()
@@ -179,15 +180,6 @@ class Follower:
             self.close()
             raise
         return self.renderer
-
-    def _small(self, film: Film) -> Film:
-        """Return a film of fewer pixels, of the same part of the picture."""
-        width, height = (max(1, n // self.divider) for n in (film.width, film.height))
-        crop = film.crop
-        if crop is not None:
-            x, y, across, down = (n // self.divider for n in crop)
-            crop = min(x, width - 1), min(y, height - 1), max(1, across), max(1, down)
-        return dataclasses.replace(film, width=width, height=height, crop=crop)
 
     def close(self) -> None:
         """Give the device's memory back."""

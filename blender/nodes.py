@@ -34,9 +34,6 @@ class Expression:
         socket = socket_of(at.node, key)
         return self.g.value(0.0) if socket is None else self.socket(at.groups, socket)
 
-    def inputs(self, at: Site) -> Callable[[str], Value]:
-        return lambda key: self.input(at, key)
-
     def socket(self, groups: tuple[bpy.types.Node, ...], socket: Any) -> Value:
         site, end = origin(groups, socket)
         if site is None:
@@ -215,6 +212,15 @@ class Tree:
         return material
 
 
+PRINCIPLED = {  # inputs that are values of OpenPBR, and parts with a tint
+    "base_metalness": "Metallic", "base_diffuse_roughness": "Diffuse Roughness",
+    "transmission_weight": "Transmission Weight", "coat_weight": "Coat Weight",
+    "coat_roughness": "Coat Roughness", "fuzz_weight": "Sheen Weight",
+    "fuzz_roughness": "Sheen Roughness", "subsurface_weight": "Subsurface Weight",
+}  # fmt: skip
+TINTED = {"specular": "Specular", "coat": "Coat", "fuzz": "Sheen"}
+
+
 def _principled(tree: Tree, at: Site) -> tuple[Json, Any]:
     color, through = tree.color(at, "Base Color"), tree.number(at, "Transmission Weight")
     coat = tree.number(at, "Coat Weight")
@@ -223,26 +229,13 @@ def _principled(tree: Tree, at: Site) -> tuple[Json, Any]:
     if coat != 0.0 and through == 0.0:  # Cycles' base meets air, that of OpenPBR its coat
         index *= 1.0 + (coat_ior - 1.0) * (coat if isinstance(coat, float) else 1.0)
     values: Json = {
-        "base_weight": 1.0,
-        "base_color": color,
-        "specular_ior": min(max(index, 1.0), 4.0),
-        "base_metalness": tree.number(at, "Metallic"),
-        "base_diffuse_roughness": tree.number(at, "Diffuse Roughness"),
+        "base_weight": 1.0, "base_color": color, "subsurface_color": color,
+        "specular_ior": min(max(index, 1.0), 4.0), "coat_ior": coat_ior, "coat_darkening": 0.0,
         "specular_weight": tree.made(lambda e: e.input(at, "Specular IOR Level") * 2.0),
-        "specular_color": tree.color(at, "Specular Tint"),
+        **{name: tree.number(at, key) for name, key in PRINCIPLED.items()},
+        **{f"{part}_color": tree.color(at, f"{key} Tint") for part, key in TINTED.items()},
         **_stretched(tree, at, "Anisotropic", "Anisotropic Rotation"),
-        "transmission_weight": through,
-        "coat_weight": coat,
-        "coat_roughness": tree.number(at, "Coat Roughness"),
-        "coat_color": tree.color(at, "Coat Tint"),
-        "coat_ior": coat_ior,
-        "coat_darkening": 0.0,
-        "fuzz_weight": tree.number(at, "Sheen Weight"),
-        "fuzz_roughness": tree.number(at, "Sheen Roughness", 0.5),
-        "fuzz_color": tree.color(at, "Sheen Tint"),
-        "subsurface_weight": tree.number(at, "Subsurface Weight"),
-        "subsurface_color": color,
-    }
+    }  # fmt: skip
     if through != 0.0:
         values["transmission_tint"] = color
     metal = _filmed_metal(tree, at, values)

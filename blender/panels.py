@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import bpy
 
-from . import measured
+from . import measured, preferences, process
 from .nodes import told
 
 MODES = (
@@ -40,8 +40,10 @@ TYPED = "Typed, 400:0.1 700:0.6; or a file of columns, nm and values"
 
 
 def _tag(group: Any, context: Any) -> None:
-    """Let viewports know that a setting has changed."""
+    """Let viewports and the compositor know that a setting has changed."""
     group.id_data.update_tag()
+    for layer in getattr(group.id_data, "view_layers", ()):
+        layer.update_render_passes()
 
 
 def _named(name: str, names: tuple[str, ...], default: str = "", text: str = "") -> Any:
@@ -63,7 +65,9 @@ def _number(
 
 
 def _count(name: str, default: int, least: int, most: int, text: str) -> Any:
-    return bpy.props.IntProperty(name=name, default=default, min=least, max=most, description=text)
+    return bpy.props.IntProperty(
+        name=name, default=default, min=least, max=most, description=text, update=_tag
+    )
 
 
 def _flag(name: str, text: str = "") -> Any:
@@ -94,6 +98,8 @@ class ClptSettings(bpy.types.PropertyGroup):
     )  # fmt: skip
     viewport_samples: _count("Viewport Samples", 256, 1, 1 << 20, "Paths of each pixel there")
     viewport_denoise: _flag("Viewport Denoise", "Take most of the noise from viewports' pictures")
+    light_passes: _flag("Direct and Indirect", "Light that met one surface at most; other light")
+    denoising_passes: _flag("Denoising Data", "What the compositor's node Denoise needs")
     bands: _count("Bands", 0, 0, 64, "Parts of the spectrum, each a pass of its radiance; 0: none")
     first_band: _number("First Band", 400.0, 200.0, 2400.0, "Where the bands begin [nm]")
     last_band: _number("Last Band", 700.0, 300.0, 2500.0, "Where the bands end [nm]")
@@ -206,6 +212,7 @@ class Panel(bpy.types.Panel):
         return settings, cls.names(settings) if callable(cls.names) else cls.names
 
     def draw(self, context: bpy.types.Context) -> None:
+        process.prepare(preferences.python())  # it loads clpt while people look for a button
         self.layout.use_property_split = True
         settings, names = self.shown(context)
         for name in names:
@@ -238,6 +245,8 @@ ROWS: tuple[tuple[str, str, str, str, str, Any], ...] = (  # tab, label, owner, 
      ("use_pass_z", "use_pass_position", "use_pass_normal", "use_pass_uv",
       "use_pass_diffuse_color", "use_pass_cryptomatte_object", "use_pass_cryptomatte_material",
       "pass_cryptomatte_depth")),
+    ("own_passes", "view_layer", "Passes of clpt", "scene", "scene.clpt",
+     ("light_passes", "denoising_passes")),
     ("groups", "view_layer", "Light Groups", "scene", "view_layer", ("lightgroups",)),
     ("object", "object", "Light Group", "object", "object", ("lightgroup",)),
     ("material", "material", "Measured Surface", "material", "material.clpt", of_material),

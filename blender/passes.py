@@ -43,6 +43,15 @@ PASSES = {  # by options of view layers
     "use_pass_uv": Pass("UV", "uv", "UVA", "VECTOR"),
     "use_pass_diffuse_color": Pass("Diffuse Color", "albedo", "RGB", "COLOR"),
 }
+OWN = {  # by options of the engine
+    "light_passes": (
+        Pass("Direct", "direct", "RGB", "COLOR"), Pass("Indirect", "indirect", "RGB", "COLOR"),
+    ),
+    "denoising_passes": (
+        Pass("Denoising Normal", "denoising_normal", "XYZ", "VECTOR"),
+        Pass("Denoising Albedo", "denoising_albedo", "RGB", "COLOR"),
+    ),
+}  # fmt: skip
 MATTES = {
     "use_pass_cryptomatte_object": ("crypto_object", "CryptoObject"),
     "use_pass_cryptomatte_material": ("crypto_material", "CryptoMaterial"),
@@ -52,6 +61,7 @@ MATTES = {
 def of_layer(layer: bpy.types.ViewLayer, settings: Any) -> list[Pass]:
     """Return the passes that a view layer and the scene's settings ask for."""
     passes = [found for option, found in PASSES.items() if getattr(layer, option)]
+    passes += [each for option, own in OWN.items() if getattr(settings, option) for each in own]
     levels = range((min(layer.pass_cryptomatte_depth, 2 * LEVELS) + 1) // 2)
     for option, (source, name) in MATTES.items():
         if getattr(layer, option):

@@ -204,10 +204,11 @@ def _checker(tree: Any, at: Site) -> Value:
 def _bricks(tree: Any, at: Site) -> Value:
     node, g = at.node, tree.g
     p = tree.vector(at, "generated") * tree.input(at, "Scale")
-    pairs = {
-        "size": ("Brick Width", "Row Height"), "mortar": ("Mortar Size", "Mortar Smooth"),
-    }  # fmt: skip
-    inputs = {key: g("combine2", *map(tree.inputs(at), names)) for key, names in pairs.items()}
+    pairs = {"size": ("Brick Width", "Row Height"), "mortar": ("Mortar Size", "Mortar Smooth")}
+    inputs = {
+        key: g("combine2", *(tree.input(at, name) for name in names))
+        for key, names in pairs.items()
+    }
     off = node.offset_frequency == 0 or node.squash_frequency == 0
     inputs["offset"] = g.value([0.0 if off else node.offset, max(node.offset_frequency, 1)])
     inputs["squash"] = g.value([1.0 if off else node.squash, max(node.squash_frequency, 1)])

@@ -10,13 +10,16 @@ import secrets
 import subprocess
 import sys
 import time
+import weakref
 from contextlib import suppress
+from multiprocessing import AuthenticationError
 from multiprocessing.connection import Connection, Listener
 from pathlib import Path
 from typing import Any
 
 WORKER = Path(__file__).with_name("worker.py")
 STARTS_WITHIN = 60.0  # [s]
+NOT_THERE = "clpt does not start; name a Python that has clpt in the preferences of the add-on"
 PYTHON = "CLPT_PYTHON"  # the environment variable that names a Python with clpt
 
 
@@ -25,39 +28,44 @@ class ProcessError(Exception):
 
 
 class Process:
-    """A process of clpt and the connection to it."""
+    """A process of clpt, which loads it at once, and the connection to it, made when it is used."""
 
     def __init__(self, python: str = ""):
         self.python = python or interpreter()
+        self._connection: Connection | None = None
+        _known.add(self)
         key = secrets.token_bytes(32)
-        with Listener(("127.0.0.1", 0), authkey=key) as listener:
-            listener._listener._socket.settimeout(0.5)  # accept() has no limit of its own
-            command = [self.python, str(WORKER), str(listener.address[1])]
-            try:
-                self.child = subprocess.Popen(
-                    command,
-                    stdin=subprocess.PIPE,
-                    env=environment(self.python),
-                    creationflags=subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0,
-                )
-            except OSError as error:
-                raise ProcessError(f"{command[0]} does not start: {error.strerror}") from None
-            assert self.child.stdin is not None
-            with suppress(BrokenPipeError):  # a child that has ended is told below
-                self.child.stdin.write(key)
-                self.child.stdin.close()
-            self.connection = self._accept(listener)
+        self._listener = Listener(("127.0.0.1", 0), authkey=key)
+        self._listener._listener._socket.settimeout(0.5)  # accept() has no limit of its own
+        command = [self.python, str(WORKER), str(self._listener.address[1])]
+        try:
+            self.child = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                env=environment(self.python),
+                creationflags=subprocess.CREATE_NO_WINDOW if sys.platform == "win32" else 0,
+            )
+        except OSError as error:
+            self._listener.close()
+            raise ProcessError(f"{command[0]} does not start: {error.strerror}") from None
+        assert self.child.stdin is not None
+        with suppress(BrokenPipeError):  # a child that has ended is told by `connection`
+            self.child.stdin.write(key)
+            self.child.stdin.close()
 
-    def _accept(self, listener: Listener) -> Connection:
+    @property
+    def connection(self) -> Connection:
+        """The connection. Raises ProcessError if the process does not come."""
         end = time.monotonic() + STARTS_WITHIN
-        while time.monotonic() < end:
-            try:
-                return listener.accept()
-            except TimeoutError:
-                if self.child.poll() is not None:
-                    break
-        self.stop()
-        raise ProcessError("clpt does not start; name a Python that has clpt in the preferences")
+        while self._connection is None:
+            with suppress(TimeoutError, OSError, AuthenticationError):
+                self._connection = self._listener.accept()
+                self._listener.close()
+            is_over = self.child.poll() is not None or time.monotonic() > end
+            if self._connection is None and is_over:
+                self.stop()
+                raise ProcessError(NOT_THERE)
+        return self._connection
 
     def send(self, message: dict[str, Any]) -> None:
         """Send a message. Raises ProcessError if the process has ended."""
@@ -84,8 +92,9 @@ class Process:
 
     def stop(self) -> None:
         """End the process, if it has not ended."""
-        if hasattr(self, "connection"):
-            self.connection.close()
+        for end in (self._listener, self._connection):
+            if end is not None:
+                end.close()
         try:
             self.child.wait(2.0)
         except subprocess.TimeoutExpired:
@@ -93,7 +102,15 @@ class Process:
             self.child.wait()
 
 
+_known: weakref.WeakSet[Process] = weakref.WeakSet()
 _idle: list[Process] = []  # one at most, for the next picture: it need not start again
+
+
+def prepare(python: str = "") -> None:
+    """Let a process load clpt before it is needed, while there is none."""
+    if not _known:
+        with suppress(ProcessError):  # told when a picture is wanted
+            give_back(Process(python))
 
 
 def take(python: str = "") -> Process:
@@ -137,4 +154,4 @@ def interpreter() -> str:
         return os.environ[PYTHON]
     if importlib.util.find_spec("clpt") is not None:
         return sys.executable
-    raise ProcessError("no Python with clpt is known; name it in the preferences of the add-on")
+    raise ProcessError(NOT_THERE)

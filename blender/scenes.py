@@ -342,7 +342,7 @@ class Writer:
     def _image(self, image: bpy.types.Image, path: Path) -> Json | None:
         space = image.colorspace_settings.name
         data = space in LINEAR
-        if space not in (*LINEAR, "sRGB"):
+        if space not in (*LINEAR, "sRGB") and not image.is_float:
             self.tell(f"image {image.name!r}: its color space {space} is read as sRGB")
         if image.source == "TILED":
             self.tell(f"image {image.name!r}: of its tiles the first one is read")
@@ -358,7 +358,7 @@ class Writer:
         pixels = np.empty(width * height * 4, np.float32)
         image.pixels.foreach_get(pixels)
         pixels = pixels.reshape(height, width, 4)[::-1]
-        if not data:
+        if not (data or image.is_float):  # those of floats are linear already
             pixels = np.concatenate([_linear(pixels[..., :3]), pixels[..., 3:]], axis=2)
         file = self.folder / f"image{next(self.numbers)}.npy"
         np.save(file, np.ascontiguousarray(pixels))

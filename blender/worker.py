@@ -47,25 +47,37 @@ class Link:
             os._exit(0)
 
 
+def load() -> None:
+    """Load clpt, while Blender reads its scene or nobody wants a picture yet."""
+    with suppress(Exception):  # told when it is used
+        import rendering  # noqa: F401
+
+
 def main() -> None:
     """Answer messages until Blender closes the connection."""
     key = sys.stdin.buffer.read()
-    with Client(("127.0.0.1", int(sys.argv[1])), authkey=key) as connection:
-        link = Link(connection)
-        with suppress(Exception):  # told below; after the connection, while Blender reads its scene
+    threading.Thread(target=load, daemon=True).start()
+    limit = threading.Timer(IDLE, os._exit, (0,))
+    limit.daemon = True
+    limit.start()
+    try:
+        connection = Client(("127.0.0.1", int(sys.argv[1])), authkey=key)
+    except (OSError, EOFError):  # Blender has ended
+        os._exit(0)
+    limit.cancel()
+    link = Link(connection)
+    while True:
+        try:
+            message = link.inbox.get(timeout=IDLE)
+        except Empty:
+            return
+        try:
             import rendering
-        while True:
-            try:
-                message = link.inbox.get(timeout=IDLE)
-            except Empty:
-                return
-            try:
-                import rendering
 
-                rendering.answer(link, message)
-            except Exception as error:  # whatever happens, Blender is told
-                lines = str(error).splitlines() or [""]
-                link.send({"error": f"{type(error).__name__}: {lines[0]}"})
+            rendering.answer(link, message)
+        except Exception as error:  # whatever happens, Blender is told
+            lines = str(error).splitlines() or [""]
+            link.send({"error": f"{type(error).__name__}: {lines[0]}"})
 
 
 if __name__ == "__main__":

@@ -292,3 +292,20 @@ def test_bands_are_passes(tmp_path: Path) -> None:
     shown = channels(tmp_path / "bands.exr")
     bands = [shown[f"ViewLayer.{nm} nm.X"][0].mean() for nm in (475, 525, 575, 625)]
     assert bands == sorted(bands) and bands[3] > 3.0 * bands[0] > 0.0
+
+
+def test_direct_and_indirect_light_are_the_picture(tmp_path: Path) -> None:
+    """And what the compositor denoises by: the albedo of a grey box, the normal of a floor."""
+    bpy.ops.mesh.primitive_plane_add(size=20.0, location=(0.0, 0.0, -1.0))
+    settings = bpy.context.scene.clpt
+    settings.light_passes = settings.denoising_passes = True
+    shown = channels(rendered("CLPT", tmp_path, 16, "OPEN_EXR_MULTILAYER"))
+
+    def of(name: str, letters: str) -> np.ndarray:
+        return np.stack([shown[f"ViewLayer.{name}.{letter}"] for letter in letters], axis=-1)
+
+    whole, direct, indirect = (of(name, "RGB") for name in ("Combined", "Direct", "Indirect"))
+    assert np.allclose(direct + indirect, whole, rtol=1e-4, atol=1e-5) and indirect.any()
+    middle = SIZE[1] // 2, SIZE[0] // 2
+    assert of("Denoising Albedo", "RGB")[middle] == pytest.approx([0.8] * 3, abs=0.06)
+    assert of("Denoising Normal", "XYZ")[-2, 2] == pytest.approx((0.0, 0.0, 1.0), abs=0.01)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 import time
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -99,4 +100,23 @@ def test_a_python_without_clpt(tmp_path: Path) -> None:
     with pytest.raises(process.ProcessError, match="does not start"):
         process.Process(str(tmp_path / "python"))
     with pytest.raises(process.ProcessError, match="does not start"):
-        process.Process("/bin/false")
+        process.Process("/bin/false").send({})
+
+
+def test_a_prepared_process_is_the_first_that_is_taken(
+    order: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """There is one at most; where it has ended before it is taken, another one starts."""
+    for ends in (False, True):
+        monkeypatch.setattr(process, "_known", weakref.WeakSet())
+        process.prepare(sys.executable)
+        process.prepare(sys.executable)
+        prepared = process._idle[0]
+        if ends:
+            prepared.child.kill()
+            prepared.child.wait()
+        taken = process.take(sys.executable)
+        assert not process._idle and (taken is prepared) is not ends
+        taken.send(order)
+        assert last(taken)[0]["samples"] == 4
+        taken.stop()

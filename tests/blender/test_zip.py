@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import subprocess
 import sys
 import zipfile
@@ -66,3 +67,32 @@ def test_blender_finds_the_manifest_valid(maker: Any, tmp_path: Path) -> None:
     command = [sys.executable, str(tool), "validate", str(file)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0 and "FATAL" not in done.stdout, done.stdout + done.stderr
+
+
+INSTALL = """
+import sys
+import bpy
+file, picture = sys.argv[1:]
+bpy.ops.wm.read_factory_settings()
+bpy.ops.extensions.package_install_files(
+    filepath=file, repo="user_default", enable_on_install=True)
+scene = bpy.context.scene
+scene.render.engine, scene.clpt.samples, scene.render.filepath = "CLPT", 1, picture
+scene.render.resolution_x, scene.render.resolution_y = 32, 32
+bpy.ops.render.render(write_still=True)
+"""
+
+
+@pytest.mark.slow
+def test_blender_installs_the_file_and_renders(maker: Any, tmp_path: Path) -> None:
+    """By Blender's operator, into an empty folder of a user."""
+    pytest.importorskip("bpy")
+    maker.write(tmp_path / "clpt.zip", ["linux-x64"])
+    picture = tmp_path / "picture.png"
+    command = [sys.executable, "-c", INSTALL, str(tmp_path / "clpt.zip"), str(picture)]
+    folders = {"BLENDER_USER_RESOURCES": str(tmp_path / "user"), "CLPT_PYTHON": sys.executable}
+    done = subprocess.run(
+        command, env=os.environ | folders, cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0 and "ERROR" not in done.stdout, done.stdout + done.stderr
+    assert picture.is_file()
