@@ -48,7 +48,9 @@ inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering
  * before the sampling, compilers would read tables of materials twice. Returns the bits to add to Path.state. */
 inline integer next_event_keep(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v, NextEvent e)
 {
-    shadow_toward(shadow, at, active, e.shine, v.s, e.ls, e.value);
+    mask kept = LANES == 1 ? active : e.shine; /* on a GPU a condition would cost registers */
+    store_shadow_t(shadow, at, active, sel(e.shine, shadow_aim(shadow, at, kept, v.s, e.ls.wi, e.ls.t), (real)(-1.0f)));
+    store_shadow_value(shadow, at, kept, e.value);
     light_layers_chosen(path, at, e.shine, e.ls.row);
     store_shadow_into(shadow, at, e.shine, volume_medium(scene, sel_i(e.shine, e.ls.row, (integer)(0))));
     store_shadow_through(shadow, at, e.shine, vertex_through(v, e.ls.wi));
