@@ -26,6 +26,7 @@ log = logging.getLogger(__name__)
 REGISTERS_VERBOSE = "-cl-nv-verbose"
 _USED = re.compile(r"Used (\d+) registers")
 _SPILLED = re.compile(r"(\d+) bytes spill stores")
+_REFUSED = (cl.status_code.INVALID_BUILD_OPTIONS, cl.status_code.INVALID_COMPILER_OPTIONS)
 _P = TypeVar("_P")
 
 
@@ -36,19 +37,15 @@ def build(
 
     Raises pyopencl.Error with the driver's log.
     """
-    if isinstance(code, str):
-        program = _cl._Program(context, code)
-    else:
-        program = _cl._Program(context, [device], [code])
-    return _tried(program, device, lambda: program._build(_joined(options), [device]))
+    source = (code,) if isinstance(code, str) else ([device], [code])
+    return _tried(_cl._Program._build, context, device, source, options)
 
 
 def compile_part(
     context: cl.Context, device: cl.Device, text: str, options: Sequence[str] = ()
 ) -> cl.Program:
     """Compile a text for linking. Raises pyopencl.Error with the driver's log."""
-    program = _cl._Program(context, text)
-    return _tried(program, device, lambda: program.compile(_joined(options), [device], []))
+    return _tried(_cl._Program.compile, context, device, (text,), options, [])
 
 
 def binary(program: cl.Program) -> bytes:
@@ -71,12 +68,19 @@ def log_of(program: cl.Program, device: cl.Device) -> str:
     return str(program.get_build_info(device, cl.program_build_info.LOG))
 
 
-def _tried(program: Any, device: cl.Device, action: Callable[[], Any]) -> cl.Program:
-    """Run an action on a program and return it; add the build log to an error, or log it."""
+def _tried(
+    action: Callable, context: cl.Context, device: cl.Device, source: tuple, flags: Sequence[str],
+    *more: list,
+) -> cl.Program:  # fmt: skip
+    """Run an action on a new program and return it; add the build log to an error, or log it."""
+    program: Any = _cl._Program(context, *source)
     try:
-        action()
+        action(program, " ".join(flags).encode(), [device], *more)
     except cl.Error as error:
         text = program.get_build_info(device, cl.program_build_info.LOG)
+        others = [flag for flag in flags if not flag.startswith("-cl-std")]  # 1.x is the default
+        if len(others) < len(flags) and (error.code in _REFUSED or "-cl-std" in text):
+            return _tried(action, context, device, source, others, *more)
         record = _cl._ErrorRecord(msg=f"{error}\n\n{text}", code=error.code, routine=error.routine)
         raise type(error)(record) from None
     if text := program.get_build_info(device, cl.program_build_info.LOG).strip():
@@ -110,7 +114,3 @@ def with_fewest_registers(
             if registers and not spilled:
                 return limited, limit
     return program, 0 if used else None
-
-
-def _joined(options: Sequence[str]) -> bytes:
-    return " ".join(options).encode()

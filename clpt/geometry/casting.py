@@ -47,7 +47,9 @@ class Caster:
         while self._levels[0].shape[1] > 1:
             self._levels.insert(0, self._levels[0].reshape(6, -1, 2).min(axis=2))
 
-    def nearest(self, origins: Floats, directions: Floats) -> tuple[NDArray[np.intp], Floats]:
+    def nearest(
+        self, origins: NDArray[np.floating], directions: NDArray[np.floating]
+    ) -> tuple[NDArray[np.intp], Floats]:
         """Return the triangle that each ray meets first, -1 for none, and its distance.
 
         origins, directions: (k, 3); distances are in lengths of the directions, inf for none.

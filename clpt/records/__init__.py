@@ -75,6 +75,7 @@ PATH = Record(
         "integer",
         "cone around the ray, see kernels/textures/cone.cl; of a scene with mip levels",
     ),
+    slope=("real", "d ln n / d ln lambda of the index n at the ray, where time is that of pulses"),
 )
 
 HIT = Record(
@@ -218,10 +219,12 @@ SETTINGS = Record(
     time_first=("real", "optical length where the first begins, over the camera's index [m]"),
     time_rate=("real", "bins in a metre of such lengths [1/m]"),
     near_share=("real", "distance to the camera's near plane over that from there to the far one"),
+    slope_before=("integer", "words before a material's row stands 1 more than the row of slopes"),
+    camera_slope=("real", "d ln n / d ln lambda at the camera's place"),
 )
 
 # the last of them, which only layers need
-LAYER_SETTINGS = tuple(m.name for m in SETTINGS.members)[-len(LAYER_PLACES) - 16 :]
+LAYER_SETTINGS = tuple(m.name for m in SETTINGS.members)[-len(LAYER_PLACES) - 18 :]
 
 SHAPE = Record(
     "ShapeRow",

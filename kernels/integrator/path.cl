@@ -1,7 +1,6 @@
 /* A vertex of a path from the camera: the light that is met, next-event estimation, and the direction to go on. Light
- * is found both by meeting it and by choosing it; the two are weighted by the power heuristic (Veach 1997, 9.2.4), and
- * against paths from lights where a scene has them (transport/mis_ratio.cl). Steps that a scene or a material does not
- * have do nothing. */
+ * is found by meeting and by choosing it, with weights of the power heuristic (Veach 1997, 9.2.4), against paths from
+ * lights (transport/mis_ratio.cl). Steps that a scene or a material does not have do nothing. */
 #include "lights/light.cl#met"
 #include "generated/ghosts.cl"
 #include "generated/light_layers.cl"
@@ -13,7 +12,7 @@
 
 inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v SHADE_ARGS)
 {
-    Spectrum beta = v.beta, ratio = load_path_ratio(path, at);
+    Spectrum ratio = load_path_ratio(path, at);
     mask hidden = add_emission(scene, path, at, active, v SHADE_PASSED), met = active & !hidden;
     mask next = BSDF_IS_PANE ? met : met & vertex_continues(scene, v, vertex_is_null((integer)(0)));
 
@@ -25,7 +24,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     next = next & (spectrum_max(bsdf_albedo(scatter.bsdf)) > 0.0f);
 #endif
     MisRatio mis_ratio = mis_ratio_of_camera_path(scene, path, at, v, sampler);
-    merge_at_vertex(scene, path, at, met, v, scatter, mis_ratio, ratio SHADE_PASSED);
+    merge_at_vertex(scene, path, at, met, &v, &scatter, mis_ratio, ratio SHADE_PASSED);
     Guided guided = guide_at(scene, v.s, v.d MERGE_PASSED);
 
     NextEvent event = next_event_seek(scene, next, v, scatter);
@@ -45,7 +44,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
         v.state = layers_record(scene, path, at, met & !null, v, scatter, v.state LAYER_PASSED);
     }
     vec3 onward = normalize3(to_world(scatter.shading.frame, bs.wi));
-    beta = spectrum_scale(spectrum_mul(beta, bs.weight), shading_frame_share(scatter.shading, onward));
+    Spectrum beta = spectrum_scale(spectrum_mul(v.beta, bs.weight), shading_frame_share(scatter.shading, onward));
     real eta = load_path_eta(path, at) * bs.eta;
     mask on = path_roulette(scene, path, at, next, null, v, scatter, guided, eta, &beta);
 
@@ -53,6 +52,8 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     store_path_cone(path, at, on, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
     path_scatters(scene, path, at, on, null, &v, scatter, mis_ratio, bs, onward);
     store_path_eta(path, at, on, eta);
+    real slope = load_path_slope(path, at) + slope_across(scene, v.row, scatter.lambdas, scatter.wo, bs.wi);
+    store_path_slope(path, at, on, slope);
     vertex_end(path, at, met, on, null, v.state + path_escapes(scene, path, shadow, at, next, v, scatter, bs, onward));
     store_path_ratio(path, at, on, ratio);
 }

@@ -30,7 +30,8 @@ inline integer whitted_light(Scene scene, Slab shadow, uint at, mask active, Ver
     real w = 1.0f / sel(shine, fabs(ls.pdf), (real)(1.0f));
     Spectrum value = spectrum_scale(spectrum_mul(spectrum_mul(own, f), ls.radiance), w);
     value = vertex_beyond(scene, v, ls.wi, ls.t, scatter.lambdas, value);
-    shadow_toward(shadow, at, active, shine, v.s, ls, value);
+    store_shadow_t(shadow, at, active, sel(shine, shadow_aim(shadow, at, shine, v.s, ls.wi, ls.t), (real)(-1.0f)));
+    store_shadow_value(shadow, at, shine, value);
     store_shadow_into(shadow, at, shine, volume_medium(scene, sel_i(shine, ls.row, (integer)(0))));
     store_shadow_through(shadow, at, shine, vertex_through(v, ls.wi));
     return sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));

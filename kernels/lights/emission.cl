@@ -182,7 +182,9 @@ inline integer light_joined(Scene scene, Slab shadow, uint at, mask ended, mask 
     /* A ray from infinity is traced from the camera. */
     store_shadow_through(shadow, at, shine, sel_i(r.away, camera_through(scene), light_through(scene, lit)));
     r.seen = medium_dims(scene, medium, c.t, lambdas, r.seen);
-    connect_camera(shadow, at, ended, shine, s, c, spectrum_scale(r.seen, cosine * c.importance));
+    mask kept = LANES == 1 ? ended : shine;
+    store_shadow_t(shadow, at, ended, sel(shine, connect_camera(shadow, at, kept, s, c), (real)(-1.0f)));
+    store_shadow_value(shadow, at, kept, spectrum_scale(r.seen, cosine * c.importance));
     return sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 }
 

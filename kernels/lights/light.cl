@@ -103,18 +103,15 @@ inline real light_begins_pdf(Scene scene, integer row, vec3 p, Receiver receiver
     return light_emit_pdf(scene, row, wi, t);
 }
 
-/* Step next_event: stores a shadow ray in the lanes that `shine`, and none in other active lanes. It runs from the
- * offset point to the light's point, because a ray along ls.wi would miss that point. On a GPU all active lanes store:
- * a condition would cost registers. */
-inline void shadow_toward(Slab shadow, uint at, mask active, mask shine, Surface s, LightSample ls, Spectrum value)
+/* Step next_event: stores where a shadow ray runs, in the lanes `kept`; returns its length. It runs from the offset
+ * point to the light's point, because a ray along wi would miss that point. */
+inline real shadow_aim(Slab shadow, uint at, mask kept, Surface s, vec3 wi, real far)
 {
-    vec3 from = surface_offset(s, ls.wi), to = sub3(madd3(ls.wi, ls.t, s.p), from);
+    vec3 from = surface_offset(s, wi), to = sub3(madd3(wi, far, s.p), from);
     real t = sqrt(dot3(to, to));
-    mask near = ls.t < FAR, kept = LANES == 1 ? active : shine;
     store_shadow_o(shadow, at, kept, from);
-    store_shadow_d(shadow, at, kept, sel3(near, scale3(to, 1.0f / t), ls.wi));
-    store_shadow_t(shadow, at, active, sel(shine, sel(near, t, ls.t) * SHADOW_SHORTER, (real)(-1.0f)));
-    store_shadow_value(shadow, at, kept, value);
+    store_shadow_d(shadow, at, kept, sel3(far < FAR, scale3(to, 1.0f / t), wi));
+    return sel(far < FAR, t, far) * SHADOW_SHORTER;
 }
 
 /* Step met: the mis_ratio of a camera path that meets a light. */

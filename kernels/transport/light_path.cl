@@ -3,19 +3,17 @@
 /* Step. */
 #include "transport/light_path.cl#sampler"
 
-/* Stores the shadow ray from a point of a surface, or of infinity, to the camera. */
-inline void connect_camera(Slab shadow, uint at, mask active, mask shine, Surface s, CameraPoint c, Spectrum value)
+/* Stores where the ray from a point, or from infinity, to the camera runs, in the lanes `kept`; returns its length. */
+inline real connect_camera(Slab shadow, uint at, mask kept, Surface s, CameraPoint c)
 {
-    LightSample ls;
-    ls.wi = neg3(c.d);
-    ls.t = c.t;
-    shadow_toward(shadow, at, active, shine, s, ls, value);
-    mask away = shine & (c.t >= FAR);
+    real t = shadow_aim(shadow, at, kept, s, neg3(c.d), c.t);
+    mask away = kept & (c.t >= FAR);
     if (any(away)) {
         store_shadow_o(shadow, at, away, c.o);
         store_shadow_d(shadow, at, away, c.d);
     }
-    store_shadow_film(shadow, at, shine, c.film);
+    store_shadow_film(shadow, at, kept, c.film);
+    return t;
 }
 
 /* Step sampler: the random numbers of paths from lights. */

@@ -98,6 +98,8 @@ def test_the_scene_of_the_exporters(assets: Path, tmp_path: Path) -> None:
     Without what Cycles does in another way: it blends texels before it decodes sRGB, clamps light,
     blurs caustics, and loses light of the blurred border of a small sun.
     """
+    if bpy.app.version < (5, 0):
+        pytest.skip("its dome says that it is in sRGB, which Blender 4 does not read")
     folder, scene = assets / "blender", bpy.context.scene
     bpy.ops.wm.usd_import(filepath=str(folder / "materialx.usdc"))
     scene.camera = bpy.data.objects["Cam"]

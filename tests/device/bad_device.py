@@ -120,3 +120,31 @@ def no_images(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for name in ("Image", "create_image", "ImageFormat"):
         monkeypatch.setattr(cl, name, refuse)
+
+
+def refuse_standard(monkeypatch: pytest.MonkeyPatch, code: int, log: str) -> list[bytes]:
+    """The compiler refuses `-cl-std`, by a code or by its log. Returns the options of each attempt.
+
+    A list that grows as programs are built.
+    """
+    attempts: list[bytes] = []
+
+    class Program(cl._cl._Program):
+        def _refuse(self, options: bytes) -> None:
+            attempts.append(options)
+            if b"-cl-std" in options:
+                raise driver_error(code)
+
+        def _build(self, options: bytes, devices: Any) -> None:
+            self._refuse(options)
+            super()._build(options, devices)
+
+        def compile(self, options: bytes, devices: Any, headers: Any) -> None:
+            self._refuse(options)
+            super().compile(options, devices, headers)
+
+        def get_build_info(self, device: cl.Device, what: Any) -> Any:
+            return log
+
+    monkeypatch.setattr(cl._cl, "_Program", Program)
+    return attempts

@@ -21,7 +21,14 @@ from clpt.render.wavefront import bounce_loop
 from clpt.render.wavefront.bounce_loop import LEAST_ITEMS
 from clpt.scene import Film, Scene, cameras, integrators, lights, materials, shapes
 from clpt.transforms import look_at
-from tests.device.bad_device import CODE, BadDevice, Launch, driver_error, no_images
+from tests.device.bad_device import (
+    CODE,
+    BadDevice,
+    Launch,
+    driver_error,
+    no_images,
+    refuse_standard,
+)
 from tests.test_other_compilers import of_every_material, texts_of
 
 MIB = 1 << 20
@@ -266,6 +273,53 @@ def test_a_compiler_that_refuses_is_one_line(scene: Scene, monkeypatch: pytest.M
     with pytest.raises(clpt.KernelBuildError, match=r"did not build: .*\.cl") as raised:
         rendered(scene, BadDevice())
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("code", "log"),
+    [
+        (CODE.INVALID_BUILD_OPTIONS, ""),
+        (CODE.INVALID_COMPILER_OPTIONS, ""),
+        (CODE.BUILD_PROGRAM_FAILURE, "error: invalid value 'CL1.2' in '-cl-std=CL1.2'"),
+    ],
+)
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_compiler_that_refuses_the_version_of_the_language(
+    code: int, log: str, linked: bool, scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every program is built without the option then, alone or as a part of a linked one."""
+    on = BadDevice().open()
+    attempts = refuse_standard(monkeypatch, code, log)
+    text = "kernel void fill(global float *out) { out[0] = 7; }"
+    options = (*building.OPTIONS, "-DMORE=1")
+    build = native_programs.compile_part if linked else native_programs.build
+    made = build(on.context, on.info.cl_device, text, options)
+    if linked:
+        made = cl.link_program(on.context, [made], [], [on.info.cl_device])
+    assert attempts == [b" ".join(map(str.encode, options)), b"-cl-kernel-arg-info -w -DMORE=1"]
+    out, found = cl.Buffer(on.context, cl.mem_flags.READ_WRITE, 4), np.empty(1, np.float32)
+    cl.Kernel(made, "fill")(on.queue, (1,), None, out)
+    cl.enqueue_copy(on.queue, found, out)
+    assert found[0] == 7
+
+
+def test_a_picture_where_the_version_of_the_language_is_refused(
+    scene: Scene, picture: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    attempts = refuse_standard(monkeypatch, CODE.INVALID_BUILD_OPTIONS, "")
+    monkeypatch.setattr(building, "_known", lambda *_: None)
+    assert np.array_equal(rendered(scene, BadDevice()), picture)
+    refused = [b"-cl-std" in options for options in attempts]
+    assert any(refused) and refused.count(True) == refused.count(False)
+
+
+def test_a_text_with_an_error_is_built_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the driver does not speak of the option."""
+    on = BadDevice().open()
+    attempts = refuse_standard(monkeypatch, CODE.BUILD_PROGRAM_FAILURE, "error: no such name")
+    with pytest.raises(cl.Error, match="no such name"):
+        native_programs.build(on.context, on.info.cl_device, "no", building.OPTIONS)
+    assert len(attempts) == 1
 
 
 def test_no_kernel_asks_for_the_size_of_sub_groups() -> None:

@@ -355,6 +355,8 @@ def prepare_patch(on_device: DeviceScene, former: Scene, scene: Scene) -> Patch 
             return "the camera is of another kind"
         if _reflects(scene.camera) != _reflects(former.camera):
             return "the camera's lens reflects, or no more"
+    if pairs and lowered.features.grouped:
+        return "slopes of indices stand before the rows of materials"
     rows: list[tuple[int, Any]] = []
     for old, new in pairs:
         check_material(new, scene.film)

@@ -10,8 +10,9 @@ from clpt.render.records import Features
 ESCAPE = ("escape", "escape_axis", "escape_width", "escape_plane", "escape_depth")
 CHANGED = (
     "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "sampled_wo",
-    "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "length", "medium", "around",
-    "bodies", "ray_offset", "mis_ratio", "merge_ratio", "expected", *ESCAPE, "state", "cone",
+    "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "length", "slope", "medium",
+    "around", "bodies", "ray_offset", "mis_ratio", "merge_ratio", "expected", *ESCAPE, "state",
+    "cone",
 )  # fmt: skip
 READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and not written
 # optional members, each with the features that need it
@@ -24,6 +25,7 @@ NEEDED: dict[str, Callable[[Features], bool]] = {
     "nulls": lambda f: f.materials.null_surfaces,
     "ratio": lambda f: f.ratios,
     "length": lambda f: f.film.layers.time_bins > 0,
+    "slope": lambda f: f.grouped,
     "medium": lambda f: f.media.absorbing,
     "around": lambda f: f.media.present and f.media.absorption and not f.media.bodies,
     "bodies": lambda f: f.media.bodies,

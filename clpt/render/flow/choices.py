@@ -319,6 +319,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         else (f"transport/guiding/guided_vertex.cl{TWIN}",)
     ),
     "generated/path_steps.cl": lambda f, cls: (
+        *either(f.grouped and cls.refracts, "transport/optical_length.cl#slopes"),
         *either(cls.kind in f.materials.shining, "integrator/steps/met_emission.cl"),
         *when(_merges(f, cls), "generated/photon.cl", "transport/photons/gather.cl"),
         *either(_merges(f, cls), "integrator/steps/merge.cl"),

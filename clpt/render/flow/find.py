@@ -46,9 +46,9 @@ class Analysis:
     index: with the chosen integrator; reason: of the choice, "" without a choice; sphere: centre
     and radius of a sphere around the scene [m]; sources: emission of its lights; sealed: media that
     rays to lights cannot leave; light_media: media around lights; around: the media, or the matter
-    of bodies, at the camera; camera_index: of refraction there, 1 where light is not sorted by
-    time; aims (k, 5): spheres that paths aim at, see `aims` and `escape_lamps`; openings: of a
-    room, for infinite lights; warnings: of media.
+    of bodies, at the camera; at_camera: the index of refraction there and its slope, 1 and 0 where
+    light is not sorted by time; aims (k, 5): spheres that paths aim at, see `aims` and
+    `escape_lamps`; openings: of a room, for infinite lights; warnings: of media.
     """
 
     index: SceneIndex
@@ -59,7 +59,7 @@ class Analysis:
     sealed: frozenset[Medium]
     light_media: LightMedia
     around: tuple[Any, ...]
-    camera_index: float
+    at_camera: tuple[float, float]
     aims: NDArray[np.float32]
     openings: Openings
     warnings: tuple[str, ...]
@@ -103,8 +103,8 @@ def analyse(
         sealed=sealed,
         light_media=lit,
         around=around,
-        camera_index=index_around(scene, cache) if index.timed else 1.0,
         openings=openings_around(index, geometry, cache) if openings is None else openings,
+        at_camera=index_around(scene, cache) if index.timed else (1.0, 0.0),
         aims=_aims(index, geometry, sphere[1], sealed, cache),
         warnings=(*warnings, *surroundings.warnings_of_holes(index, cache)),
     )

@@ -58,6 +58,7 @@ from clpt.render.records.materials import row_words
 from clpt.render.records.tables import LoweringCache, is_table
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.find import Density, density, emissions
+from clpt.render.spectra.slopes import Slope
 from clpt.render.textures.texels import ImageFiles
 from clpt.scene import Scene
 from clpt.scene import materials as mt
@@ -311,7 +312,8 @@ class _Tables:
         settings["second_u"], settings["second_v"] = self.encoder.textures.second_uv
         settings["ambient"], settings["density"] = self.ambient, self.density
         if self.index.timed:
-            set_times(settings, self.index, self.analysis.camera_index)
+            set_times(settings, self.index, *self.analysis.at_camera)
+            settings["slope_before"] = self.materials.slope_before
         return settings
 
     def append_motion(self) -> int:
@@ -331,7 +333,8 @@ class _Tables:
         leaves: tuple[type[Kind], ...] = (*mt.LEAVES, *index.leaves)
         longest = max(map(row_words, leaves))
         self.store.append("materials", np.zeros(longest, np.uint32))
-        return MaterialWords(self.encoder, index.leaves, index.normal_mapped, self._asks_gloss())
+        asked = self._asks_gloss(), self._asks_slopes()
+        return MaterialWords(self.encoder, index.leaves, index.normal_mapped, *asked)
 
     @property
     def _tree_from(self) -> int | None:
@@ -348,6 +351,14 @@ class _Tables:
         )
         leaves = (leaf for shape in index.shapes for leaf in mt.parts(shape.material))
         return tree and (index.shared or any(gloss_word(leaf) for leaf in leaves))
+
+    def _asks_slopes(self) -> bool:
+        """Whether light by time asks for the indices of groups; bodies that overlap have none."""
+        index = self.index
+        if not (index.timed and index.spectral) or index.nested:
+            return False
+        leaves = (leaf for shape in index.shapes for leaf in mt.parts(shape.material))
+        return any(Slope.of(leaf) is not None for leaf in leaves)
 
     def _append_lights(self, media: MediumWords) -> LightRows:
         """Append the rows of `lights`, and note in the rows of shapes which lights they are."""

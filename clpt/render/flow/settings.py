@@ -106,8 +106,14 @@ def _set_layers(settings: NDArray[np.void], layers: LayerFeatures) -> None:
     settings["layer_times"] = layers.times
 
 
-def set_times(settings: NDArray[np.void], index: SceneIndex, camera_index: float) -> None:
-    """Write which optical lengths the bins of a film are; camera_index: at the camera's place."""
+def set_times(
+    settings: NDArray[np.void], index: SceneIndex, camera_index: float, slope: float
+) -> None:
+    """Write which optical lengths the bins of a film are.
+
+    camera_index, slope: of the index of refraction at the camera's place.
+    """
+    settings["camera_slope"] = slope
     film, planes = index.film, fields_of(index.camera)
     settings["time_bins"] = film.time_bins
     settings["time_first"] = film.time_min * LIGHT_SPEED / camera_index

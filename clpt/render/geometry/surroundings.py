@@ -35,6 +35,7 @@ from clpt.geometry.motion import AT_ONCE, corners
 from clpt.geometry.winding import box, triangles_of
 from clpt.render.records.tables import LoweringCache
 from clpt.render.scene_index import SceneIndex
+from clpt.render.spectra.slopes import Slope
 from clpt.scene import Film, Scene
 from clpt.scene import materials as mt
 from clpt.scene.cameras import Camera
@@ -201,21 +202,24 @@ def bodies_at(
     return tuple(body for body, number in numbers.items() if number > 0.5)
 
 
-def index_around(scene: Scene, cached: LoweringCache | None = None) -> float:
-    """Return the index of refraction at the camera's place, at the yellow line of sodium.
+def index_around(scene: Scene, cached: LoweringCache | None = None) -> tuple[float, float]:
+    """Return the index of refraction at the camera's place, and its `Slope`, at sodium's line.
 
-    Outside of all bodies it is 1. Bodies lie one in another, or have a priority: then the highest
-    fills the place. Raises as `media_around` does.
+    Outside of all bodies they are 1 and 0. Bodies lie one in another, or have a priority: then the
+    highest fills the place. Raises as `media_around` does.
     """
     time = moment(scene.camera)
     p = camera_origin(scene.camera, scene.film, time)
-    factors: dict[int, float] = {}  # by priority
+    factors: dict[int, tuple[float, float]] = {}  # by priority
     for shape in every(scene.shapes, lambda shape: _bends(shape) != 1.0):
         low, high = _swept_box(shape, cached, time)
         if _bends(shape) != 1.0 and ((p >= low) & (p <= high)).all():
             turns = round(_winding(shape, p, cached, time))
-            factors[shape.priority] = factors.get(shape.priority, 1.0) * _bends(shape) ** turns
-    return factors[max(factors)] if factors else 1.0
+            factor, slope = factors.get(shape.priority, (1.0, 0.0))
+            slopes = filter(None, map(Slope.of, mt.parts(shape.material)))
+            more = sum(float(each.sample(SODIUM)) for each in slopes)
+            factors[shape.priority] = factor * _bends(shape) ** turns, slope + more * turns
+    return factors[max(factors)] if factors else (1.0, 0.0)
 
 
 def _bends(shape: Shape) -> float:

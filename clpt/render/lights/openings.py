@@ -78,7 +78,7 @@ class Openings:
             row["x"], row["y"], row["reach"] = (
                 x / (x @ x),
                 y / (y @ y),
-                np.hypot(*map(np.linalg.norm, (x, y))),
+                np.sqrt(x @ x + y @ y),
             )
         return rows.view(np.uint32)
 
@@ -400,4 +400,4 @@ def _axes(normals: Floats, area: Floats) -> Floats:
         axes = [axes[0] if axes else np.array([0.0, 0.0, 1.0])]
         other = np.cross(axes[0], np.eye(3)[np.abs(axes[0]).argmin()])
         axes.append(other / np.linalg.norm(other))
-    return np.array([*axes, np.cross(*axes)])
+    return np.array([*axes, np.cross(axes[0], axes[1])])

@@ -18,6 +18,7 @@ from clpt.errors import SceneError
 from clpt.render.materials.encoder import Encoder
 from clpt.render.records.materials import MIXTURE, NORMAL_MAP_WORDS, MaterialFeatures
 from clpt.render.scene_index import SceneIndex
+from clpt.render.spectra.slopes import Slope
 from clpt.scene import materials as mt
 from clpt.scene import roles
 from clpt.scene.materials import BumpMap, NormalMap
@@ -126,7 +127,8 @@ class _Side:
 class MaterialWords:
     """The words of materials, and what these materials need of the kernels.
 
-    gloss_before: a row's gloss lies this many words before the row, 0 without gloss;
+    gloss_before, slope_before: a row's gloss, and 1 more than the row in `spectra` of its slope of
+    the index, lie this many words before the row, 0 without them;
     uvs, tangents, absorption: whether a material needs them; transmitting: the kinds of leaves that
     transmit light in this scene; mixture_depth: how deep masks and blends nest.
     """
@@ -137,9 +139,12 @@ class MaterialWords:
         leaves: tuple[type[Scatterer], ...],
         normal_mapped: bool,
         asks_gloss: bool,
+        asks_slopes: bool,
     ):
         self._encoder, self._leaves, self._normal_mapped = encoder, leaves, normal_mapped
         self.gloss_before = (1 + NORMAL_MAP_WORDS * normal_mapped) * asks_gloss
+        before = 1 + NORMAL_MAP_WORDS * normal_mapped + asks_gloss
+        self.slope_before = before * asks_slopes
         self._words: dict[tuple[int, tuple[Any, ...]], int] = {}
         self._depths: dict[int, int] = {}  # of mixtures, by their words
         self.uvs = self.tangents = self.absorption = False
@@ -155,6 +160,7 @@ class MaterialWords:
             leaves=index.leaves,
             transmitting=tuple(sorted(self.transmitting)),
             shining=index.shining,
+            slopes=self.slope_before > 0,
             mixtures=self.mixture_depth,
             normal_mapped=index.normal_mapped,
             free_panes=index.free_panes,
@@ -203,6 +209,10 @@ class MaterialWords:
         if self.gloss_before:
             maps = () if before is None else before
             before = np.array([gloss_word(material), *maps], np.uint32)
+        if self.slope_before:
+            slope = Slope.of(material)
+            word = 0 if slope is None else 1 + self._encoder.spectra.row(slope)
+            before = np.array([word, *(() if before is None else before)], np.uint32)
         row = self._encoder.row(material, "materials", before)
         if row >= 1 << 24:
             raise SceneError("the scene has more than 16 million words of material parameters")

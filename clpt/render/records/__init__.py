@@ -224,6 +224,11 @@ class Features:
         return self.dispersion and self.spectra.spectral
 
     @property
+    def grouped(self) -> bool:
+        """Whether light by time counts the indices of groups: the delay of pulses."""
+        return self.film.layers.time_bins > 0 and self.materials.slopes
+
+    @property
     @macro("USES_RATIO")
     def ratios(self) -> bool:
         """Whether the density of a path differs between its wavelengths."""

@@ -103,6 +103,7 @@ class MaterialFeatures:
     mixtures: int = 0  # how deep masks and blends nest
     normal_mapped: bool = False  # some material has a normal or a bump map
     free_panes: bool = flag("FREE_PANES")  # light goes straight through thin glass
+    slopes: bool = False  # rows of glass know how the index changes with the wavelength
     sources: Sources = frozenset()
 
     @property

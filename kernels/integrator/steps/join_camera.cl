@@ -21,14 +21,18 @@ inline integer join_camera(Scene scene, Slab shadow, uint at, mask active, Verte
                            MisRatio mis_ratio, CameraJoint joint, real arrives)
 {
     CameraPoint c = joint.c;
+    real length, cosine = VERTEX_COSINE(v.s.n, c.d);
+    if (LANES == 1) length = connect_camera(shadow, at, active & c.seen, v.s, c); /* later it costs registers */
     BsdfPair pair = bsdf_pair(scatter.bsdf, joint.to, scatter.wo, spectrum_of(1.0f));
     mask shine = active & c.seen & (spectrum_max(pair.f) > 0.0f);
     real share = shading_frame_share(scatter.shading, neg3(v.d));
-    real carries = VERTEX_COSINE(v.s.n, c.d) * arrives * c.importance * share;
+    real carries = cosine * arrives * c.importance * share;
     carries *= mis_weight_of_connection(scene, mis_ratio, v, pair, c, &shine);
     Spectrum value = spectrum_scale(spectrum_mul(v.beta, pair.f), carries);
     value = vertex_beyond(scene, v, neg3(c.d), c.t, v.lambdas, value);
-    connect_camera(shadow, at, active, shine, v.s, c, value);
+    if (LANES > 1) length = connect_camera(shadow, at, shine, v.s, c);
+    store_shadow_t(shadow, at, active, sel(shine, length, (real)(-1.0f)));
+    store_shadow_value(shadow, at, LANES == 1 ? active : shine, value);
     store_shadow_through(shadow, at, shine, vertex_through(v, neg3(c.d)));
     return sel_i(shine, (integer)(PATH_SHADOW), (integer)(0));
 }

@@ -5,6 +5,7 @@ typedef struct {
     real begins; /* density of a light path from the point, if light paths have MIS weights */
     vec3 wi;     /* toward the point, in shading.frame */
     real index;  /* of the side of wi, over that of wo */
+    real more;   /* slope there, less that on the side of wo */
     Spectrum value;
 } NextEvent;
 
@@ -35,6 +36,7 @@ inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering
     real p = guided_pdf(guided, e.ls.wi, pair.pdf MERGE_PASSED);
     real w = event_weight(scene, mis_ratio, v.s, e.ls, e.begins, pair, p);
     e.index = index_across(scatter.bsdf, scatter.wo, e.wi);
+    e.more = slope_across(scene, v.row, scatter.lambdas, scatter.wo, e.wi);
     e.shine = e.shine & (e.ls.pdf != 0.0f) & (spectrum_max(f) > 0.0f);
     w = w / sel(e.shine, fabs(e.ls.pdf), (real)(1.0f));
     e.value = spectrum_scale(spectrum_mul(spectrum_mul(v.beta, f), e.ls.radiance), w);
@@ -46,11 +48,14 @@ inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering
  * before the sampling, compilers would read tables of materials twice. Returns the bits to add to Path.state. */
 inline integer next_event_keep(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v, NextEvent e)
 {
-    shadow_toward(shadow, at, active, e.shine, v.s, e.ls, e.value);
+    mask kept = LANES == 1 ? active : e.shine; /* on a GPU a condition would cost registers */
+    store_shadow_t(shadow, at, active, sel(e.shine, shadow_aim(shadow, at, kept, v.s, e.ls.wi, e.ls.t), (real)(-1.0f)));
+    store_shadow_value(shadow, at, kept, e.value);
     light_layers_chosen(path, at, e.shine, e.ls.row);
     store_shadow_into(shadow, at, e.shine, volume_medium(scene, sel_i(e.shine, e.ls.row, (integer)(0))));
     store_shadow_through(shadow, at, e.shine, vertex_through(v, e.ls.wi));
-    length_to_light(path, shadow, at, e.shine, v.t, e.ls.t, e.index);
+    real index = e.index * (1.0f - e.more / (1.0f - load_path_slope(path, at)));
+    length_to_light(path, shadow, at, e.shine, v.t, e.ls.t, index);
     return sel_i(e.shine, (integer)(PATH_SHADOW), (integer)(0));
 }
 

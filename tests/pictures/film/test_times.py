@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import clpt
+from clpt import spectra
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.render.film import film_file
@@ -309,3 +310,45 @@ def test_ranges_that_make_no_sense_are_refused():
     plain = Scene(lights=[Constant()], camera=ray(), film=Film(size=(2, 2)))
     with clpt.Renderer(plain) as renderer, pytest.raises(SceneError, match="has no times"):
         renderer.times()
+
+
+F2 = {"int_ior": "f2", "ext_ior": 1.0}
+SHINING = {"emission": Area(radiance=1.0), "material": mt.Diffuse(reflectance=0.0)}
+IN_GLASS = {  # shapes, metres of glass, and of air
+    "behind glass": ([slab(mt.Dielectric(**F2), thick=2.0), wall(4.0, **SHINING)], 2.0, 2.0),
+    "camera in glass": ([slab(mt.Dielectric(**F2), -3.0, 5.0), wall(3.0, **SHINING)], 2.0, 1.0),
+    "rough glass": ([slab(mt.RoughDielectric(**F2, alpha=0.05))], 1.0, 9.0),
+}
+
+
+@pytest.mark.parametrize("name", IN_GLASS)
+def test_pulses_go_at_the_speed_of_groups_in_glass(name):
+    """F2 at 589.3 nm: n is 1.620, and n - lambda dn / dlambda by Schott's formula 1.670."""
+    shapes, glass, air = IN_GLASS[name]
+    reach = {"mode": "spectral", "lambda_min": 587.3, "lambda_max": 591.3}
+    scene = Scene(
+        camera=ray(),
+        shapes=shapes,
+        lights=[Point(position=(0, 0, 10), intensity=1.0)] if "rough" in name else [],
+        integrator=Path(light_paths=0, max_depth=3),
+        film=timed((0.05, 20.05), 20000, **reach),
+    )
+    times, _ = rendered(scene, 256)
+    index = spectra.index("f2").sample([589.3 - 0.1, 589.3, 589.3 + 0.1])
+    group = index[1] - 589.3 * (index[2] - index[0]) / 0.2
+    assert group == pytest.approx(1.67038, abs=1e-4)
+    first = 0.05 + 1e-3 * np.nonzero(times[0, 0, :-1].any(axis=1))[0][0]
+    assert first == pytest.approx(group * glass + air, abs=3e-3)
+
+
+def test_light_in_even_glass_has_the_index_of_phases():
+    """A constant index, in spectral mode too: it has no slope."""
+    even = mt.Dielectric(int_ior=1.6, ext_ior=1.0)
+    scene = Scene(
+        camera=ray(),
+        shapes=[slab(even, thick=2.0), wall(4.0, **SHINING)],
+        integrator=CAMERA,
+        film=timed((0.05, 10.05), 1000, mode="spectral"),
+    )
+    times, _ = rendered(scene, 64)
+    assert np.nonzero(times[0, 0, :-1].any(axis=1))[0][0] == 514
