@@ -164,7 +164,7 @@ def is_singular(matrix: ArrayLike) -> bool:
         return True
     if is_affine(matrix) and np.abs(matrix).max() <= LARGE:
         columns = matrix[:3, :3].T.tolist()
-        sides = [math.hypot(*column) for column in columns]
+        sides = [math.sqrt(sum(x * x for x in column)) for column in columns]
         if 0.0 in sides:
             return True
         units = [[x / side for x in column] for column, side in zip(columns, sides, strict=True)]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats32
+
 LEAF = 4  # triangles
 LARGE = 64  # triangles that stand outside of the tree: their boxes would be met by most rays
 MORTON_BITS = 10  # for each axis
 BIAS = np.float32(1e-12)  # of a direction's components, whose inverse must be finite
-
-Floats = NDArray[np.float32]
 
 
 class Caster:
@@ -32,7 +32,7 @@ class Caster:
         split = proper[np.argpartition(area[proper], len(proper) - large)] if large else proper
         self._large, small = split[len(split) - large :], split[: len(split) - large]
         self._large_edges = _edges(triangles[self._large])
-        self._levels: list[Floats] = []
+        self._levels: list[Floats32] = []
         if not len(small):
             return
         middle = (low[small] + high[small]) * 0.5
@@ -49,7 +49,7 @@ class Caster:
 
     def nearest(
         self, origins: NDArray[np.floating], directions: NDArray[np.floating]
-    ) -> tuple[NDArray[np.intp], Floats]:
+    ) -> tuple[NDArray[np.intp], Floats32]:
         """Return the triangle that each ray meets first, -1 for none, and its distance.
 
         origins, directions: (k, 3); distances are in lengths of the directions, inf for none.
@@ -73,7 +73,7 @@ class Caster:
         return triangles, distances
 
     def _leaves(
-        self, o: Floats, d: Floats, ends: Floats
+        self, o: Floats32, d: Floats32, ends: Floats32
     ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Return pairs of a ray and a place of a triangle, whose leaf it meets before its end."""
         inverse = 1.0 / np.where(np.abs(d) < BIAS, BIAS, d)
@@ -94,13 +94,13 @@ class Caster:
         return np.repeat(rays, LEAF), places
 
 
-def _edges(triangles: NDArray[np.floating]) -> Floats:
+def _edges(triangles: NDArray[np.floating]) -> Floats32:
     """Return a corner of triangles and the two edges from there, (3, 3, n): by kind, then axis."""
     a, b, c = (triangles[:, k].T for k in range(3))
     return np.stack([a, b - a, c - a]).astype(np.float32)
 
 
-def _distances(edges: Floats, o: Floats, d: Floats) -> Floats:
+def _distances(edges: Floats32, o: Floats32, d: Floats32) -> Floats32:
     """Return the distances of rays from triangles, inf where they miss (Moeller and Trumbore 1997).
 
     Arrays (3, ...) are by axis, and are broadcast.
@@ -114,12 +114,12 @@ def _distances(edges: Floats, o: Floats, d: Floats) -> Floats:
     return np.where((u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (t > 0.0), t, np.float32(np.inf))
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
+def _cross(a: Floats32, b: Floats32) -> Floats32:
     rows = [a[i] * b[j] - a[j] * b[i] for i, j in ((1, 2), (2, 0), (0, 1))]
     return np.stack(np.broadcast_arrays(*rows))
 
 
-def _dot(a: Floats, b: Floats) -> Floats:
+def _dot(a: Floats32, b: Floats32) -> Floats32:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 

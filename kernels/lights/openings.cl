@@ -57,16 +57,6 @@ inline vec3 openings_direction(Scene scene, vec3 p, vec3 hemisphere, vec2 u)
     return normalize3(add3(sub3(o.center, p), madd3(o.x, a, scale3(o.y, b))));
 }
 
-/* The random numbers of the two techniques. *through: the lanes that sample openings. */
-inline vec2 openings_choose(Scene scene, LightRow l, vec2 u, mask *through)
-{
-    float share = scene.settings->opening_share;
-    mask infinite = light_is_infinite(l);
-    *through = infinite & (u.x < share);
-    real x = sel(*through, u.x / share, (u.x - share) / (1.0f - share));
-    return (vec2){sel(infinite, clamp_r(x, (real)(0.0f), (real)(0.99999994f)), u.x), u.y};
-}
-
 /* The density of next-event estimation for a light, whose own density is pdf [1/sr]. */
 inline real with_openings(Scene scene, LightRow l, vec3 p, vec3 hemisphere, vec3 d, real pdf)
 {
@@ -76,10 +66,15 @@ inline real with_openings(Scene scene, LightRow l, vec3 p, vec3 hemisphere, vec3
     return sel(infinite, (1.0f - share) * pdf + share * openings_pdf(scene, p, hemisphere, d), pdf);
 }
 
-/* A sample of a light by both techniques. s: the sample by the light's own density. */
-inline LightSample openings_sample(Scene scene, LightRow l, LightView view, vec3 p, vec3 hemisphere, vec2 u,
-                                   mask through, Wavelengths lambdas, LightSample s)
+/* A sample of a light off all shapes, of an infinite light by both techniques. u: uniform in the unit square. */
+inline LightSample lamp_in_room(Scene scene, LightRow l, LightView view, vec3 p, vec3 hemisphere, vec2 u,
+                                Wavelengths lambdas)
 {
+    float share = scene.settings->opening_share;
+    mask infinite = light_is_infinite(l), through = infinite & (u.x < share);
+    real left = sel(through, u.x / share, (u.x - share) / (1.0f - share));
+    u.x = sel(infinite, clamp_r(left, (real)(0.0f), (real)(0.99999994f)), u.x);
+    LightSample s = light_moved(view, lamp_sample(scene, l, view, u, lambdas));
     if (any(through)) {
         vec3 d = openings_direction(scene, p, hemisphere, u);
         Spectrum radiance;
@@ -95,11 +90,5 @@ inline LightSample openings_sample(Scene scene, LightRow l, LightView view, vec3
 }
 
 /* Twin, where no openings are known. */
-inline vec2 openings_choose(Scene scene, LightRow l, vec2 u, mask *through)
-{
-    *through = mask_of(0);
-    return u;
-}
-inline real with_openings(Scene scene, LightRow l, vec3 p, vec3 hemisphere, vec3 d, real pdf) { return pdf; }
-inline LightSample openings_sample(Scene scene, LightRow l, LightView view, vec3 p, vec3 hemisphere, vec2 u,
-                                   mask through, Wavelengths lambdas, LightSample s) { return s; }
+#define with_openings(scene, l, p, hemisphere, d, pdf) (pdf)
+#define lamp_in_room(scene, l, v, p, hemisphere, u, lambdas) light_moved(v, lamp_sample(scene, l, v, u, lambdas))

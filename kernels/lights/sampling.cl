@@ -10,10 +10,7 @@ inline LightSample light_sample(Scene scene, vec3 p, Receiver receiver, real pic
     integer row = light_choose(scene, p, receiver, FEW_LIGHTS ? &u.x : &pick, u.y, &pmf);
     LightRow l = light_at(scene, row);
     LightView view = light_view(scene, row, l, p, receiver.hemisphere);
-    mask through;
-    u = openings_choose(scene, l, u, &through);
-    LightSample s = light_moved(view, lamp_sample(scene, l, view, u, lambdas));
-    s = openings_sample(scene, l, view, p, receiver.hemisphere, u, through, lambdas, s);
+    LightSample s = lamp_in_room(scene, l, view, p, receiver.hemisphere, u, lambdas);
     s = area_light_sample(scene, row, l, view, p, u, lambdas, s);
     return area_unseen(light_chosen(s, row, pmf), l);
 }

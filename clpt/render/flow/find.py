@@ -76,19 +76,16 @@ def analyse(
 ) -> Analysis:
     """Return the facts about a scene; cache: with results of the analysis before.
 
-    former: the integrator before an edit, which stays: its film has sums for light paths, or none;
-    lit_before: whether light paths were ghosts of a lens then; openings: the ones then, which stay;
-    shared: see `SceneIndex`.
+    former, lit_before, openings: the integrator, whether light paths were ghosts of a lens, and the
+    openings before an edit, which stay as they are; shared: see `SceneIndex`.
 
     Raises SceneError for an invalid scene; it names the shape, light or material.
     """
-    scene = at_rest(scene)
-    check_at_rest(scene, cache)
+    check_at_rest(scene := at_rest(scene), cache)
     scene = plainly_lit(scene)
     index = replace(SceneIndex.of(scene, shared), lit_before=lit_before)
-    geometry = assembled(index, cache)
+    geometry, look = assembled(index, cache), Look.of(scene.film, cache)
     sphere = geometry.bounding_sphere()
-    look = Look.of(scene.film, cache)
     sources = sources_of(index, geometry, sphere[1], look)
     index, lit = _media_at_lights(index, geometry, sources, sphere, cache)
     index, reason = decided(Lit(index, geometry, look, sources, sphere, lit.extinction), former)

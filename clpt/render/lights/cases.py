@@ -82,9 +82,10 @@ def dispatch_text(features: Features, densities: str = "") -> str:
     present = kinds_of(features)
     rows = [*_numbers(features, present), *included(*_includes(features))]
     rows += _tree_text() if features.lights.tree else included("lights/light.cl#by_power")
-    rows += [*_infinite_case(features), *_openings_text(features)]
+    rows += _infinite_case(features)
     if present:
         rows += [_lamps_text(features), *_areas_text(features)]
+    rows += _openings_text(features)
     rows += included(either(present, "lights/sampling.cl"))
     rows.append(densities)
     if BRICK in present:

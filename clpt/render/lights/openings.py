@@ -16,6 +16,7 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.arrays import Floats
 from clpt.geometry.casting import Caster
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Geometry
@@ -47,9 +48,8 @@ AIMED, FINALLY = 512, 2048  # rays to a plane, for the choice of one, and for it
 TRIED = 3  # planes
 CELLS = 24  # along a side, for these rays
 RARE = 0.25  # of the mean share: where less escapes at a side, the opening ends
+FAR = 1e9  # [m] no room is so large
 OFFSET = 1e-4  # of the size of the scene, from a surface
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,8 @@ def _openings(index: SceneIndex, geometry: Geometry, eye: Floats, view: View | N
         if not _is_passed(index, shape.material)
     ]
     triangles = np.concatenate([np.zeros((0, 3, 3), np.float32), *walls])
-    return find(triangles, eye, view)
+    with np.errstate(all="ignore"):
+        return find(triangles, eye, view) if np.abs(triangles).max(initial=0.0) < FAR else CLOSED
 
 
 def _is_passed(index: SceneIndex, material: mt.Material) -> bool:
