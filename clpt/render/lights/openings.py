@@ -26,7 +26,7 @@ from clpt.render.scene_index import SceneIndex
 from clpt.scene import materials as mt
 from clpt.scene.cameras.camera import View
 
-MOST_TRIANGLES = 1 << 20  # the largest ones
+MOST_TRIANGLES = 1 << 16  # the largest ones
 AROUND, ONWARD, SECOND = 192, 6, 256  # rays from the camera, from a hit, hits of those that go on
 WIDE = 1.4  # [rad] from the view's axis, at most
 MOST_SHARE = 0.8  # of the samples, if all rays that escape do so through the openings
