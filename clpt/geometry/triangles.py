@@ -234,26 +234,24 @@ def _moved(
 
 def _solid(vertices: Points, faces: Faces) -> NDArray[np.bool_]:
     """Return which faces have a cross product whose square is not zero in float32."""
-    has_area, vertices = np.empty(len(faces), np.bool_), _wide(vertices)
+    has_area, columns = np.empty(len(faces), np.bool_), _columns(vertices)
     for first in range(0, len(faces), CHUNK):
-        x, y, z = np.abs(_cross_columns(vertices, faces[first : first + CHUNK])) > LEAST_CROSS
+        x, y, z = np.abs(_crosses(columns, faces[first : first + CHUNK])) > LEAST_CROSS
         has_area[first : first + CHUNK] = x | y | z
     return has_area
 
 
-def _wide(vertices: NDArray[Any]) -> NDArray[Any]:
-    """Return vertices whose products do not overflow: as float64 if they are far away."""
-    return vertices.astype(np.float64) if np.abs(vertices).max(initial=0.0) > FAR else vertices
+def _columns(vertices: NDArray[Any]) -> NDArray[Any]:
+    """Return vertices as columns (3, n), since numpy is slow along short axes.
+
+    Far away they are float64, so that their products do not overflow.
+    """
+    far = np.abs(vertices).max(initial=0.0) > FAR
+    return np.array(vertices.T, np.float64 if far else vertices.dtype, order="C")
 
 
-def _crosses(vertices: NDArray[Any], faces: Faces) -> NDArray[Any]:
-    """Cross products of the edges at each triangle's first vertex, (m, 3) like the vertices."""
-    return _cross_columns(vertices, faces).T
-
-
-def _cross_columns(vertices: NDArray[Any], faces: Faces) -> NDArray[Any]:
-    """Return cross products as columns (3, m): numpy is slow along short axes."""
-    columns = np.ascontiguousarray(vertices.T)
+def _crosses(columns: NDArray[Any], faces: Faces) -> NDArray[Any]:
+    """Cross products of the edges at each triangle's first vertex, (3, m) like the `_columns`."""
     first, second, third = (columns.take(faces[:, i], axis=1) for i in range(3))
     (ax, ay, az), (bx, by, bz) = second - first, third - first
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
@@ -261,7 +259,7 @@ def _cross_columns(vertices: NDArray[Any], faces: Faces) -> NDArray[Any]:
 
 def triangle_areas(vertices: Points, faces: Faces) -> NDArray[np.float64]:
     """Return the area of every triangle [m^2], (m,) float64."""
-    return 0.5 * np.linalg.norm(_crosses(_wide(vertices), faces).astype(np.float64), axis=1)
+    return 0.5 * np.linalg.norm(_crosses(_columns(vertices), faces).astype(np.float64), axis=0)
 
 
 def triangle_rows(vertices: Points, faces: Faces) -> Words:

@@ -121,6 +121,10 @@ class SceneIndex:
         """Whether the scene has thin glass that paths cross without a step."""
         return self.integrator.free_panes and any(cls.is_pane for cls in self.leaves)
 
+    def passes_shadow_rays(self, leaf: type[Scatterer]) -> bool:
+        """Whether rays to lights pass a kind of leaf materials."""
+        return leaf.is_null or (leaf.is_pane and self.free_panes)
+
     @property
     def grids(self) -> GridFeatures:
         """Features of the media whose density is on a grid."""

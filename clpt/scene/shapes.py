@@ -72,12 +72,7 @@ class Shape(Kind):
 
     def placed_at(self: ShapeKind, to_worlds: Iterable[ArrayLike]) -> list[ShapeKind]:
         """Return the shape at each of `to_worlds`, (4, 4) in memory, as `placed` does."""
-        kind, parameters, copies = type(self), vars(self), []
-        for to_world in to_worlds:
-            other = object.__new__(kind)
-            vars(other).update(parameters, to_world=to_world)
-            copies.append(other)
-        return copies
+        return [self.altered(to_world=to_world) for to_world in to_worlds]
 
     material: Material = host(Diffuse(), "of the surface", form="material")
     emission: PoweredLamp | None = host(None, "an `area` light, or None", form="area_light")

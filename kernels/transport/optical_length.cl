@@ -12,7 +12,6 @@ inline void length_begin(Scene scene, Slab path, uint at, mask go, real far)
     store_path_length(path, at, go, (1.0f - slope) * far * scene.settings->near_share);
 }
 
-
 /* The length at a distance t along the ray. */
 inline real length_after(Slab path, uint at, real t)
 {

@@ -319,6 +319,12 @@ def camera_origin(camera: Camera, film: Film, time: float) -> NDArray[np.float64
     return np.asarray(transforms.transform_points(matrix, origin), np.float64)
 
 
+def camera_halfway(index: SceneIndex) -> NDArray[np.float64]:
+    """Return where the camera is in the middle of the shutter's time (3,) [m]."""
+    shutter = index.motions.shutter
+    return camera_origin(index.camera, index.film, (shutter.open + shutter.close) / 2.0)
+
+
 def moment(camera: Camera) -> float:
     """Return the time [s] when the shutter opens."""
     return (camera.shutter or AT_ONCE).open

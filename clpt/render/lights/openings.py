@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,28 +22,26 @@ from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Geometry
 from clpt.render.records.lights import OPENING
 from clpt.render.records.tables import LoweringCache
-from clpt.render.scene_index import SceneIndex
-from clpt.scene import materials as mt
+from clpt.render.scene_index import SceneIndex, leaves_of
 from clpt.scene.cameras.camera import View
 
 MOST_TRIANGLES = 1 << 16  # the largest ones
-AROUND, ONWARD, SECOND = 192, 6, 256  # rays from the camera, from a hit, hits of those that go on
+AROUND = 192  # rays from the camera
+ONWARD, SECOND = 6, 256  # rays from each of their hits; second hits, from which rays go on
 WIDE = 1.4  # [rad] from the view's axis, at most
 MOST_SHARE = 0.8  # of the samples, if all rays that escape do so through the openings
 OUTDOORS = 0.35  # share of escaping rays beyond which a place is no room
 FEWEST = 8  # escaping rays of an opening
 MOST = 6  # openings
-WORTH, SEEN = (
-    3.0,
-    0.3,
-)  # least share of rays to an opening that escape: over that of all rays; itself
+SEEN = 0.3  # least share of escaping rays among the rays to an opening
+WORTH = 3.0  # the same, over the share of all rays
 CAPTURED = 0.9  # of escaping rays: no more rectangles are sought
 WALLS, MOST_WALLS = 12, 1 << 14  # planes along an axis; triangles among which they are sought
 SLICES = 256  # along an axis, whose walls count as one
 LEAST = 0.1  # of the escaping rays: fewer are no reason for openings in a plane
 STEEP = 0.15  # least component of a direction through a plane
 MARGIN = 0.1  # of a side, around rays that escaped
-SHRINK = 0.1  # of the rays through a box, for each step in which its sides move inwards
+SHRINK = 0.1  # of the rays through a box that a smaller box leaves out, in each step
 AIMED, FINALLY = 512, 2048  # rays to a plane, for the choice of one, and for its openings
 TRIED = 3  # planes
 CELLS = 24  # along a side, for these rays
@@ -71,15 +69,12 @@ class Openings:
     def words(self) -> NDArray[np.uint32]:
         """Return their rows of clpt.render.records.lights.OPENING."""
         rows = np.zeros(len(self.rectangles), OPENING.dtype)
-        for row, (center, x, y) in zip(rows, map(astuple, self.rectangles), strict=True):
+        for row, opening in zip(rows, self.rectangles, strict=True):
+            x, y = opening.x, opening.y
             across = np.cross(x, y)
             half = np.linalg.norm(across)
-            row["center"], row["n"], row["area"] = center, across / half, 4.0 * half
-            row["x"], row["y"], row["reach"] = (
-                x / (x @ x),
-                y / (y @ y),
-                np.sqrt(x @ x + y @ y),
-            )
+            row["center"], row["n"], row["area"] = opening.center, across / half, 4.0 * half
+            row["x"], row["y"], row["reach"] = x / (x @ x), y / (y @ y), np.sqrt(x @ x + y @ y)
         return rows.view(np.uint32)
 
 
@@ -91,11 +86,10 @@ def openings_around(index: SceneIndex, geometry: Geometry, cache: LoweringCache)
 
     Instances and analytic shapes do not count as walls; what rays to lights pass does not either.
     """
-    if index.shared or not any(light.reach == "infinite" for light in index.lights):
+    lit = any(light.reach == "infinite" for light in index.lights)
+    if index.shared or index.light_paths or not lit:
         return CLOSED
-    shutter = index.motions.shutter
-    middle = (shutter.open + shutter.close) / 2.0
-    eye = surroundings.camera_origin(index.camera, index.film, middle)
+    eye = surroundings.camera_halfway(index)
     view = index.camera.view_of(index.film.width, index.film.height)
     if not np.isfinite(eye).all():
         return CLOSED
@@ -107,17 +101,11 @@ def _openings(index: SceneIndex, geometry: Geometry, eye: Floats, view: View | N
     walls = [
         geometry.vertices[geometry.faces[faces]]
         for shape, _, faces in geometry.meshes()
-        if not _is_passed(index, shape.material)
+        if not all(map(index.passes_shadow_rays, leaves_of(shape.material)))
     ]
     triangles = np.concatenate([np.zeros((0, 3, 3), np.float32), *walls])
     with np.errstate(all="ignore"):
         return find(triangles, eye, view) if np.abs(triangles).max(initial=0.0) < FAR else CLOSED
-
-
-def _is_passed(index: SceneIndex, material: mt.Material) -> bool:
-    """Whether rays to lights pass a material."""
-    leaves = [part for part in mt.parts(material) if not part.is_composite]
-    return all(leaf.is_null or (index.free_panes and leaf.is_pane) for leaf in leaves)
 
 
 def find(triangles: NDArray[np.floating], eye: Floats, view: View | None = None) -> Openings:
@@ -162,7 +150,7 @@ class _Search:
         return float(self.escaped.mean())
 
     def spread(self, eye: Floats, view: View | None) -> bool:
-        """Send rays: from the camera to surfaces, from these, and from what those rays meet.
+        """Send rays from the camera, from the surfaces that they meet, and from second surfaces.
 
         Returns whether the place is a room with openings.
         """
@@ -183,9 +171,10 @@ class _Search:
         more = self._onward(again[some], faces[some])
         self.points = np.concatenate([points, again[some]])
         self.faces = np.concatenate([normals, faces[some]])
-        self.origins = np.concatenate([origins, more[0]])
-        self.directions = np.concatenate([directions, more[1]])
-        self.escaped = self._escape(self.origins, self.directions)
+        origins = np.concatenate([origins, more[0]])
+        directions = np.concatenate([directions, more[1]])
+        self.escaped = self._escape(origins, directions)
+        self.along_axes = origins @ self.axes.T, directions @ self.axes.T
         return self.share < OUTDOORS and bool(self.escaped.sum() >= FEWEST)
 
     def _sphere(self, count: int) -> Floats:
@@ -251,7 +240,7 @@ class _Search:
 
     def _crossings(self, axis: int, sign: int, place: float) -> tuple[Floats, NDArray[np.bool_]]:
         """Return where rays cross a plane (n, 2), and which of them do it, towards a side."""
-        o, d = self.origins @ self.axes.T, self.directions @ self.axes.T
+        o, d = self.along_axes
         along = d[:, axis] * sign
         through = (along > STEEP) & ((place - o[:, axis]) * sign > 0.0)
         t = (place - o[:, axis]) / np.where(through, d[:, axis], 1.0)
@@ -299,9 +288,10 @@ class _Plane:
 
 @dataclass(frozen=True)
 class _Plan:
-    """Openings in a plane; gain: rays through them, by what is seen; inside: which rays these are.
+    """Openings in a plane.
 
-    plane: with a box around the openings.
+    inside: the rays through them; gain: their number, each by the share of the rays to its opening
+    that escape; plane: with a box around the openings.
     """
 
     rectangles: list[Rectangle]

@@ -192,8 +192,7 @@ def sealed_media(index: SceneIndex, cache: LoweringCache | None = None) -> froze
 
 
 def _stops_shadow_rays(shape: Shape, index: SceneIndex) -> bool:
-    leaves = leaves_of(shape.material)
-    return not any(leaf.is_null or (leaf.is_pane and index.free_panes) for leaf in leaves)
+    return not any(map(index.passes_shadow_rays, leaves_of(shape.material)))
 
 
 def _overlaps(bodies: list[Shape], lamp: Box, cache: LoweringCache | None) -> bool:

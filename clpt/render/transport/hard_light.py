@@ -79,9 +79,7 @@ class Lit:
     @cached_property
     def eye(self) -> NDArray[np.float64]:
         """Where the camera is in the middle of the shutter's time (3,) [m]."""
-        index, shutter = self.index, self.index.motions.shutter
-        middle = (shutter.open + shutter.close) / 2.0
-        return surroundings.camera_origin(index.camera, index.film, middle)
+        return surroundings.camera_halfway(self.index)
 
     @cached_property
     def bounds(self) -> light_bounds.Bounds:

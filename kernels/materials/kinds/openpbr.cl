@@ -95,6 +95,7 @@ inline Spectrum openpbr_complement(Spectrum f)
 #undef C
     return f;
 }
+
 /* Where a film covers a share of it, its reflectance, else f. */
 inline Spectrum openpbr_filmed(Openpbr m, Spectrum f, FilmBase base, real c)
 {
