@@ -254,3 +254,11 @@ def test_fallbacks_of_primvars(stage: Loader) -> None:
     shape = stage(text).shapes[0]
     assert np.allclose(shape.attributes["vertex_paint"], (0.5, 0.25, 0.125))
     assert np.allclose(shape.attributes["vertex_wear"], 0.75)
+
+
+def test_a_mesh_without_texture_coordinates_shows_one_texel(stage: Loader, tmp_path: Path) -> None:
+    Image.fromarray(np.zeros((2, 2, 3), np.uint8)).save(tmp_path / "image.png")
+    color = "color3f inputs:diffuseColor.connect = </Look/T.outputs:rgb>"
+    text = STAGE.format(color, "", "", SQUARE, SUN).replace("primvars:map1", "primvars:other")
+    mesh = stage(text).shapes[0]
+    assert np.array_equal(mesh.uvs, np.zeros((4, 2)))
