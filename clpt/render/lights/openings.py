@@ -194,8 +194,8 @@ class _Search:
         self.escaped = self._escape(origins, directions)
         if self.share >= OUTDOORS or self.escaped.sum() < FEWEST:
             return False
-        some = slice(MOST_WALLS)
-        walls = self.triangles[some], self.normals[some], self.area[some]
+        largest = slice(MOST_WALLS)
+        walls = self.triangles[largest], self.normals[largest], self.area[largest]
         self.axes = _axes(*walls[1:])
         self.walls = [_walls(*walls, axis) for axis in self.axes]
         self.along_axes = origins @ self.axes.T, directions @ self.axes.T
