@@ -17,6 +17,7 @@ import pytest
 
 from clpt import device
 from clpt.files import child_processes
+from tests import slow_tests
 
 # the processes that tests start take a second each to parse all sources, where none keeps bytecode
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -50,12 +51,17 @@ def pytest_collection(session: pytest.Session) -> None:
             import_module(".".join(path.relative_to(HERE.parent).with_suffix("").parts))
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Let long tests be the first, and quick tests of processes try twice more.
+    """Mark what is listed as slow, let long tests be the first, and quick tests of processes try
+    twice more.
 
     The summary tells of each that did so. Who asks for slow tests gets each failure: `make
     test-all`, `-m slow`, `-m ""`.
     """
+    for item in items:
+        if item.nodeid in slow_tests.listed():
+            item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: item.get_closest_marker("long") is None)
     if config.getoption("markexpr") != "not slow":
         return
