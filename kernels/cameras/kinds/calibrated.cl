@@ -75,9 +75,9 @@ inline vec2 calibrated_film(global const CalibratedCamera *camera, vec3 d, mask 
     return (vec2){plane.x * camera->focal[0] + camera->middle[0], plane.y * camera->focal[1] + camera->middle[1]};
 }
 
-/* Step connect: a point as the camera sees it: see film/connect.cl. The model says in which pixel; Newton's method leads
- * from there to the place whose bilinear direction it is, so that light paths meet what rays from there see. It gains
- * |u x v . d| / |w|^2 of solid angle per pixel. */
+/* Step connect: a point as the camera sees it: see film/connect.cl. The model says in which pixel; a step of Newton's
+ * method leads from there to the place whose bilinear direction it is, as rays begin there. A pixel has the solid angle
+ * |u x v . d| / |w|^2. */
 CameraPoint calibrated_connect(global const CalibratedCamera *camera, global const Settings *settings, vec3 p,
                                mask away, vec2 lens)
 {

@@ -203,6 +203,23 @@ def test_z_is_along_the_axis():
     assert along.max() > 1.0 and np.ptp(along) > 0.1
 
 
+def test_a_stereo_rig_shares_a_scene():
+    """A point lies f b / z farther left for the right camera, whose picture is a new renderer's."""
+    left = camera("pinhole", np.random.default_rng(6))
+    place = np.asarray(left.to_world) @ tf.translate([-0.1, 0.0, 0.0])
+    right = dataclasses.replace(left, to_world=place)
+    with clpt.Renderer(room(left)) as renderer:
+        renderer.run(4)
+        seen = np.asarray(renderer.layers()["position"], np.float64)
+        renderer.update(camera=right)
+        renderer.run(4)
+        np.testing.assert_array_equal(renderer.image(), clpt.render(room(right), spp=4))
+    away = (seen - place[:3, 3]) @ place[:3, 2]
+    disparity = left.project(seen, *SIZE) - right.project(seen, *SIZE)
+    np.testing.assert_allclose(disparity[..., 0], 80.0 * 0.1 / away, atol=1e-6)
+    np.testing.assert_allclose(disparity[..., 1], 0.0, atol=1e-6)
+
+
 @pytest.mark.parametrize("name", ["brown_conrady", "kannala_brandt", "double_sphere"])
 def test_motion_is_by_the_model(name):
     """Where a still room is seen as the camera has moved on, after what `project` says."""
