@@ -9,6 +9,7 @@ processor count in the whole. The hash is of all pictures and their truth, and m
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -148,7 +149,9 @@ def report(name: str, rows: list[dict[str, Any]], first: int) -> None:
 @click.option("--skip", default=10, show_default=True, help="pictures that do not count")
 @click.option("--truth", default="visible", show_default=True)
 @click.option("--beside", type=click.Path(path_type=Path, exists=True))
-@click.option("--rows", "rows_file", type=click.Path(path_type=Path), help="JSON lines of all")
+@click.option(
+    "--rows", "rows_file", type=click.Path(path_type=Path), help="JSON lines, as they come"
+)
 @click.option("--serve", "serves", is_flag=True, hidden=True)
 def main(
     count: int, warmed: int, skip: int, truth: str, beside: Path | None, rows_file: Path | None,
@@ -164,10 +167,14 @@ def main(
     checkouts = [Path(__file__).parents[1], *([beside] if beside else [])]
     workers = [worker(checkout, truth) for checkout in checkouts]
     rows: list[list[dict[str, Any]]] = [[] for _ in workers]
-    for index in range(count):
-        order = range(len(workers)) if index % 2 else reversed(range(len(workers)))
-        for which in order:
-            rows[which].append(asked(workers[which], index))
+    with contextlib.nullcontext() if rows_file is None else rows_file.open("w") as written:
+        for index in range(count):
+            order = range(len(workers)) if index % 2 else reversed(range(len(workers)))
+            for which in order:
+                rows[which].append(asked(workers[which], index))
+            if written is not None:  # a run that ends early keeps what it has measured
+                written.write(json.dumps(rows[0][-1]) + "\n")
+                written.flush()
     for process, checkout, of_one in zip(workers, checkouts, rows, strict=True):
         assert process.stdin is not None
         process.stdin.close()
@@ -178,8 +185,6 @@ def main(
     if beside:
         same = [a["hash"] == b["hash"] for a, b in zip(*rows, strict=True)]
         print(f"pictures that are the same to the bit: {sum(same)} of {count}")
-    if rows_file is not None:
-        rows_file.write_text("".join(json.dumps(row) + "\n" for row in rows[0]))
 
 
 if __name__ == "__main__":

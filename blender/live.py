@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import time
 from contextlib import suppress
@@ -92,8 +93,14 @@ class Parts:
         self.known = {**needed, **dressed}
         return Scene(
             camera=self.camera(described["camera"]), shapes=placed, lights=lights, film=film,
-            integrator=integrators.Path(light_paths=0),
+            integrator=self.integrator(described["integrator"]["max_depth"]),
         )  # fmt: skip
+
+    @staticmethod
+    @functools.cache
+    def integrator(max_depth: int) -> integrators.Path:
+        """Return the same integrator for the same depth."""
+        return integrators.Path(max_depth=max_depth, light_paths=0)
 
     def camera(self, described: dict[str, Any]) -> Any:
         """Return a camera."""
@@ -192,7 +199,8 @@ def _edits(former: Scene, scene: Scene) -> dict[str, Any] | None:
     """Return the arguments of an update from a scene to another; None if more than these differ."""
     places: dict[int, Any] = {}
     materials: dict[Any, Any] = {}
-    if not _same(former.lights, scene.lights) or len(former.shapes) != len(scene.shapes):
+    alike = former.integrator is scene.integrator and _same(former.lights, scene.lights)
+    if not alike or len(former.shapes) != len(scene.shapes):
         return None
     for number, (old, new) in enumerate(zip(former.shapes, scene.shapes, strict=True)):
         if old is new:

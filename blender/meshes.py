@@ -221,6 +221,17 @@ def particle_strands(source: bpy.types.Object, system: Any) -> tuple[np.ndarray,
     return (np.concatenate(found) if found else np.empty((0, 4))), lengths
 
 
+def count_of_strands(source: bpy.types.Object) -> int:
+    """Return how many strands a hair of an object has; 0 where hairs or their strands differ."""
+    if source.type == "CURVES":
+        hairs = [strands(source.data)[1]]
+    else:
+        systems = (s for s in source.particle_systems if s.settings.type == "HAIR")
+        hairs = [particle_strands(source, system)[1] for system in systems]
+    counts = {len(lengths) if len(set(lengths)) == 1 else 0 for lengths in hairs}
+    return counts.pop() if len(counts) == 1 else 0
+
+
 def write_strands(rows: np.ndarray, lengths: list[int], file: Path) -> bool:
     """Write strands, whose points are joined by Catmull-Rom pieces; return whether there is any.
 

@@ -368,12 +368,12 @@ def _alphas(tree: Tree, at: Site) -> Json:
 
 
 def _glass(tree: Tree, at: Site) -> tuple[Json, Any]:
+    color = tree.color(at, "Color")
     values: Json = {
         "int_ior": max(tree.single(at, "IOR", 1.5), 1.0), "ext_ior": 1.0,
-        "specular_transmittance": tree.color(at, "Color"), **_films(tree, at),
+        "specular_transmittance": color, **_films(tree, at),
+        "specular_reflectance": 0.0 if at.node.type == "BSDF_REFRACTION" else color,
     }  # fmt: skip
-    if at.node.type == "BSDF_REFRACTION":
-        values["specular_reflectance"] = 0.0
     smooth = tree.number(at, "Roughness") == 0.0
     kind = {"type": "dielectric"} if smooth else {
         "type": "rough_dielectric", **_alphas(tree, at),

@@ -92,6 +92,7 @@ class ClptSettings(bpy.types.PropertyGroup):
     mode: _choice("Mode", MODES)
     samples: _count("Samples", 128, 1, 1 << 20, "Paths of each pixel")
     denoise: _flag("Denoise", "Take most of the noise from the finished picture")
+    bounces: _count("Max Bounces", 12, 0, 1024, "Of light from surface to surface; 0: direct light")
     noise: _number(
         "Noise Limit", 0.0, 0.0, 1.0,
         "Pixels below this relative noise get no more samples; 0: no limit",
@@ -236,7 +237,7 @@ class Panel(bpy.types.Panel):
 
 ROWS: tuple[tuple[str, str, str, str, str, Any], ...] = (  # tab, label, owner, settings, names
     ("sampling", "render", "Sampling", "scene", "scene.clpt",
-     ("mode", "samples", "noise", "denoise", "viewport_samples", "viewport_denoise")),
+     ("mode", "samples", "noise", "bounces", "denoise", "viewport_samples", "viewport_denoise")),
     ("motion", "render", "Alpha and Motion", "scene", "scene.render",
      ("film_transparent", "use_motion_blur", "motion_blur_position", "motion_blur_shutter")),
     ("film", "render", "Film Response", "scene", "scene.clpt",

@@ -138,6 +138,7 @@ class Writer:
                 "alpha": self.depsgraph.scene.render.film_transparent,
                 **measured.film(self.depsgraph.scene.clpt),
             },
+            "integrator": {"type": "path", "max_depth": self.depsgraph.scene.clpt.bounces + 2},
             "materials": self.named,
             "media": self.media,
             "groups": self.groups,

@@ -15,7 +15,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from . import operations, patterns
+from . import meshes, operations, patterns
 from .graphs import TURN, Site, Value, fixed_mapping, origin
 
 Read = Callable[[Any, Site], Value | None]  # of a nodes.Expression, whose `graph` is called g
@@ -147,8 +147,11 @@ def _object_info(tree: Any, at: Site) -> Value:
 
 def _hair(tree: Any, at: Site) -> Value:
     known = {"Is Strand": 1.0, "Length": 1.0, "Thickness": 0.001}
-    if at.output == "Intercept":
-        return tree.g("extract", Value(tree.g, "texcoord", 2), index=1)
+    tree.tree.personal = True
+    count = 0 if tree.object is None else meshes.count_of_strands(tree.object)
+    if at.output == "Intercept" and count:  # clpt's v runs on from strand to strand
+        along = tree.g("extract", Value(tree.g, "texcoord", 2), index=1)
+        return tree.g("fract", along * float(count))
     return tree.told(at, f"{at.output} of Curves Info is one number", known.get(at.output, 0.5))
 
 

@@ -70,8 +70,15 @@ def _strided(array: Any) -> Array:
 
 def check_unmasked(values: object, where: str | None = None) -> None:
     """Raise SceneError for an array of NumPy with elements that are masked, which have no value."""
-    if isinstance(values, np.ma.MaskedArray) and np.ma.getmaskarray(values).any():
+    if _has_masked(values):
         raise SceneError("has masked numbers: fill them, as by array.filled(0)", where=where)
+
+
+def _has_masked(values: object) -> bool:
+    module = sys.modules.get("numpy.ma")  # whoever has such an array has imported it
+    if module is None or not isinstance(values, module.MaskedArray):
+        return False
+    return bool(module.getmaskarray(values).any())
 
 
 def in_memory(value: object) -> Any:
@@ -139,7 +146,7 @@ def plain(value: object) -> Any:
     """
     if not isinstance(value, (np.generic, np.ndarray)) or value.ndim:
         return value
-    masked = isinstance(value, np.ma.MaskedArray) and np.ma.getmaskarray(value).any()
+    masked = _has_masked(value)
     return value if masked or value.dtype.kind not in _PYTHON else _PYTHON[value.dtype.kind](value)
 
 

@@ -30,6 +30,7 @@ COUNTS = {
     "eucm": (2,), "double_sphere": (2,),
 }  # fmt: skip
 MODELS = tuple(COUNTS)
+MOST_COEFFICIENTS = 12
 STEPS = 8192  # of the angle to the axis, in tables of radii
 ITERATIONS = 12  # of Newton's method
 TOLERANCE = 1e-9  # of a point on the image plane
@@ -102,6 +103,18 @@ class Projection:
         rows = np.concatenate([unit * np.sin(theta)[..., None], np.cos(theta)[..., None]], axis=-1)
         rows[radius > radii[-1]] = np.nan
         return rows
+
+    def kernel_form(self) -> tuple[int, list[float]]:
+        """Return the form and the coefficients that kernels/cameras/kinds/calibrated.cl takes."""
+        k = list(self.coefficients)
+        if self.model == "fov":
+            k = [2.0 * math.tan(0.5 * k[0]), 1.0 / k[0]]
+        elif self.model in ("ucm", "eucm"):
+            k = [0.0, *k]
+        form = {"opencv": 0, "kannala_brandt": 1, "fov": 2}.get(self.model, 3)
+        if form == 3:  # shift, alpha and beta
+            k = [*k, 1.0][:3]
+        return form, k + [0.0] * (MOST_COEFFICIENTS - len(k))
 
     @property
     def widest(self) -> float:

@@ -32,9 +32,8 @@ EVEN = 0.1  # share of the ghosts' samples that is divided evenly among all pair
 def check_camera(camera: Camera, film: Film) -> None:
     """Raise SceneError for a camera whose parameters cannot be used with a film."""
     camera.checked_members(film.width, film.height)
-    lit = camera.connects or camera.traced_lens is not None
-    if lit and camera.shutter is not None and camera.shutter.readout:
-        message = "light paths do not know the time of a row; take the camera calibrated"
+    if camera.traced_lens is not None and camera.rolls:
+        message = "rays through a lens do not know the time of a row; take the camera calibrated"
         raise SceneError(message, where=f"{camera.kind}.shutter.readout")
     for glass in camera.dispersive_glasses:
         check_index(glass, film, f"{camera.kind}.glass")

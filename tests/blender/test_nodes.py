@@ -185,9 +185,8 @@ def scene() -> Any:
     blender.unregister()
 
 
-def linked(tree: Any, node: Any, how: str) -> None:
+def linked(tree: Any, node: Any, how: str, place: Any) -> None:
     """Link places, or colors of them, to the inputs of a node."""
-    place = tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"]
 
     def vector(operation: str, source: Any, by: tuple[float, ...]) -> Any:
         made = tree.nodes.new("ShaderNodeVectorMath")
@@ -211,7 +210,8 @@ def linked(tree: Any, node: Any, how: str) -> None:
             if socket.enabled and socket.name in ("A", "B", "Color1", "Color2"):
                 tree.links.new(color if socket.name in ("A", "Color1") else other, socket)
     elif how == "color":
-        tree.links.new(color, node.inputs["Color"])
+        socket = next(s for s in node.inputs if s.name in ("Color", "Image"))
+        tree.links.new(color, socket)
     elif how == "value":
         tree.links.new(part(color, "X"), next(s for s in node.inputs if s.name in (
             "Value", "Factor", "Fac")))  # fmt: skip
@@ -229,20 +229,16 @@ def linked(tree: Any, node: Any, how: str) -> None:
                 tree.links.new(part(place, "Y"), socket)
 
 
-def made(case: tuple[str, str, dict[str, Any], str]) -> Any:
-    """Return a material that emits what a node returns, moved to about [0, 1]."""
+def moved(tree: Any, case: tuple[str, str, dict[str, Any], str], place: Any) -> Any:
+    """Add a node that looks at places; return its output, moved to about [0, 1]."""
     kind, output, settings, how = case
-    material = bpy.data.materials.new("m")
-    material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
     node = tree.nodes.new(f"ShaderNode{kind}")
     settings = {**settings}
     if "ramp" in settings:
         ramp = node.color_ramp
         ramp.color_mode, ramp.interpolation = settings.pop("mode", "RGB"), settings.pop("ramp")
-        for place, color in ((0.3, (0.8, 0.2, 0.1, 0.5)), (0.55, (0.1, 0.3, 0.9, 1.0))):
-            ramp.elements.new(place).color = color
+        for position, color in ((0.3, (0.8, 0.2, 0.1, 0.5)), (0.55, (0.1, 0.3, 0.9, 1.0))):
+            ramp.elements.new(position).color = color
     if settings.pop("curve", False):
         for i, curve in enumerate(node.mapping.curves):
             curve.points.new(0.4, 0.6 - 0.1 * i)
@@ -255,14 +251,24 @@ def made(case: tuple[str, str, dict[str, Any], str]) -> Any:
             sockets = [s for s in node.inputs if s.enabled and key in (s.identifier, s.name)]
             for socket in sockets[:1]:
                 socket.default_value = value
-    linked(tree, node, how)
-    end = tree.nodes.new("ShaderNodeOutputMaterial")
-    glow, moved = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeVectorMath")
-    moved.operation = "MULTIPLY_ADD"
-    moved.inputs[1].default_value, moved.inputs[2].default_value = (0.3,) * 3, (0.4,) * 3
+    linked(tree, node, how, place)
+    scaled = tree.nodes.new("ShaderNodeVectorMath")
+    scaled.operation = "MULTIPLY_ADD"
+    scaled.inputs[1].default_value, scaled.inputs[2].default_value = (0.3,) * 3, (0.4,) * 3
     source = next(s for s in node.outputs if s.identifier == output or s.name == output)
-    tree.links.new(source, moved.inputs[0])
-    tree.links.new(moved.outputs[0], glow.inputs[0])
+    tree.links.new(source, scaled.inputs[0])
+    return scaled.outputs[0]
+
+
+def made(case: tuple[str, str, dict[str, Any], str]) -> Any:
+    """Return a material that emits what a node returns, moved to about [0, 1]."""
+    material = bpy.data.materials.new("m")
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    place = tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"]
+    end, glow = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(moved(tree, case, place), glow.inputs[0])
     tree.links.new(glow.outputs[0], end.inputs["Surface"])
     slots = bpy.data.objects["Plane"].data.materials
     slots.clear()

@@ -75,7 +75,7 @@ SHADERS: dict[str, tuple[Callable[[Any], Any], float]] = {
     "metallic": (one("BsdfMetallic", Base_Color=COLOR, Roughness=0.3), 0.05),
     "conductor": (one("BsdfMetallic", fresnel_type="PHYSICAL_CONDUCTOR", Roughness=0.4), 0.06),
     "sheen": (one("BsdfSheen", Color=COLOR), 0.06),
-    "glass": (one("BsdfGlass", Color=(0.9, 1.0, 0.9, 1.0)), 0.05),
+    "glass": (one("BsdfGlass", Color=(0.9, 0.6, 0.9, 1.0)), 0.02),
     "rough glass": (one("BsdfGlass", Roughness=0.4), 0.06),
     "refraction": (one("BsdfRefraction", IOR=1.3), 0.06),
     "translucent": (one("BsdfTranslucent", Color=COLOR), 0.05),

@@ -33,17 +33,19 @@ def stage(monkeypatch: pytest.MonkeyPatch) -> Any:
     return scene
 
 
-def pictures(folder: Path, samples: int = 64, bounces: int = 4) -> list[np.ndarray]:
-    """Return clpt's picture and Cycles' (SIZE, SIZE, 3)."""
+def pictures(
+    folder: Path, samples: int = 64, bounces: int = 4, size: tuple[int, int] = (SIZE, SIZE)
+) -> list[np.ndarray]:
+    """Return clpt's picture and Cycles' (h, w, 3); size: width and height."""
     scene, found = bpy.context.scene, []
     render, cycles = scene.render, scene.cycles
-    render.resolution_x = render.resolution_y = SIZE
+    render.resolution_x, render.resolution_y = size
     render.image_settings.file_format, render.image_settings.color_depth = "OPEN_EXR", "32"
     for engine in ("CLPT", "CYCLES"):
         render.engine = engine
         cycles.samples, cycles.device, cycles.use_denoising = samples, "CPU", False
         cycles.max_bounces = cycles.volume_bounces = cycles.diffuse_bounces = bounces
-        scene.clpt.samples, scene.clpt.mode = samples, "rgb"
+        scene.clpt.samples, scene.clpt.mode, scene.clpt.bounces = samples, "rgb", bounces
         render.filepath = str(folder / f"{engine}.exr")
         bpy.ops.render.render(write_still=True)
         found.append(np.asarray(images.read(render.filepath))[..., :3])

@@ -234,6 +234,20 @@ def test_denoised_pictures_are_nearer_to_the_truth(window: Window) -> None:
     assert errors[0] < 0.7 * errors[1]
 
 
+def test_bounces_are_counted(window: Window) -> None:
+    """Over a floor direct light alone is darker; with the former number all is as before."""
+    scene = bpy.context.scene
+    bpy.ops.mesh.primitive_plane_add(size=20.0, location=(0.0, 0.0, -1.0))
+    window.open()
+    many = window.picture(64)
+    scene.clpt.bounces = 0
+    window.open()
+    assert window.picture(64)[..., :3].mean() < 0.98 * many[..., :3].mean()
+    scene.clpt.bounces = 12
+    window.open()
+    assert np.allclose(window.picture(64), many, atol=1e-5)
+
+
 def test_a_real_lens_is_seen_through_the_camera(window: Window, tmp_path: Path) -> None:
     """Its picture is the final one, where the region shows just the camera's frame."""
     camera = bpy.context.scene.camera

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import clpt
 from clpt import transforms as tf
@@ -60,6 +61,85 @@ def test_points_are_found_in_the_picture(convention, seed):
     columns, rows = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
     assert np.hypot(FOCAL * x + 31.5 - columns, FOCAL * y + 23.5 - rows).max() < 0.01
     np.testing.assert_allclose(conventions.pose(view.to_world, convention), pose, atol=1e-12)
+
+
+def colmap_place(model: str, k: list[float], p: np.ndarray) -> np.ndarray:
+    """Places (2, ...) on the image plane of points (..., 3) by COLMAP's sensor/models.h."""
+    u, v = p[..., 0] / p[..., 2], p[..., 1] / p[..., 2]
+    r = np.hypot(u, v)
+    if model == "FOV":
+        return np.arctan(2.0 * r * np.tan(k[0] / 2.0)) / (k[0] * r) * np.stack([u, v])
+    if model.endswith("FISHEYE"):
+        theta = np.arctan2(np.hypot(p[..., 0], p[..., 1]), p[..., 2])
+        powers = sum(factor * theta ** (2 * i + 2) for i, factor in enumerate(k))
+        return (
+            theta * (1.0 + powers) / np.hypot(p[..., 0], p[..., 1]) * np.moveaxis(p[..., :2], -1, 0)
+        )
+    k = [*k, *[0.0] * 8] if model in ("OPENCV", "FULL_OPENCV") else [*k, 0.0, 0.0][:2] + [0.0] * 8
+    k1, k2, p1, p2, k3, k4, k5, k6 = k[:8]
+    radial = (1.0 + k1 * r**2 + k2 * r**4 + k3 * r**6) / (1.0 + k4 * r**2 + k5 * r**4 + k6 * r**6)
+    return np.stack([
+        u * radial + 2.0 * p1 * u * v + p2 * (r**2 + 2.0 * u**2),
+        v * radial + 2.0 * p2 * u * v + p1 * (r**2 + 2.0 * v**2),
+    ])  # fmt: skip
+
+
+COLMAP_MODELS = {
+    "SIMPLE_PINHOLE": [], "PINHOLE": [], "SIMPLE_RADIAL": [-0.1], "RADIAL": [-0.2, 0.05],
+    "OPENCV": [-0.2, 0.05, 0.01, -0.02],
+    "FULL_OPENCV": [0.3, -0.1, 0.01, 0.02, 0.02, 0.4, -0.05, 0.01],
+    "SIMPLE_RADIAL_FISHEYE": [0.03], "RADIAL_FISHEYE": [0.03, -0.02],
+    "OPENCV_FISHEYE": [0.03, -0.02, 0.004, 0.001], "FOV": [0.9],
+}  # fmt: skip
+
+
+def assert_found(view: captures.Capture, place, focal) -> None:
+    """What each pixel sees lies within .01 px of its middle, which is (x + .5, y + .5) in files.
+
+    place: leads from points in the world to the image plane (2, h, w); the middle is (30, 25).
+    """
+    x, y = np.array(focal)[:, None, None] * place(positions(view.camera))
+    columns, rows = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
+    assert np.hypot(x + 30.0 - (columns + 0.5), y + 25.0 - (rows + 0.5)).max() < 0.01
+
+
+@pytest.mark.parametrize("model", COLMAP_MODELS)
+def test_points_are_found_in_the_picture_of_a_colmap_file(tmp_path, model):
+    """By the file's quaternion, translation and model, in random poses."""
+    k = COLMAP_MODELS[model]
+    focal = (50.0, 50.0) if model.startswith(("SIMPLE", "RADIAL")) else (50.0, 54.0)
+    ways = [random_pose(np.random.default_rng(seed)) for seed in (11, 12)]
+    numbers = [*focal[: 2 if focal[1] != focal[0] or model == "PINHOLE" else 1], 30.0, 25.0, *k]
+    (tmp_path / "cameras.txt").write_text(f"3 {model} 64 48 {' '.join(map(str, numbers))}\n")
+    rows = []
+    for i, way in enumerate(ways):
+        q = Rotation.from_matrix(way[:3, :3]).as_quat().tolist()
+        turn = [q[3], *q[:3], *way[:3, 3].tolist()]
+        rows.append(f"{i + 1} {' '.join(map(repr, turn))} 3 {i}.png\n\n")
+    (tmp_path / "images.txt").write_text("".join(rows))
+    for way, view in zip(ways, captures.read_colmap(tmp_path), strict=True):
+        assert_found(
+            view, lambda p, m=way: colmap_place(model, k, tf.transform_points(m, p)), focal
+        )
+
+
+@pytest.mark.parametrize("model", ["OPENCV", "OPENCV_FISHEYE"])
+def test_points_are_found_in_the_picture_of_a_transforms_json(tmp_path, model):
+    """By the file's matrix, camera to world, x right, y up, z back, in random poses."""
+    k = COLMAP_MODELS[model]
+    names = ("k1", "k2", "k3", "k4") if "FISHEYE" in model else ("k1", "k2", "p1", "p2")
+    ways = [random_pose(np.random.default_rng(seed)) for seed in (13, 14)]
+    document = {
+        "camera_model": model, "w": 64, "h": 48, "fl_x": 50.0, "fl_y": 54.0, "cx": 30.0,
+        "cy": 25.0, **dict(zip(names, k, strict=True)),
+        "frames": [{"file_path": "a", "transform_matrix": way.tolist()} for way in ways],
+    }  # fmt: skip
+    (tmp_path / "t.json").write_text(json.dumps(document))
+    for way, view in zip(ways, captures.read_transforms(tmp_path / "t.json"), strict=True):
+        back = np.diag([1.0, -1.0, -1.0, 1.0]) @ np.linalg.inv(way)
+        assert_found(
+            view, lambda p, m=back: colmap_place(model, k, tf.transform_points(m, p)), (50.0, 54.0)
+        )
 
 
 def test_a_pinhole_has_intrinsics():

@@ -33,7 +33,6 @@ MOSTLY_WHITE = 0.5  # of the lit pixels
 NEARLY_BLACK = 0.98  # of all pixels
 DARK = 2.0  # stops: a picture that is nearly black would have to be brightened by more
 OUTSHINING = 1000.0  # times as strong as any other lamp
-WHITE = watts(RGBIlluminant(1.0, 1.0, 1.0))  # of an emission of 1 [nm]
 ADVICE = "docs/lighting.md has a list: Why is it black?"
 
 
@@ -191,8 +190,9 @@ def _outshone(scene: Scene) -> Iterator[str]:
 
 def _watts(lamp: Light, look: Look) -> float:
     """The emission of a lamp from 360 to 830 nm, such as its intensity [W/sr]."""
+    white = RGBIlluminant(1.0, 1.0, 1.0)
     values = [
-        watts(value) if isinstance(value, Spectrum) else WHITE * mean(value, look)
+        watts(value) if isinstance(value, Spectrum) else watts(white) * mean(value, look)
         for value in emissions_of(lamp).values()
     ]
     return float(np.mean(values)) if values else 0.0

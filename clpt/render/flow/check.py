@@ -54,7 +54,7 @@ def check_at_rest(scene: Scene, cache: LoweringCache) -> None:
     shapes_ = list(distinct(scene.shapes))
     check_film(scene)
     check_camera(scene.camera, scene.film)
-    if scene.integrator.merging and scene.camera.shutter and scene.camera.shutter.readout:
+    if scene.integrator.merging and scene.camera.rolls:
         message = "photons of a pass are all at one time, rows are not: use path"
         raise SceneError(message, where="camera.shutter.readout")
     for light in scene.lights:
@@ -163,12 +163,13 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
     camera, integrator = index.camera, index.integrator
     kind, warnings = integrator.kind, []
     if integrator.light_tracing and not index.joined:
-        names = " and ".join(CONNECTED)
-        reason = f"a {camera.kind} camera cannot be joined to a point"
-        if camera.kind in CONNECTED:
-            reason = "its glass disperses"
+        names = f"{', '.join(CONNECTED[:-1])} and {CONNECTED[-1]} can"
+        reason = f"a {camera.kind} camera cannot be joined to a point; {names}"
+        if camera.connects:
+            rolls = "its shutter opens row by row; without readout it can"
+            reason = rolls if camera.rolls else f"its glass disperses; {names}, without such glass"
         name = "light_tracing" if kind == "vcm" else "light_paths"
-        warnings.append(f"{kind}.{name}: left aside, as {reason}; {names} can, without such glass")
+        warnings.append(f"{kind}.{name}: left aside, as {reason}")
     if integrator.merging and not index.merged:
         reason = f"a path needs {light_caches.FIRST_STORED + 1} surfaces"
         if not index.lights_reach:

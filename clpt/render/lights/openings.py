@@ -90,14 +90,37 @@ def openings_around(index: SceneIndex, geometry: Geometry, cache: LoweringCache)
     if index.shared or index.light_paths or not lit:
         return CLOSED
     eye = surroundings.camera_halfway(index)
-    view = index.camera.view_of(index.film.width, index.film.height)
     if not np.isfinite(eye).all():
         return CLOSED
+    view = index.camera.view_of(index.film.width, index.film.height)
     where = (*eye.tolist(), *(view.axis.tolist() if view else ()), view.angle if view else 0.0)
     return cache(_openings, index, geometry, eye, view, by=(index.listed, *where))
 
 
+def _sees_sky_beside(geometry: Geometry, eye: Floats) -> bool:
+    """Return whether so many rays around a camera miss the box of all meshes that it is outdoors.
+
+    It is so above a landscape, and costs less than the search.
+    """
+    if not geometry.world_vertices:
+        return True
+    vertices = geometry.vertices[: geometry.world_vertices]
+    around = _sphere(np.random.default_rng(0), AROUND)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slabs = np.sort((np.stack([vertices.min(0), vertices.max(0)]) - eye)[:, None] / around, 0)
+        met = np.maximum(slabs[0].max(axis=1), 0.0) <= slabs[1].min(axis=1)
+    return int(met.sum()) < (1.0 - OUTDOORS) * AROUND
+
+
+def _sphere(random: np.random.Generator, count: int) -> Floats:
+    """Return directions at random (count, 3)."""
+    directions = random.normal(size=(count, 3))
+    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
 def _openings(index: SceneIndex, geometry: Geometry, eye: Floats, view: View | None) -> Openings:
+    if _sees_sky_beside(geometry, eye):
+        return CLOSED
     walls = [
         geometry.vertices[geometry.faces[faces]]
         for shape, _, faces in geometry.meshes()
@@ -138,11 +161,6 @@ class _Search:
         self.caster = Caster(triangles)
         self.offset = OFFSET * float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
         self.random = np.random.default_rng(0)
-        some = slice(MOST_WALLS)
-        self.axes = _axes(normals[some], area[some])
-        self.walls = [
-            _walls(triangles[some], normals[some], area[some], axis) for axis in self.axes
-        ]
 
     @property
     def share(self) -> float:
@@ -154,12 +172,12 @@ class _Search:
 
         Returns whether the place is a room with openings.
         """
-        around = self._sphere(AROUND)
+        around = _sphere(self.random, AROUND)
         points, normals = self._met(np.broadcast_to(eye, around.shape), around)
         if len(points) < (1.0 - OUTDOORS) * AROUND:
             return False
         if view is not None:
-            ahead = view.axis + math.tan(min(view.angle, WIDE)) * self._sphere(AROUND)
+            ahead = view.axis + math.tan(min(view.angle, WIDE)) * _sphere(self.random, AROUND)
             ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
             seen = self._met(np.broadcast_to(eye, ahead.shape), ahead)
             points, normals = (
@@ -174,13 +192,14 @@ class _Search:
         origins = np.concatenate([origins, more[0]])
         directions = np.concatenate([directions, more[1]])
         self.escaped = self._escape(origins, directions)
+        if self.share >= OUTDOORS or self.escaped.sum() < FEWEST:
+            return False
+        largest = slice(MOST_WALLS)
+        walls = self.triangles[largest], self.normals[largest], self.area[largest]
+        self.axes = _axes(*walls[1:])
+        self.walls = [_walls(*walls, axis) for axis in self.axes]
         self.along_axes = origins @ self.axes.T, directions @ self.axes.T
-        return self.share < OUTDOORS and bool(self.escaped.sum() >= FEWEST)
-
-    def _sphere(self, count: int) -> Floats:
-        """Directions at random (count, 3)."""
-        directions = self.random.normal(size=(count, 3))
-        return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        return True
 
     def _met(self, origins: Floats, directions: Floats) -> tuple[Floats, Floats]:
         """Return where rays meet surfaces, and the normals there, on the rays' side."""
@@ -193,7 +212,7 @@ class _Search:
     def _onward(self, points: Floats, normals: Floats) -> tuple[Floats, Floats]:
         """Return ONWARD rays from each point, by the cosine."""
         points, normals = np.repeat(points, ONWARD, axis=0), np.repeat(normals, ONWARD, axis=0)
-        directions = normals + self._sphere(len(points))
+        directions = normals + _sphere(self.random, len(points))
         return points, directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
     def _escape(self, origins: Floats, directions: Floats) -> NDArray[np.bool_]:

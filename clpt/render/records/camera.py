@@ -94,6 +94,15 @@ RECORDS: dict[str, Record] = {
         columns=("integer", "of the film"),
         rows=("integer", "of the film"),
         directions=("integer", "the first word of the corners, row by row, from to_world on"),
+        form=(
+            "integer",
+            "of the model: 0: distortion of a pinhole, 1: a polynomial of the angle, "
+            "2: its arc tangent, 3: spheres",
+        ),
+        coefficients=("integer", "the first word of the model's numbers, 12"),
+        widest=("real", "cosine of the widest angle that is seen"),
+        focal=("vec2", "a length of 1 on the image plane [pixels of the film]"),
+        middle=("vec2", "where the axis meets the film, from its corner [pixels]"),
     ),
 }
 

@@ -30,8 +30,10 @@ def check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
         return
     spectral = scene.film.mode == "spectral"
     if not scene.camera.connects:
-        names = " and ".join(CONNECTED)
+        names = f"{', '.join(CONNECTED[:-1])} and {CONNECTED[-1]}"
         _refuse(f"the cameras {names}, not {scene.camera.kind}", "camera")
+    if scene.camera.rolls:
+        _refuse("a shutter without readout", "camera.shutter.readout")
     if scene.film.alpha:
         _refuse("a film without alpha", "film.alpha")
     if spectral and scene.camera.dispersive_glasses:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import logging
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -141,7 +142,9 @@ class Calibrated(Camera):
     "clpt.scene.cameras" counts them.
     """
 
+    connects: ClassVar[bool] = True
     has_axis: ClassVar[bool] = True
+    has_screen: ClassVar[bool] = True
 
     model: str = choice("opencv", "of the projection", projections.MODELS)
     intrinsics: Sequence[float] = host(
@@ -190,15 +193,23 @@ class Calibrated(Camera):
         return np.array([[width / whole[0], height / whole[1]], values[:2], values[2:]])
 
     def record_members(self, width: int, height: int) -> dict[str, ArrayLike]:
-        """Return its matrix and the film's size."""
-        self._pixels(width, height)
-        self._projection()
-        return {"to_world": self.rigid_matrix(), "columns": width, "rows": height}
+        """Return its matrix, the film's size, and how its model sees directions."""
+        (scale, focal, middle), model = self._pixels(width, height), self._projection()
+        return {
+            "to_world": self.rigid_matrix(), "columns": width, "rows": height,
+            "form": model.kernel_form()[0], "widest": math.cos(model.widest),
+            "focal": focal * scale, "middle": (middle + 0.5) * scale,
+        }  # fmt: skip
 
     def record_tables(self, width: int, height: int) -> dict[str, NDArray[np.float32]]:
-        """Return directions in camera space of the pixels' corners, row by row; 0: none."""
-        scaled = self._pixels(width, height).tobytes()
-        return {"directions": _corner_directions(self._projection(), width, height, scaled)}
+        """Return directions in camera space of the pixels' corners, row by row (0: none), and
+        the numbers of the model.
+        """
+        model, scaled = self._projection(), self._pixels(width, height).tobytes()
+        return {
+            "directions": _corner_directions(model, width, height, scaled),
+            "coefficients": np.array(model.kernel_form()[1], np.float32),
+        }
 
 
 @functools.lru_cache(maxsize=8)

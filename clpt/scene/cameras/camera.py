@@ -192,9 +192,14 @@ class Camera(Kind):
         """Return a camera of parallel rays with a film `factor` as wide; None for other cameras."""
         return None
 
+    @property
+    def rolls(self) -> bool:
+        """Whether its shutter opens row by row: light paths do not know the time of a row."""
+        return self.shutter is not None and self.shutter.readout > 0.0
+
     def is_connected(self, mode: str) -> bool:
         """Return whether light paths can be joined to it, in the mode of a film."""
-        return self.connects and (mode == "rgb" or not self.dispersive_glasses)
+        return self.connects and not self.rolls and (mode == "rgb" or not self.dispersive_glasses)
 
     def affine_matrix(self) -> NDArray[np.float64]:
         """Return `to_world`. Raises SceneError if it has no inverse, or projects."""

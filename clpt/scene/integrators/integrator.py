@@ -88,8 +88,9 @@ class Path(Integrator):
 
     With `light_paths` some paths start at lights. Each vertex of them is connected to the camera,
     with a weight (MIS). So caustics converge that the camera sees directly. The camera must be
-    `perspective` or `thin_lens`. A number below 1 is a share: with 0.5 every second sample has a
-    light path. "auto" starts light paths if a surface is specular and a light is small.
+    `perspective`, `thin_lens` or `calibrated`. A number below 1 is a share: with 0.5 every second
+    sample has a light path. "auto" starts light paths if a surface is specular and a light is
+    small.
     """
 
     has_escape_rays = True
@@ -226,8 +227,8 @@ class ParticleTracer(Integrator):
     """Light tracing: paths start at lights, and every vertex is connected to the camera.
 
     It finds caustics, also of the smallest lights. Mirrors and smooth glass are black. A sample per
-    pixel is a light path for every pixel of the film. The camera must be `perspective` or
-    `thin_lens`.
+    pixel is a light path for every pixel of the film. The camera must be `perspective`,
+    `thin_lens` or `calibrated`.
     """
 
     from_lights_alone = True

@@ -14,6 +14,7 @@ from clpt.errors import SceneError
 from clpt.lenses.projections import Projection
 from clpt.scene import Film, Scene, cameras, lights, shapes
 from clpt.scene.integrators import Box, Path
+from clpt.scene.motion import Keys, Shutter
 
 SIZE = 96, 72
 MODELS = {
@@ -200,6 +201,42 @@ def test_z_is_along_the_axis():
     along = (layers["position"] - pose[:3, 3]) @ pose[:3, 2]
     np.testing.assert_allclose(layers["z"][..., 0], along, atol=1e-5)
     assert along.max() > 1.0 and np.ptp(along) > 0.1
-    moving = dataclasses.replace(view, film=dataclasses.replace(view.film, layers=("motion",)))
-    with pytest.raises(SceneError, match="calibrated has no projection for motion"):
-        clpt.Renderer(moving)
+
+
+def test_a_stereo_rig_shares_a_scene():
+    """A point lies f b / z farther left for the right camera, whose picture is a new renderer's."""
+    left = camera("pinhole", np.random.default_rng(6))
+    place = np.asarray(left.to_world) @ tf.translate([-0.1, 0.0, 0.0])
+    right = dataclasses.replace(left, to_world=place)
+    with clpt.Renderer(room(left)) as renderer:
+        renderer.run(4)
+        seen = np.asarray(renderer.layers()["position"], np.float64)
+        renderer.update(camera=right)
+        renderer.run(4)
+        np.testing.assert_array_equal(renderer.image(), clpt.render(room(right), spp=4))
+    away = (seen - place[:3, 3]) @ place[:3, 2]
+    disparity = left.project(seen, *SIZE) - right.project(seen, *SIZE)
+    np.testing.assert_allclose(disparity[..., 0], 80.0 * 0.1 / away, atol=1e-6)
+    np.testing.assert_allclose(disparity[..., 1], 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["brown_conrady", "kannala_brandt", "double_sphere"])
+def test_motion_is_by_the_model(name):
+    """Where a still room is seen as the camera has moved on, after what `project` says."""
+    ways = Keys([0.0, 1.0], [np.eye(4), tf.translate([0.1, -0.05, 0.0])])
+    still = camera(name, np.random.default_rng(4))
+    view = dataclasses.replace(
+        still, motion=ways, shutter=Shutter(0.0, 1.0, shape=[1.0] + [0.0] * 255)
+    )
+    scene = room(view)
+    scene.film = dataclasses.replace(scene.film, layers=("position", "motion"))
+    with clpt.Renderer(scene) as renderer:
+        renderer.run(16)
+        layers = renderer.layers()
+    later = dataclasses.replace(still, to_world=ways.transforms[1] @ np.asarray(still.to_world))
+    there = later.project(layers["position"], *SIZE)
+    x, y = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
+    expected = np.stack([there[..., 0] - x, y - there[..., 1]], -1)
+    seen = np.isfinite(expected).all(axis=-1) & (np.abs(layers["position"]).max(axis=-1) > 1.0)
+    assert seen.mean() > 0.9
+    np.testing.assert_allclose(layers["motion"][..., 2:][seen], expected[seen], atol=0.05)

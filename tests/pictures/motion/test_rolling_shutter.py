@@ -11,7 +11,7 @@ import clpt
 from clpt import transforms as tf
 from clpt.errors import SceneError
 from clpt.scene import Film, Scene, cameras
-from clpt.scene.integrators import Path, Vcm
+from clpt.scene.integrators import ParticleTracer, Path, Vcm
 from clpt.scene.lights import Area
 from clpt.scene.motion import Keys, Shutter
 from clpt.scene.shapes import Rectangle
@@ -85,8 +85,9 @@ def test_a_file_keeps_it(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"camera": cameras.Perspective(shutter=Shutter(0, 1, readout=0.5))}, "time of a row"),
+        ({"camera": cameras.Lens(shutter=Shutter(0, 1, readout=0.5))}, "time of a row"),
         ({"integrator": Vcm()}, "photons of a pass"),
+        ({"integrator": ParticleTracer()}, "a shutter without readout"),
     ],
 )
 def test_light_paths_are_refused(changes, message):

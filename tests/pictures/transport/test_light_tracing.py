@@ -279,7 +279,7 @@ BEAM = Rectangle(emission=DirectionalArea(), name="beam")
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"camera": Orthographic()}, "camera: .*perspective and thin_lens, not orthographic"),
+        ({"camera": Orthographic()}, "camera: .*thin_lens and calibrated, not orthographic"),
         ({"camera": ThinLens(glass="sf11")}, "camera.glass: .*does not disperse"),
         ({"lights": [Point(falloff=False)]}, r"lights\[0\]: .*falls with distance"),
         ({"film": Film(alpha=True)}, "film.alpha: .*without alpha"),
