@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from clpt import transforms as tf
 from clpt.render.flow.scene_to_tables import lower
-from clpt.render.lights.aims import CELLS, MOST, is_sharp
+from clpt.render.lights.aims import CELLS, MANY, MOST, is_sharp
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
@@ -120,6 +120,17 @@ def test_of_many_some_share_a_sphere() -> None:
     assert 8 < len(made) <= MOST
     assert_inside(centers, made)
     assert np.isclose(made[:, 4].sum(), AIMED)
+
+
+def test_of_many_fine_meshes_all_is_inside() -> None:
+    """So many triangles together that each mesh's grid is coarser."""
+    places = [(x, 1.0, z) for x in range(-28, 29, 8) for z in range(-28, 29, 8)]
+    balls = [ball_mesh(0.5, place, subdivisions=3) for place in places]
+    assert len(balls[0].faces) < CELLS**3
+    assert sum(len(ball.faces) for ball in balls) > MANY
+    spheres = spheres_of(*balls)
+    assert 8 < len(spheres) <= MOST
+    assert_inside(np.concatenate([ball.vertices for ball in balls]), spheres)
 
 
 def test_instances() -> None:
