@@ -92,7 +92,7 @@ inline vec2 calibrated_change(global const CalibratedCamera *camera, vec3 d, vec
     return (vec2){2.0f * (after.x - before.x), 2.0f * (after.y - before.y)};
 }
 
-/* Steps u to the right and v down, of about a pixel, have the solid angle |u x v . d|; the model tells where they lead. */
+/* Steps u and v of about a pixel, right and down, have the solid angle |u x v . d|; the model says where they lead. */
 CameraPoint calibrated_connect(global const CalibratedCamera *camera, global const Settings *settings, vec3 p,
                                mask away, vec2 lens)
 {
