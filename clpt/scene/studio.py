@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import spectra, transforms
+from clpt.arrays import corners_of
 from clpt.errors import SceneError
 from clpt.scene import cameras, integrators, lights, shapes
 from clpt.scene.cameras import Perspective
@@ -109,7 +110,8 @@ def shape_bounds(shape: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.f
         reach = rows[:, 3].max() * np.linalg.norm(linear, axis=1)
     else:
         points, reach = transforms.transform_points(matrix, _corners(shape)), np.zeros(3)
-    return points.min(axis=0) - reach, points.max(axis=0) + reach
+    low, high = corners_of(points)
+    return low - reach, high + reach
 
 
 def _outlines(
