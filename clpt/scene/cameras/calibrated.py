@@ -203,10 +203,9 @@ class Calibrated(Camera):
 
     def view_of(self, width: int, height: int) -> View:
         """Return its view along the axis, in which the pixels with directions lie."""
-        (scale, focal, _), table = self._pixels(width, height), self.record_tables(width, height)
-        seen = table["directions"][table["directions"].any(axis=1)]
-        angle = math.acos(min(float(seen[:, 2].min(initial=1.0)), 1.0))
-        return self._view(self.rigid_matrix(), width / float(scale[0] * focal[0]), angle)
+        pixels = self._pixels(width, height)
+        angle = _widest(self._projection(), width, height, pixels.tobytes())
+        return self._view(self.rigid_matrix(), width / float(pixels[0, 0] * pixels[1, 0]), angle)
 
     def record_tables(self, width: int, height: int) -> dict[str, NDArray[np.float32]]:
         """Return directions in camera space of the pixels' corners, row by row (0: none), and
@@ -234,3 +233,11 @@ def _corner_directions(
         log.warning(message, (~whole).sum(), whole.size, projection.model)
     directions[~seen] = 0.0
     return directions.reshape(-1, 3).astype(np.float32)
+
+
+@functools.lru_cache(maxsize=8)
+def _widest(projection: Projection, width: int, height: int, pixels: bytes) -> float:
+    """Return the largest angle to the axis of `_corner_directions` [rad]."""
+    directions = _corner_directions(projection, width, height, pixels)
+    cosines = directions[directions.any(axis=1), 2]
+    return math.acos(min(float(cosines.min(initial=1.0)), 1.0))
