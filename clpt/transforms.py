@@ -123,13 +123,24 @@ def unit_vectors(vectors: NDArray[Any]) -> NDArray[Any]:
     return np.asarray(vectors / np.where(lengths > 0.0, lengths, 1.0))
 
 
+def crosses(first: NDArray[Any], second: NDArray[Any]) -> NDArray[Any]:
+    """Return cross products (n, 3) of vectors (n, 3), bit by bit those of numpy.cross.
+
+    Of a few vectors numpy takes ten times as long.
+    """
+    a, b = first.T, second.T
+    return np.stack(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]], axis=1
+    )
+
+
 def edge_crosses(vertices: ArrayLike, faces: ArrayLike) -> Matrix:
     """Return cross products (m, 3) of triangles' edges: normals whose lengths are twice the areas.
 
     vertices: (n, 3); faces: (m, 3) whole numbers.
     """
-    a, b, c = np.moveaxis(np.asarray(vertices, np.float64)[np.asarray(faces)], 1, 0)
-    return np.asarray(np.cross(b - a, c - a))
+    a, b, c = np.asarray(vertices, np.float64)[np.asarray(faces)].swapaxes(0, 1)
+    return crosses(b - a, c - a)
 
 
 def inverse(matrix: ArrayLike) -> Matrix:

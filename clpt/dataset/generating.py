@@ -232,11 +232,11 @@ def generate(
     output_files.check_folder(folder)
     settings = {name: options.get(name, default) for name, default in DEFAULTS.items()}
     _check_same(folder, {"form": form, **settings}, make_scene)
-    present = {int(path.stem) for path in (folder / "records").glob("*.json")}
+    present = _present(folder)
     missing = [index for index in range(first, count, step) if index not in present]
     writer = WRITERS[form](folder)
     failures = _add(folder, writer, make_scene, missing, options)
-    if present | set(missing) - failures.keys() >= set(range(count)):
+    if _present(folder) >= set(range(count)):  # others may have finished pictures meanwhile
         writer.finish(_records(folder, count))
     return Report(len(missing) - len(failures), len(present), failures)
 
@@ -275,6 +275,11 @@ def _tell(folder: Path, index: int, error: Exception) -> str:
     text = "".join(traceback.format_exception(error))
     output_files.write_text(folder / "failures" / f"{index:06d}.txt", text)
     return line
+
+
+def _present(folder: Path) -> set[int]:
+    """Return the numbers of the pictures that are finished."""
+    return {int(path.stem) for path in (folder / "records").glob("*.json")}
 
 
 def _records(folder: Path, count: int) -> Iterator[dict[str, Any]]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from clpt.arrays import Floats, Integers
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.transforms import edge_crosses, unit_vectors
+from clpt.transforms import crosses, edge_crosses, unit_vectors
 
 MOST_CORNERS = 24_000  # of a polygon whose ears are clipped: time may grow with their square
 CHUNK = 1 << 18  # corners that are tested at a time: in float64 they take 200 bytes each
@@ -95,7 +95,7 @@ def _mend_quads(
     outline = places.reshape(-1, 4, 3)
     with np.errstate(over="ignore", invalid="ignore"):
         a, b, c = (outline[:, i] - outline[:, 0] for i in (1, 2, 3))
-        first, second = np.cross(a, b), np.cross(b, c)
+        first, second = crosses(a, b), crosses(b, c)
         normals = first + second
         least = -ROUNDING * (normals**2).sum(axis=1)
         turned = ((first * normals).sum(axis=1) < least) | ((second * normals).sum(axis=1) < least)

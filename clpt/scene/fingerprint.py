@@ -43,7 +43,7 @@ ARRAYS: dict[str, DTypeLike] = {  # how lowering reads a host parameter, by its 
     "rows2": np.float32, "rows3": np.float32, "rows4": np.float32, "normals": np.float32,
     "attributes": np.float32, "grid": np.float32, "triangles": np.uint32, "lengths": np.int64,
 }  # fmt: skip
-NAMELESS = (bool, int, float, type(None), np.ndarray, np.generic)  # types without names of files
+NAMELESS = frozenset({bool, int, float, type(None), np.ndarray})  # types without names of files
 FILES = ("image", "cube_images")  # forms of host parameters that may name files
 PIECE = 1 << 20  # bytes of a read
 
@@ -188,12 +188,12 @@ def named_files(whole: object) -> set[str]:
             paths.add(os.fspath(part))
         elif hasattr(part, "__dataclass_fields__"):
             fields = fields_of(part)
-            below = ((fields[name], form) for name, form in _plan(part.__class__))
-            waiting += [each for each in below if not isinstance(each[0], NAMELESS)]
+            below = [(fields[name], form) for name, form in _plan(part.__class__)]
+            waiting += [each for each in below if type(each[0]) not in NAMELESS]
         elif isinstance(part, dict):
             waiting += [(value, form) for value in part.values()]
         elif isinstance(part, (list, tuple)) and form not in ARRAYS:
-            waiting += [(value, form) for value in part if not isinstance(value, NAMELESS)]
+            waiting += [(value, form) for value in part if type(value) not in NAMELESS]
     return paths
 
 

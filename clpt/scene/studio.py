@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt import spectra, transforms
+from clpt.arrays import corners_of
 from clpt.errors import SceneError
 from clpt.scene import cameras, integrators, lights, shapes
 from clpt.scene.cameras import Perspective
 from clpt.scene.materials import Diffuse
 from clpt.spectra import RGBIlluminant
 
+Placed = list[tuple[NDArray[np.float64], NDArray[np.float64]]]  # see `grouped`
 FOV = 35.0
 EXACT = 1 << 25  # most points of instances that are transformed; else corners of boxes
 CHUNK = 1 << 18  # points at a time
@@ -33,12 +35,14 @@ def framing_camera(
     top: Sequence[float] = (0.0, 1.0, 0.0),
     distance: float = 1.0,
     bounds: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    placed: Placed | None = None,
 ) -> Perspective:
     """Return a camera that looks at the middle of shapes; together they fill its shorter side.
 
     from_: the direction from the shapes to the camera, the front and above by default; top: the
     upward direction in its picture, both before the rotation `up`; distance: a factor on the
-    distance that frames all shapes.
+    distance that frames all shapes; bounds and placed: `world_bounds` and `grouped` of the shapes,
+    where they are known.
     Raises SceneError for shapes too large to be framed.
     """
     centre, radius = middle(*(bounds or world_bounds(scene_shapes)), where="the scene")
@@ -47,7 +51,8 @@ def framing_camera(
     all_seen = 1.5 * radius
     half_picture = np.tan(np.radians(FOV / 2.0))
     sides = [side * view[:, axis] / half_picture for axis in (0, 1) for side in (-1.0, 1.0)]
-    for points in _outlines(scene_shapes, np.array(sides) - view[:, 2]):
+    placed = grouped(scene_shapes) if placed is None else placed
+    for points in _outlines(scene_shapes, placed, np.array(sides) - view[:, 2]):
         local = (points - centre) @ view
         aside = np.abs(local[:, :2]).max(axis=1) / half_picture
         all_seen = max(all_seen, MARGIN * float(np.max(aside - local[:, 2])))
@@ -62,17 +67,18 @@ def framing_camera(
 
 
 def world_bounds(
-    scene_shapes: Sequence[shapes.Shape],
+    scene_shapes: Sequence[shapes.Shape], placed: Placed | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the least and largest corner (3,) of all shapes in world space; a box for no shapes.
 
-    For very many instances they bound the boxes of groups.
+    For very many instances they bound the boxes of groups. placed: `grouped` of the shapes, where
+    it is known.
     """
     boxes = [
         shape_bounds(shape) for shape in scene_shapes if not isinstance(shape, shapes.Instance)
     ]
     axes = np.concatenate([np.eye(3), -np.eye(3)])
-    for points in _instance_points(scene_shapes, axes):
+    for points in _instance_points(grouped(scene_shapes) if placed is None else placed, axes):
         boxes.append((points.min(axis=0), points.max(axis=0)))
     if not boxes:
         boxes = [(-np.ones(3), np.ones(3))]
@@ -104,17 +110,18 @@ def shape_bounds(shape: shapes.Shape) -> tuple[NDArray[np.float64], NDArray[np.f
         reach = rows[:, 3].max() * np.linalg.norm(linear, axis=1)
     else:
         points, reach = transforms.transform_points(matrix, _corners(shape)), np.zeros(3)
-    return points.min(axis=0) - reach, points.max(axis=0) + reach
+    low, high = corners_of(points)
+    return low - reach, high + reach
 
 
 def _outlines(
-    scene_shapes: Sequence[shapes.Shape], directions: NDArray[np.float64]
+    scene_shapes: Sequence[shapes.Shape], placed: Placed, directions: NDArray[np.float64]
 ) -> Iterator[NDArray[np.float64]]:
     """Yield points (n, 3) in world space; no shape reaches farther along any direction (k, 3)."""
     for shape in scene_shapes:
         if not isinstance(shape, shapes.Instance):
             yield _hull(shape)
-    yield from _instance_points(scene_shapes, directions)
+    yield from _instance_points(placed, directions)
 
 
 def _hull(shape: shapes.Shape) -> NDArray[np.float64]:
@@ -124,17 +131,26 @@ def _hull(shape: shapes.Shape) -> NDArray[np.float64]:
     return _box_corners(*shape_bounds(shape))
 
 
-def _instance_points(
-    scene_shapes: Sequence[shapes.Shape], directions: NDArray[np.float64]
-) -> Iterator[NDArray[np.float64]]:
-    """Yield points (n, 3) as `_outlines` does, of instances; of boxes of groups for very many."""
+def grouped(scene_shapes: Sequence[shapes.Shape]) -> Placed:
+    """Return of each group its points (m, 3) and the places (n, 3, 4) of its instances."""
     instances: dict[int, list[shapes.Instance]] = {}
     for shape in scene_shapes:
         if isinstance(shape, shapes.Instance) and shape.group.shapes:
             instances.setdefault(id(shape.group), []).append(shape)
-    for placed in instances.values():
-        matrices = np.array([shape.to_world for shape in placed], np.float64)[:, :3]
-        points = np.concatenate([_hull(shape) for shape in placed[0].group.shapes])
+    return [
+        (
+            np.concatenate([_hull(shape) for shape in several[0].group.shapes]),
+            np.array([shape.to_world for shape in several], np.float64)[:, :3],
+        )
+        for several in instances.values()
+    ]
+
+
+def _instance_points(
+    placed: Placed, directions: NDArray[np.float64]
+) -> Iterator[NDArray[np.float64]]:
+    """Yield points (n, 3) as `_outlines` does, of instances; of boxes of groups for very many."""
+    for points, matrices in placed:
         matrices = matrices[_may_be_outermost(matrices, points, directions)]
         if len(points) * len(matrices) > EXACT:
             points = _box_corners(points.min(axis=0), points.max(axis=0))
@@ -227,7 +243,8 @@ def parts(
     if up not in UPS:
         raise SceneError(f"{up!r} is none of {', '.join(UPS)}", where="up")
     turn = UPS[up]
-    low, high = world_bounds(scene_shapes)
+    placed = grouped(scene_shapes)
+    low, high = world_bounds(scene_shapes, placed)
     centre, radius = middle(low, high)
     extra_shapes: list[shapes.Shape] = []
     extra_lights: list[lights.Light] = []
@@ -242,7 +259,7 @@ def parts(
     counts = {"shapes": len(extra_shapes), "lights": len(extra_lights)}
     added = {"camera": camera is None, **counts, "up": up}
     return {
-        "camera": camera or framing_camera(scene_shapes, turn, bounds=(low, high)),
+        "camera": camera or framing_camera(scene_shapes, turn, bounds=(low, high), placed=placed),
         "shapes": [*scene_shapes, *extra_shapes],
         "lights": [*own_lights, *extra_lights],
         "film": integrators.Film(filter=integrators.Gaussian()),

@@ -240,6 +240,20 @@ def test_parts_make_the_same_pictures(tmp_path):
         assert whole == part, name
 
 
+def test_parts_at_the_same_time_end_with_a_summary(tmp_path):
+    """A process renders its part while another renders the rest; the last to end sums up."""
+
+    def meanwhile(index, rng):
+        if index == 2:
+            run(tmp_path, count=3, part=(1, 2), form="coco")
+            assert not (tmp_path / "annotations.json").exists()
+        return scene(index, rng)
+
+    run(tmp_path, meanwhile, count=3, part=(0, 2), form="coco")
+    document = json.loads((tmp_path / "annotations.json").read_text())
+    assert [picture["id"] for picture in document["images"]] == [1, 2, 3]
+
+
 def test_a_killed_run_goes_on(tmp_path):
     """A process that dies within a picture leaves the finished ones; the next call adds others."""
     code = textwrap.dedent(f"""

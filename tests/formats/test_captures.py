@@ -85,7 +85,7 @@ def colmap_place(model: str, k: list[float], p: np.ndarray) -> np.ndarray:
 
 
 COLMAP_MODELS = {
-    "SIMPLE_PINHOLE": [], "PINHOLE": [], "SIMPLE_RADIAL": [-0.1], "RADIAL": [-0.2, 0.05],
+    "SIMPLE_PINHOLE": [], "PINHOLE": [], "SIMPLE_RADIAL": [-0.2], "RADIAL": [-0.2, 0.05],
     "OPENCV": [-0.2, 0.05, 0.01, -0.02],
     "FULL_OPENCV": [0.3, -0.1, 0.01, 0.02, 0.02, 0.4, -0.05, 0.01],
     "SIMPLE_RADIAL_FISHEYE": [0.03], "RADIAL_FISHEYE": [0.03, -0.02],

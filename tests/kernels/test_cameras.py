@@ -383,22 +383,18 @@ SEEN = {cls.kind: varied(cls) for cls in scene.KINDS} | {
     ],
 )
 def test_points_are_seen_where_their_rays_begin(name, step):
-    """What a ray of the film meets is projected back to its place, near and infinitely far.
-
-    Directions of a calibrated camera are bilinear in pixels, which `screen` does not know.
-    """
+    """What a ray of the film meets is projected back to its place, near and infinitely far."""
     camera = SEEN[name]
-    within = 5e-4 if camera.kind == "calibrated" and step == "screen" else 2e-5
     pixels = [4.0, 3.0] + [32.0, 24.0] * _samples()[0]
     pixels += 0.3 - 0.6 * (pixels % 1.0)  # off their edges, where directions bend
     film = np.float32(pixels / [40.0, 30.0])
     origins, directions = rays(camera, 40, 30, film)
     x, y, seen, importance = projected(camera, step, origins + 3.0 * directions, away=False)
     assert seen.all()
-    np.testing.assert_allclose(np.stack([x, y], axis=1), film, atol=within)
+    np.testing.assert_allclose(np.stack([x, y], axis=1), film, atol=2e-5)
     if camera.connects:
         assert (
-            pytest.approx(np.column_stack([film, np.ones(len(film))]), abs=within)
+            pytest.approx(np.column_stack([film, np.ones(len(film))]), abs=2e-5)
             == projected(camera, step, directions, away=True)[:3].T
         )
     if step == "connect":  # over the solid angle of the film, at 1 m

@@ -14,7 +14,7 @@ from pxr import Sdf, Tf, Usd, UsdShade
 from clpt import images
 from clpt.files import input_files
 from clpt.formats import materialx
-from clpt.formats.usd import textures
+from clpt.formats.usd import arnold, textures
 from clpt.formats.usd.document import Document
 from clpt.formats.usd.textures import Node, Uses
 from clpt.scene import gltf_material
@@ -172,7 +172,7 @@ def _network(document: Document, material: UsdShade.Material) -> tuple[materialx
     """Return the shader of MaterialX that a material has, and its uses; None without one."""
     for context in CONTEXTS:
         found = material.ComputeSurfaceSource(context)[0]
-        node = Node(document, found) if found else None
+        node = arnold.surface_of(document, found) if found else None
         if node is not None and node.kind.startswith("ND_") and "UsdPreview" not in node.kind:
             return node, Uses(document)
     return None

@@ -425,11 +425,12 @@ def _shape(
     faces: Integers,
 ) -> Mesh | None:
     points = polygons.points[values.pop("")[:, 0]]
-    uvs = [values.pop(name, None) for name in look.uv_sets[:2]]
+    # A set that a mesh lacks is the fallback of who reads it, a single place.
+    nowhere = np.zeros((len(points), 2), np.float32)
+    uvs = [values.pop(name, nowhere) for name in look.uv_sets[:2]]
     attributes = {f"vertex_{name}": value for name, value in values.items()}
     if len(look.uv_sets) > 1 and len(uvs) > 1:
-        second = np.zeros((len(points), 2), np.float32) if uvs[1] is None else uvs[1]
-        attributes |= dict(zip(SECOND_UV, (second[:, :1], second[:, 1:]), strict=True))
+        attributes |= dict(zip(SECOND_UV, (uvs[1][:, :1], uvs[1][:, 1:]), strict=True))
     given = Arrays(points, faces, normals, uvs[0] if uvs else None, attributes)
     notes: list[str] = []
     arrays = checked(document.file, str(prim.GetPath()), given, notes)

@@ -23,9 +23,6 @@ from clpt.scene import gltf_material
 from clpt.scene.textures import Bitmap, MeshAttribute
 from clpt.scene.values import Texture
 
-# Shaders of other renderers that are, input by input, nodes of MaterialX.
-SAME = {"arnold:standard_surface": "ND_standard_surface_surfaceshader"}
-
 
 @dataclass(frozen=True)
 class Node:
@@ -37,8 +34,7 @@ class Node:
     @property
     def kind(self) -> str:
         """Its identifier, such as UsdUVTexture; "" for none."""
-        name = str(self.shader.GetIdAttr().Get() or "")
-        return SAME.get(name, name)
+        return str(self.shader.GetIdAttr().Get() or "")
 
     @property
     def path(self) -> str:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt import transforms
-from clpt.arrays import Faces, Points, fits_single
+from clpt.arrays import Faces, Points, corners_of, fits_single
 from clpt.bvh.build import MOST
 from clpt.errors import SceneError
 from clpt.files import budget
@@ -108,20 +109,22 @@ class Geometry:
             if face < last_face <= world:
                 yield shape, slice(vertex, last_vertex), slice(face, last_face)
 
+    @cached_property
+    def mesh_corners(self) -> NDArray[np.float32]:
+        """The least and the largest corner (2, 3) of its meshes outside of groups; none: (0, 3)."""
+        vertices = self.vertices[: self.world_vertices]
+        return corners_of(vertices) if len(vertices) else vertices
+
     def bounding_sphere(self) -> tuple[NDArray[np.float64], float]:
         """Return centre and radius of a sphere around the scene; the unit sphere if it is empty.
 
         Raises SceneError for a scene whose size is beyond float32.
         """
-        vertices = self.vertices[: self.world_vertices]
-        boxes = [box for box in (self.boxes, self.instances.boxes) if len(box)]
-        lows = [vertices.min(axis=0)] if len(vertices) else []
-        highs = [vertices.max(axis=0)] if len(vertices) else []
-        lows += [box[:, 0].min(axis=0) for box in boxes]
-        highs += [box[:, 1].max(axis=0) for box in boxes]
-        if not lows:
+        boxes = [self.mesh_corners, self.boxes.reshape(-1, 3), self.instances.boxes.reshape(-1, 3)]
+        corners = [corners_of(box) for box in boxes if len(box)]
+        if not corners:
             return np.zeros(3), 1.0
-        low, high = np.min(lows, axis=0), np.max(highs, axis=0)
+        low, high = np.concatenate(corners).min(axis=0), np.concatenate(corners).max(axis=0)
         if max(np.abs(low).max(), np.abs(high).max()) > triangles.FAR:
             low, high = low.astype(np.float64), high.astype(np.float64)
         if not fits_single(2.0 * (high - low)):

@@ -17,7 +17,9 @@ MOST = 32  # spheres
 SHARP = 0.2  # roughness alpha of microfacets below which a surface counts as specular
 LARGE = 0.5  # of the scene's radius: a single sphere that is larger is no aim
 CLUSTERS = 256  # most clusters into which specular pieces are cut
-CELLS = 16  # along each side of a grid that merges many pieces cell by cell
+CELLS = 16  # along each side of a grid that merges a shape's many pieces cell by cell
+MANY = 1 << 16  # pieces of all shapes; beyond, the grids have FEWER_CELLS
+FEWER_CELLS = 8
 GAP = 0.05  # of the span of pieces along an axis: wider gaps are cut first
 PRICE = 1e-3  # of a sphere, over the area of all: a cut that gains less is not made
 COMPACT = 0.5  # of the area of its surface, of the disk of a shape that no cut improves: a ball's
@@ -45,6 +47,8 @@ def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[
     pieces = [part for part in by_shape if len(part)]
     if not pieces:
         return none
+    if sum(map(len, pieces)) > MANY:
+        pieces = [_fewer(part, FEWER_CELLS) for part in pieces]
     spheres = _spheres(pieces)
     centre, radius = np.split(spheres[np.argsort(spheres[:, 3], kind="stable")], [3], axis=1)
     if len(radius) == 1 and radius[0] > LARGE * scene_radius:
@@ -215,19 +219,19 @@ def _widest_gaps(
     return order, widest, np.minimum.reduceat(at, runs)
 
 
-def _fewer(pieces: Floats) -> Floats:
+def _fewer(pieces: Floats, cells: int = CELLS) -> Floats:
     """Merge many pieces: the result has a piece for each cell of a grid."""
-    if len(pieces) <= CELLS**3:
+    if len(pieces) <= cells**3:
         return pieces
     columns = _columns(pieces)
     lows, highs = columns[LOW], columns[HIGH]
     middles = (lows + highs) / 2
     least = middles.min(axis=1, keepdims=True)
     span = np.maximum(np.ptp(middles, axis=1, keepdims=True), 1e-30)
-    cells = np.minimum((middles - least) / span * CELLS, CELLS - 1).astype(np.int64)
-    cells = np.array([CELLS * CELLS, CELLS, 1]) @ cells
-    order = np.argsort(cells)
-    firsts = np.flatnonzero(np.diff(cells[order], prepend=-1))
+    places = np.minimum((middles - least) / span * cells, cells - 1).astype(np.int64)
+    places = np.array([cells * cells, cells, 1]) @ places
+    order = np.argsort(places)
+    firsts = np.flatnonzero(np.diff(places[order], prepend=-1))
     low = np.minimum.reduceat(lows[:, order], firsts, axis=1)
     high = np.maximum.reduceat(highs[:, order], firsts, axis=1)
     reach = np.linalg.norm(high - low, axis=0) / 2

@@ -102,14 +102,13 @@ def _sees_sky_beside(geometry: Geometry, eye: Floats) -> bool:
 
     It is so above a landscape, and costs less than the search.
     """
-    if not geometry.world_vertices:
+    if not len(geometry.mesh_corners):
         return True
-    vertices = geometry.vertices[: geometry.world_vertices]
-    around = _sphere(np.random.default_rng(0), AROUND)
+    around = _sphere(np.random.default_rng(0), AROUND).T
     with np.errstate(divide="ignore", invalid="ignore"):
-        slabs = np.sort((np.stack([vertices.min(0), vertices.max(0)]) - eye)[:, None] / around, 0)
-        met = np.maximum(slabs[0].max(axis=1), 0.0) <= slabs[1].min(axis=1)
-    return int(met.sum()) < (1.0 - OUTDOORS) * AROUND
+        one, other = (geometry.mesh_corners - eye)[:, :, None] / around
+        near, far = np.minimum(one, other).max(axis=0), np.maximum(one, other).min(axis=0)
+    return int((np.maximum(near, 0.0) <= far).sum()) < (1.0 - OUTDOORS) * AROUND
 
 
 def _sphere(random: np.random.Generator, count: int) -> Floats:

@@ -24,20 +24,6 @@ inline CalibratedPixel calibrated_pixel(global const CalibratedCamera *camera, r
     return p;
 }
 
-CameraRay calibrated_ray(Scene scene, global const CalibratedCamera *camera, vec2 film, vec2 lens, Wavelengths lambdas,
-                         Spectrum *weight)
-{
-    real x = film.x * (float)camera->columns, y = film.y * (float)camera->rows, zero = 0.0f;
-    CalibratedPixel p = calibrated_pixel(camera, x, y);
-    vec3 w = sel3(p.seen, p.w, v3(zero, zero, zero + 1.0f));
-    CameraRay ray;
-    ray.d = normalize3(matrix_vector(camera->to_world, w.x, w.y, w.z));
-    ray.o = matrix_point(camera->to_world, zero, zero, zero);
-    ray.far = sel(p.seen, (real)(FAR), (real)(1e-30f)); /* an unseen ray meets nothing */
-    *weight = spectrum_sel(p.seen, spectrum_of(1.0f), spectrum_of(0.0f));
-    return ray;
-}
-
 /* Brown's distortion of a place on a pinhole's plane, rational and with thin prisms, as OpenCV has it. */
 inline vec2 calibrated_distorted(global const float *k, real x, real y)
 {
@@ -75,9 +61,38 @@ inline vec2 calibrated_film(global const CalibratedCamera *camera, vec3 d, mask 
     return (vec2){plane.x * camera->focal[0] + camera->middle[0], plane.y * camera->focal[1] + camera->middle[1]};
 }
 
-/* Step connect: a point as the camera sees it: see film/connect.cl. The model says in which pixel; a step of Newton's
- * method leads from there to the place whose bilinear direction it is, as rays begin there. A pixel has the solid angle
- * |u x v . d| / |w|^2. */
+/* A step of Newton's method leads from the bilinear direction to that which the model sees in this place. */
+CameraRay calibrated_ray(Scene scene, global const CalibratedCamera *camera, vec2 film, vec2 lens, Wavelengths lambdas,
+                         Spectrum *weight)
+{
+    real x = film.x * (float)camera->columns, y = film.y * (float)camera->rows, zero = 0.0f;
+    CalibratedPixel p = calibrated_pixel(camera, x, y);
+    vec3 w = sel3(p.seen, p.w, v3(zero, zero, zero + 1.0f));
+    mask within = p.seen;
+    vec2 there = calibrated_film(camera, normalize3(w), &within);
+    real right = x - there.x, down = y - there.y;
+    within = within & (max_r(fabs(right), fabs(down)) < 0.5f); /* not where the picture folds */
+    w = sel3(within, madd3(p.u, right, madd3(p.v, down, w)), w);
+    CameraRay ray;
+    ray.d = normalize3(matrix_vector(camera->to_world, w.x, w.y, w.z));
+    ray.o = matrix_point(camera->to_world, zero, zero, zero);
+    ray.far = sel(p.seen, (real)(FAR), (real)(1e-30f)); /* an unseen ray meets nothing */
+    *weight = spectrum_sel(p.seen, spectrum_of(1.0f), spectrum_of(0.0f));
+    return ray;
+}
+
+/* Step connect: a point as the camera sees it: see film/connect.cl. */
+
+/* How the film's place changes by a step from a direction [pixels]. */
+inline vec2 calibrated_change(global const CalibratedCamera *camera, vec3 d, vec3 step)
+{
+    mask any_way = mask_of(1);
+    vec2 after = calibrated_film(camera, normalize3(madd3(step, (real)(0.25f), d)), &any_way);
+    vec2 before = calibrated_film(camera, normalize3(madd3(step, (real)(-0.25f), d)), &any_way);
+    return (vec2){2.0f * (after.x - before.x), 2.0f * (after.y - before.y)};
+}
+
+/* Steps u and v of about a pixel, right and down, have the solid angle |u x v . d|; the model says where they lead. */
 CameraPoint calibrated_connect(global const CalibratedCamera *camera, global const Settings *settings, vec3 p,
                                mask away, vec2 lens)
 {
@@ -88,19 +103,17 @@ CameraPoint calibrated_connect(global const CalibratedCamera *camera, global con
     c.seen = t > 1e-12f;
     c.o = o;
     c.d = scale3(to, 1.0f / t);
+    c.t = sel(away, (real)(FAR), t);
     vec3 d = screen_back(m, c.d);
     vec2 film = calibrated_film(camera, d, &c.seen);
     CalibratedPixel at = calibrated_pixel(camera, film.x, film.y);
-    real grows = dot3(d, cross3(at.u, at.v));
-    grows = sel(fabs(grows) > 1e-30f, grows, (real)(1e-30f));
-    real right = -dot3(d, cross3(at.w, at.v)) / grows, down = -dot3(d, cross3(at.u, at.w)) / grows;
-    c.seen = c.seen & at.seen & (max_r(fabs(right), fabs(down)) < 1.0f);
-    at.w = madd3(at.u, right, madd3(at.v, down, at.w));
-    c.t = sel(away, (real)(FAR), t);
-    c.film.x = film.x + right - (float)settings->crop_x;
-    c.film.y = film.y + down - (float)settings->crop_y;
-    float pixels = (float)settings->width * (float)settings->height;
-    c.importance = dot3(at.w, at.w) / (fabs(grows) * pixels * sel(away, (real)(1.0f), t * t));
+    c.seen = c.seen & at.seen;
+    vec2 u = calibrated_change(camera, d, at.u), v = calibrated_change(camera, d, at.v);
+    real angle = fabs(dot3(d, cross3(at.u, at.v))) / max_r(fabs(u.x * v.y - u.y * v.x), (real)(1e-30f));
+    c.film.x = film.x - (float)settings->crop_x;
+    c.film.y = film.y - (float)settings->crop_y;
+    angle *= (float)settings->width * (float)settings->height;
+    c.importance = 1.0f / (max_r(angle, (real)(1e-30f)) * sel(away, (real)(1.0f), t * t));
     return c;
 }
 

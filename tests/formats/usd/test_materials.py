@@ -256,26 +256,9 @@ def test_fallbacks_of_primvars(stage: Loader) -> None:
     assert np.allclose(shape.attributes["vertex_wear"], 0.75)
 
 
-def test_surfaces_of_arnold_are_those_of_materialx(stage: Loader) -> None:
-    pytest.importorskip("MaterialX", reason="its library translates standard_surface")
-    text = f"""
-    def Material "Look" {{
-        token outputs:%s:surface.connect = </Look/S.outputs:surface>
-        def Shader "S" {{
-            uniform token info:id = "%s"
-            float inputs:base = 1
-            color3f inputs:base_color = (0.5, 0.25, 0.125)
-            float inputs:specular_roughness = 0.625
-            token outputs:surface
-        }}
-    }}
-    {BOUND} {SUN}"""
-    scenes = [
-        stage(text % names)
-        for names in (
-            ("arnold", "arnold:standard_surface"),
-            ("mtlx", "ND_standard_surface_surfaceshader"),
-        )
-    ]
-    assert str(scenes[0].shapes[0].material) == str(scenes[1].shapes[0].material)
-    assert not scenes[0].warnings and "0.625" in str(scenes[0].shapes[0].material)
+def test_a_mesh_without_texture_coordinates_shows_one_texel(stage: Loader, tmp_path: Path) -> None:
+    Image.fromarray(np.zeros((2, 2, 3), np.uint8)).save(tmp_path / "image.png")
+    color = "color3f inputs:diffuseColor.connect = </Look/T.outputs:rgb>"
+    text = STAGE.format(color, "", "", SQUARE, SUN).replace("primvars:map1", "primvars:other")
+    mesh = stage(text).shapes[0]
+    assert np.array_equal(mesh.uvs, np.zeros((4, 2)))

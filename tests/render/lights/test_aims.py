@@ -7,11 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 import trimesh
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from clpt import transforms as tf
 from clpt.render.flow.scene_to_tables import lower
-from clpt.render.lights.aims import CELLS, MOST, is_sharp
+from clpt.render.lights.aims import CELLS, MANY, MOST, is_sharp
 from clpt.scene import Film, Scene
 from clpt.scene import materials as m
 from clpt.scene.cameras import Perspective
@@ -61,7 +61,7 @@ def assert_inside(points: NDArray[np.floating], spheres: NDArray[np.float32]) ->
     assert (far.min(axis=1) <= 0.0).all()
 
 
-def ball_mesh(radius: float, center: tuple[float, float, float], subdivisions: int = 2) -> Mesh:
+def ball_mesh(radius: float, center: ArrayLike, subdivisions: int = 2) -> Mesh:
     made = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
     vertices = np.asarray(made.vertices + np.array(center), np.float32)
     return Mesh(vertices=vertices, faces=np.asarray(made.faces, np.uint32), material=GLASS)
@@ -120,6 +120,17 @@ def test_of_many_some_share_a_sphere() -> None:
     assert 8 < len(made) <= MOST
     assert_inside(centers, made)
     assert np.isclose(made[:, 4].sum(), AIMED)
+
+
+def test_of_many_fine_meshes_all_is_inside() -> None:
+    """So many triangles together that each mesh's grid is coarser."""
+    places = np.random.default_rng(3).uniform([-40, 1, -40], [40, 2, 40], (64, 3))
+    balls = [ball_mesh(0.1, place, subdivisions=3) for place in places]
+    assert len(balls[0].faces) < CELLS**3
+    assert sum(len(ball.faces) for ball in balls) > MANY
+    spheres = spheres_of(*balls)
+    assert 8 < len(spheres) <= MOST
+    assert_inside(np.concatenate([ball.vertices for ball in balls]), spheres)
 
 
 def test_instances() -> None:
