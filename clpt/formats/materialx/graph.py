@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from clpt import images
 from clpt.arrays import Floats
 from clpt.errors import SceneError
+from clpt.images import interop
 from clpt.images.interop import Encoding
 from clpt.scene.roles import REAL
 from clpt.scene.textures import Bitmap
@@ -364,7 +365,7 @@ def from_space(value: Floats, space: str) -> Floats:
     """Return colors (..., 3 or 4) of a color space as linear Rec. 709."""
     if value.shape[-1] < 3 or space in LINEAR:
         return value
-    encoding = SPACES.get(space)
+    encoding = SPACES.get(space) or interop.encoding(space)
     if encoding is None:
         return value
     return np.concatenate([encoding.linear(value[..., :3]), value[..., 3:]], axis=-1)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 import tempfile
 from collections import defaultdict
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -181,59 +180,31 @@ def shown(document: Document, root: Usd.Prim, *, defined: bool = True) -> Shown:
 
     Prims are shown if they and those above are visible and of a purpose that is shown; cameras
     always. defined: leave out prims that only `over` speaks of, as a stage does; prototypes may be
-    below such prims. Under "bindings" stand prims that bind a material, if any does; under
-    "prototypes" those of the instances, in their order.
+    below such prims. Under "bindings" stand prims that bind a material, if any does.
     """
-    sorting = _Sorting(document)
+    prims: Shown = defaultdict(list)
+    known: set[tuple[str, ...]] = set()  # many prims author the same properties
     anywhere = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
-    predicate = Usd.PrimDefaultPredicate if defined else anywhere
-    # The stage knows its instances: to visit them takes twice as long.
-    whole = root.IsPseudoRoot()
-    hidden: set[Sdf.Path] = set()
-    iterator = iter(Usd.PrimRange(root, predicate & ~Usd.PrimIsInstance if whole else predicate))
+    iterator = iter(Usd.PrimRange(root, Usd.PrimDefaultPredicate if defined else anywhere))
     for prim in iterator:
-        prototype = prim.GetPrototype() if not whole and prim.IsInstance() else None
-        if not sorting.opens(prim, prototype):
-            iterator.PruneChildren()
-            hidden.add(prim.GetPath())
-    for prototype in document.stage.GetPrototypes() if whole else ():
-        for prim in prototype.GetInstances():
-            apart = not prim.IsInPrototype() and predicate(prim)
-            if apart and hidden.isdisjoint(prim.GetPath().GetPrefixes() if hidden else ()):
-                sorting.opens(prim, prototype)
-    return sorting.prims
-
-
-@dataclass
-class _Sorting:
-    """Sorts prims by role. known: sets of properties that many prims have alike."""
-
-    document: Document
-    prims: Shown = field(default_factory=lambda: defaultdict(list))
-    known: set[tuple[str, ...]] = field(default_factory=set)
-
-    def opens(self, prim: Usd.Prim, prototype: Usd.Prim | None) -> bool:
-        """Sort a prim in; return whether what is below it may be shown.
-
-        prototype: of an instance, else None.
-        """
         name, authored = prim.GetTypeName(), tuple(prim.GetAuthoredPropertyNames())
-        if authored not in self.known:
-            self.known.add(authored)
+        if authored not in known:
+            known.add(authored)
             if any(BINDING.match(property_name) for property_name in authored):
-                self.prims["bindings"].append(prim)
-        if "visibility" in authored and self.document.value(prim, "visibility") == "invisible":
-            if name == "Camera":
-                self.prims["cameras"].append(prim)
-            return False
-        if "purpose" in authored and prim.GetAttribute("purpose").Get() in HIDDEN:
-            return False
+                prims["bindings"].append(prim)
+        if "visibility" in authored and document.value(prim, "visibility") == "invisible":
+            iterator.PruneChildren()
+            if name != "Camera":
+                continue
+        elif "purpose" in authored and prim.GetAttribute("purpose").Get() in HIDDEN:
+            iterator.PruneChildren()
+            continue
         if name in ROLES:
-            self.prims[ROLES[name]].append(prim)
-            return bool(name != "PointInstancer")
-        if name in UNREAD:
-            self.document.warn(f"{name} is not read", prim.GetPath())
-        elif prototype:
-            self.prims["instances"].append(prim)
-            self.prims["prototypes"].append(prototype)
-        return True
+            prims[ROLES[name]].append(prim)
+            if name == "PointInstancer":
+                iterator.PruneChildren()
+        elif name in UNREAD:
+            document.warn(f"{name} is not read", prim.GetPath())
+        elif prim.IsInstance():
+            prims["instances"].append(prim)
+    return prims

@@ -313,17 +313,15 @@ def _alike(
     prims: Shown, inherited: UsdShade.Material | None, *, in_world: bool
 ) -> Iterator[tuple[Usd.Prim, UsdShade.Material | None, list[Usd.Prim]]]:
     """Yield a prototype, the material of its shapes that bind none, and its instances."""
-    instances, prototypes = prims["instances"], prims["prototypes"]
-    alike = defaultdict[tuple[Usd.Prim, str], list[Usd.Prim]](list)
+    instances, alike = prims["instances"], defaultdict[tuple[Usd.Prim, str], list[Usd.Prim]](list)
     # Nothing in the world is bound unless a prim of it binds.
     binds = prims["bindings"] or not in_world
     materials = {"": inherited}
     all_bound = _bound(instances) if binds else [None] * len(instances)
-    for prim, prototype, bound in zip(instances, prototypes, all_bound, strict=True):
+    for prim, bound in zip(instances, all_bound, strict=True):
         name = _path_of(bound)
-        if bound:
-            materials.setdefault(name, bound)
-        alike[prototype, name].append(prim)
+        materials.setdefault(name, bound)
+        alike[prim.GetPrototype(), name].append(prim)
     for (prototype, name), several in alike.items():
         yield prototype, materials[name], several
 

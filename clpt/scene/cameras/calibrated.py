@@ -18,7 +18,7 @@ from clpt.arrays import vectors
 from clpt.errors import SceneError
 from clpt.lenses import projections
 from clpt.lenses.projections import Projection
-from clpt.scene.cameras.camera import Camera
+from clpt.scene.cameras.camera import Camera, View
 from clpt.scene.params import (
     choice,
     host,
@@ -200,6 +200,13 @@ class Calibrated(Camera):
             "form": model.kernel_form()[0], "widest": math.cos(model.widest),
             "focal": focal * scale, "middle": (middle + 0.5) * scale,
         }  # fmt: skip
+
+    def view_of(self, width: int, height: int) -> View:
+        """Return its view along the axis, in which the pixels with directions lie."""
+        (scale, focal, _), table = self._pixels(width, height), self.record_tables(width, height)
+        seen = table["directions"][table["directions"].any(axis=1)]
+        angle = math.acos(min(float(seen[:, 2].min(initial=1.0)), 1.0))
+        return self._view(self.rigid_matrix(), width / float(scale[0] * focal[0]), angle)
 
     def record_tables(self, width: int, height: int) -> dict[str, NDArray[np.float32]]:
         """Return directions in camera space of the pixels' corners, row by row (0: none), and

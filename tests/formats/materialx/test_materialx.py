@@ -16,7 +16,7 @@ from clpt import images
 from clpt.errors import SceneError
 from clpt.formats import materialx
 from clpt.formats.materialx import document
-from clpt.formats.materialx.graph import Graph, Probing, category, width
+from clpt.formats.materialx.graph import Graph, Probing, category, from_space, width
 from clpt.formats.materialx.nodes import READERS
 from clpt.scene.materials import (
     Blend,
@@ -523,3 +523,26 @@ def test_a_document_is_a_scene(tmp_path: Path) -> None:
             "utf-8",
         )
         materialx.load_material(tmp_path / "b.mtlx")
+
+
+@pytest.mark.parametrize(
+    ("own", "common"),
+    [
+        ("acescg", "lin_ap1_scene"), ("lin_displayp3", "lin_p3d65_scene"),
+        ("srgb_displayp3", "srgb_p3d65_scene"), ("lin_adobergb", "lin_adobergb_scene"),
+        ("adobergb", "g22_adobergb_scene"), ("g22_ap1", "g22_ap1_scene"),
+        ("g18_rec709", "g18_rec709_scene"), ("srgb_texture", "srgb_rec709_scene"),
+    ],
+)  # fmt: skip
+def test_spaces_have_the_names_of_the_color_interop_forum(own: str, common: str) -> None:
+    color = np.array([0.25, 0.5, 0.75])
+    linear = from_space(color, common)
+    assert (
+        np.allclose(linear, from_space(color, own), atol=1e-3) and abs(linear - color).max() > 0.01
+    )
+
+
+def test_a_space_of_the_color_interop_forum_alone() -> None:
+    assert from_space(np.array([0.0, 1.0, 0.0]), "lin_rec2020_scene") == pytest.approx(
+        [-0.5876, 1.1329, -0.1006], abs=1e-3
+    )
