@@ -46,9 +46,11 @@ def colors() -> dict[str, tuple[Build, float]]:
     old = (space for space in ("RGB", "HSV") if hasattr(bpy.types, f"ShaderNodeCombine{space}"))
     for space in old:  # of Blender 4
         of_color = (f"Separate{space}", {"RGB": "G", "HSV": "S"}[space], {}, "color")
-        of_parts = (f"Combine{space}", "Color", {}, "shares")
+        of_parts = (f"Combine{space}", {"RGB": "Image", "HSV": "Color"}[space], {}, "shares")
         for case in (of_color, of_parts):
             found[case[0]] = (lambda tree, case=case: moved(tree, case, place(tree))), 0.01
+    if bpy.app.version < (5, 0):  # its cells lie elsewhere, which is told
+        found["TexVoronoi"] = found["TexVoronoi"][0], 0.1
     others: dict[str, Build] = {
         "Value": value, "RGB": shown("RGB", "Color"), "TexCoord": shown("TexCoord", "UV"),
         "UVMap": shown("UVMap", "UV"), "ObjectInfo": shown("ObjectInfo", "Random"),
@@ -134,7 +136,7 @@ def striped(tree: Any) -> Any:
 
 
 BALLS: dict[str, tuple[Build, float]] = {
-    **SHADERS, "film": (SHADERS["film"][0], 0.07), "weighted": (weighted, 0.03),
+    **SHADERS, "film": (SHADERS["film"][0], 0.07), "weighted": (weighted, 0.04),
     "glass": (SHADERS["glass"][0], 0.05),  # a small bright image of the lamp
     "camera alone": (seen_alone, 0.02), "bump": (bent("Bump"), 0.03),
     "normal map": (bent("NormalMap"), 0.03),
@@ -224,7 +226,7 @@ class Board:
         cup.materials.append(None)
         bpy.data.objects.remove(bpy.context.object)
         lamp = bpy.data.lights.new("lamp", "POINT")
-        lamp.energy, lamp.shadow_soft_size, lamp.use_nodes = 0.1, 0.0, True
+        lamp.energy, lamp.shadow_soft_size, lamp.use_nodes = 0.5, 0.0, True
         tree = lamp.node_tree
         node, glow = tree.nodes.new("ShaderNodeTexIES"), tree.nodes["Emission"]
         node.ies = bpy.data.texts.new("lamp.ies")
@@ -233,7 +235,7 @@ class Board:
         put = bpy.data.objects.new("lamp", lamp)
         put.location = (x, y, 0.2)
         bpy.context.scene.collection.objects.link(put)
-        self.put("lamp of a file", cup, self.of_shader(one("BsdfDiffuse")), 0.03)
+        self.put("lamp of a file", cup, self.of_shader(one("BsdfDiffuse")), 0.05)
 
 
 def sky() -> Any:
@@ -264,6 +266,7 @@ def lit(rows: int) -> None:
     scene.collection.objects.link(lamp)
     scene.cycles_curves.shape = "THICK"
     scene.cycles.sample_clamp_indirect = scene.cycles.blur_glossy = 0.0
+    scene.cycles.light_sampling_threshold = 0.0
     scene.cycles.transmission_bounces = scene.cycles.transparent_max_bounces = 16
 
 

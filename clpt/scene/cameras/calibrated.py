@@ -18,7 +18,7 @@ from clpt.arrays import vectors
 from clpt.errors import SceneError
 from clpt.lenses import projections
 from clpt.lenses.projections import Projection
-from clpt.scene.cameras.camera import Camera
+from clpt.scene.cameras.camera import Camera, View
 from clpt.scene.params import (
     choice,
     host,
@@ -201,6 +201,12 @@ class Calibrated(Camera):
             "focal": focal * scale, "middle": (middle + 0.5) * scale,
         }  # fmt: skip
 
+    def view_of(self, width: int, height: int) -> View:
+        """Return its view along the axis, in which the pixels with directions lie."""
+        pixels = self._pixels(width, height)
+        angle = _widest(self._projection(), width, height, pixels.tobytes())
+        return self._view(self.rigid_matrix(), width / float(pixels[0, 0] * pixels[1, 0]), angle)
+
     def record_tables(self, width: int, height: int) -> dict[str, NDArray[np.float32]]:
         """Return directions in camera space of the pixels' corners, row by row (0: none), and
         the numbers of the model.
@@ -227,3 +233,11 @@ def _corner_directions(
         log.warning(message, (~whole).sum(), whole.size, projection.model)
     directions[~seen] = 0.0
     return directions.reshape(-1, 3).astype(np.float32)
+
+
+@functools.lru_cache(maxsize=8)
+def _widest(projection: Projection, width: int, height: int, pixels: bytes) -> float:
+    """Return the largest angle to the axis of `_corner_directions` [rad]."""
+    directions = _corner_directions(projection, width, height, pixels)
+    cosines = directions[directions.any(axis=1), 2]
+    return math.acos(min(float(cosines.min(initial=1.0)), 1.0))

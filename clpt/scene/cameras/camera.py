@@ -164,11 +164,15 @@ class Camera(Kind):
         members = self.checked_members(width, height)
         if not {"to_world", "extent"} <= members.keys():
             return None
-        matrix, extent = members["to_world"], members["extent"]
+        extent = members["extent"]
+        return self._view(members["to_world"], extent[0], math.atan(math.hypot(*extent) / 2.0))
+
+    def _view(self, matrix: NDArray[np.float64], width: float, angle: float) -> View:
+        """Return the view along +z of a matrix, in the middle of the shutter."""
         if self.motion is not None:
             shutter = self.shutter or Shutter(0.0, 0.0)
             matrix = self.motion.at((shutter.open + shutter.close) / 2.0) @ matrix
-        return View(matrix[:3, 3], matrix[:3, 2], extent[0], math.atan(math.hypot(*extent) / 2.0))
+        return View(matrix[:3, 3], matrix[:3, 2], width, angle)
 
     def half_height(self, aspect: float) -> float:
         """Return half the height of the film at a distance of 1, or across parallel rays [m].

@@ -14,7 +14,9 @@ import pytest
 import clpt
 from clpt import transforms as tf
 from clpt.errors import SceneError
+from clpt.render.flow.scene_to_tables import lower
 from clpt.scene import Film, Scene, cameras, lights
+from clpt.scene.conventions import calibrated
 from clpt.scene.integrators import ParticleTracer, Path, Vcm
 from clpt.scene.materials import Dielectric
 from clpt.scene.motion import Keys, Shutter
@@ -96,13 +98,24 @@ def test_a_camera_that_moves() -> None:
     both(still_life("rgb", ONE_LAMP, camera), 32, "moves", depth=3)
 
 
-@pytest.mark.slow
-def test_a_caustic_is_brought_by_light_paths() -> None:
-    """`auto` takes them for a ball of glass below a small lamp, as with a pinhole."""
+@pytest.mark.parametrize("name", VIEWS)
+def test_a_caustic_is_brought_by_light_paths(name: str) -> None:
+    """`auto` and `vcm` take them for a ball of glass below a small lamp, as with a pinhole."""
     glass = Sphere(center=(0.1, 0.45, 0.2), radius=0.4, material=Dielectric(int_ior=1.5))
     scene = test_hybrid.corner({}, test_hybrid.lamp(0.1), glass)
-    with clpt.Renderer(dataclasses.replace(scene, camera=view("brown_conrady"))) as renderer:
-        assert renderer._wavefront.features.transport.joined
+    for camera in (scene.camera, view(name)):
+        own = dataclasses.replace(scene, camera=camera)
+        assert lower(own).features.transport.joined
+        both_ways = lower(dataclasses.replace(own, integrator=Vcm())).features.transport
+        assert both_ways.joined and both_ways.merged
+
+
+def test_the_view_is_as_wide_as_that_of_the_same_pinhole() -> None:
+    pinhole = cameras.Perspective(to_world=VIEW, fov=50.0)
+    same, other = pinhole.view_of(64, 48), calibrated(pinhole, 64, 48).view_of(64, 48)
+    assert same is not None
+    for name in ("origin", "axis", "width", "angle"):
+        np.testing.assert_allclose(vars(other)[name], vars(same)[name], atol=1e-6)
 
 
 def test_rows_have_times_that_light_paths_do_not_know() -> None:
