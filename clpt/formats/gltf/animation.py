@@ -18,6 +18,7 @@ from clpt.arrays import Floats, Matrix
 from clpt.errors import SceneError
 from clpt.formats.gltf.accessors import floats
 from clpt.formats.gltf.document import Document, Element
+from clpt.geometry.motion import is_even
 from clpt.scene import Scene
 from clpt.scene.motion import Deformation, Shutter, placement, through
 from clpt.scene.shapes import Group, Instance, Mesh
@@ -152,6 +153,14 @@ KEYS = 9  # while the shutter is open
 NEAR = 1e-3  # largest distance of a vertex from its path between keys, over the mesh's size
 
 
+def _lit_evenly(shape: Any, warnings: list[str]) -> Any:
+    """Return a shape without its light, with a warning, where its motion stretches it."""
+    if shape.motion is None or shape.emission is None or is_even(shape.motion):
+        return shape
+    warnings.append(f"{shape.name}: its light is left out, as its motion stretches it")
+    return shape.altered(emission=None)
+
+
 def scene_over_shutter(load: Callable[[float], Scene], time: float, length: float) -> Scene:
     """Return the scene at a time [s], whose nodes move while a shutter is open for `length` [s].
 
@@ -170,7 +179,7 @@ def scene_over_shutter(load: Callable[[float], Scene], time: float, length: floa
     shapes: list[Any] = []
     for i in range(count):
         ways = [each.shapes[i] for each in scenes]
-        moved = _moving(ways, times, warnings, f"shapes[{i}]")
+        moved = _lit_evenly(_moving(ways, times, warnings, f"shapes[{i}]"), warnings)
         shapes.append(_deforming(moved, ways, times, warnings, groups))
     shapes += scene.shapes[count:]
     lights: list[Any] = list(scene.lights)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable
 
 import numpy as np
@@ -14,6 +15,7 @@ from clpt.formats.usd.document import Document, rows
 from clpt.formats.usd.materials import surface
 from clpt.formats.usd.meshes import Topology
 from clpt.scene.shapes import Curves, Shape, Spheres
+from clpt.scene.textures import attributes_in
 
 WIDTH = 1.0  # of curves and points without widths
 # Rows that give the Bezier points of a piece from the four of its basis.
@@ -56,6 +58,9 @@ def curves(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
     rows[:, 3] = np.maximum(rows[:, 3], 0.0)
     look = surface(document, material, prim, both=True)
     look = look.settled(_means(document, prim, look.fallbacks))
+    if look.emission is not None and attributes_in(look.emission):
+        document.warn("its light is left out, as it varies by a primvar", prim.GetPath())
+        look = dataclasses.replace(look, emission=None)
     return [
         Curves(
             points=rows.astype(np.float32), lengths=tuple(len(part) for part in kept),

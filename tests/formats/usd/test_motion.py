@@ -46,6 +46,29 @@ def test_a_camera_opens_its_shutter(stage: Loader) -> None:
     assert only_mesh(stage(MOVING + SUN + view, TIMES, time=3, shutter=0)).motion is None
 
 
+def test_what_shines_and_is_stretched_as_it_moves_is_dark(stage: Loader) -> None:
+    text = f"""
+    def Material "Glow" {{
+        token outputs:surface.connect = </Glow/S.outputs:surface>
+        def Shader "S" {{
+            uniform token info:id = "UsdPreviewSurface"
+            color3f inputs:emissiveColor = (1, 1, 1)
+            token outputs:surface
+        }}
+    }}
+    def Mesh "M" (apiSchemas = ["MaterialBindingAPI"]) {{
+        {SQUARE}
+        rel material:binding = </Glow>
+        float3 xformOp:scale.timeSamples = {{ 1: (1, 1, 1), 5: (1, %s, %s) }}
+        uniform token[] xformOpOrder = ["xformOp:scale"]
+    }}
+    """
+    scene = stage(text % (2, 1) + SUN, TIMES, shutter=2)
+    assert only_mesh(scene).emission is None and "its motion stretches it" in scene.warnings[0]
+    evenly = text.replace("5: (1,", "5: (2,") % (2, 2)
+    assert only_mesh(stage(evenly + SUN, TIMES, shutter=2)).emission is not None
+
+
 def test_a_single_sample_is_no_motion(stage: Loader, monkeypatch: pytest.MonkeyPatch) -> None:
     still = MOVING.replace(", 5: (8, 0, 0)", "")
     monkeypatch.setattr(scenes.animation, "scene_over_shutter", None)  # the scene is read once
