@@ -61,8 +61,8 @@ class Host(Protocol):
     def image(self, asset: object, path: str) -> images.Stored | None:
         """Return the image of an input `file`; None, after a warning, where there is none."""
 
-    def attribute(self, name: str, count: int) -> Texture:
-        """Return a property of a mesh, of a count of numbers for each place."""
+    def attribute(self, name: str, default: tuple[float, ...]) -> Texture:
+        """Return a property of a mesh. default: of meshes without it, as wide as it."""
 
     def uv_mapping(self, name: str) -> str:
         """Return "uv" or "uv1" for a set of texture coordinates; "" is the usual one."""

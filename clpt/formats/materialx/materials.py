@@ -41,7 +41,7 @@ class Folder:
             self.warn(f"{error}; the default stands for it", path)
             return None
 
-    def attribute(self, name: str, count: int) -> Texture:
+    def attribute(self, name: str, default: tuple[float, ...]) -> Texture:
         return MeshAttribute(name=f"vertex_{name}")
 
     def uv_mapping(self, name: str) -> str:

@@ -98,7 +98,9 @@ def _property(graph: Graph, node: Node, output: str) -> Value:
         return _texcoord(graph, node, output)
     if count not in (1, 3):
         raise LeftOut(f"{node.kind} is not read")
-    return graph.built.look_up(graph.host.attribute(str(node.value("geomprop", "")), count), count)
+    default = np.broadcast_to(graph.constant(node, "default", (0.0,) * count), count)
+    name = str(node.value("geomprop", ""))
+    return graph.built.look_up(graph.host.attribute(name, tuple(default.tolist())), count)
 
 
 def _position(graph: Graph, node: Node, output: str) -> Value:

@@ -122,8 +122,8 @@ class Uses:
     def image(self, asset: object, path: str) -> images.Stored | None:
         return read(self.document, asset, path)
 
-    def attribute(self, name: str, count: int) -> MeshAttribute:
-        self.fallbacks.setdefault(name, (0.0,) * count)
+    def attribute(self, name: str, default: tuple[float, ...]) -> MeshAttribute:
+        self.fallbacks.setdefault(name, default)
         return MeshAttribute(name=f"vertex_{name}")
 
     def uv_mapping(self, name: str) -> str:

@@ -368,7 +368,7 @@ class _Told:
     def image(self, asset: Any, path: str) -> images.Stored | None:
         return images.Stored(np.full((2, 2, 3), 0.25, np.float32), encoded=False)
 
-    def attribute(self, name: str, count: int) -> MeshAttribute:
+    def attribute(self, name: str, default: tuple[float, ...]) -> MeshAttribute:
         return MeshAttribute(name=f"vertex_{name}")
 
     def uv_mapping(self, name: str) -> str:

@@ -93,6 +93,13 @@ def test_lambert_and_products_of_arnold(stage: Loader) -> None:
     assert np.allclose((base.base_color.r, base.base_color.g, base.base_color.b), (0.25, 0.25, 0.0))
 
 
+def test_data_of_a_mesh_in_arnold_and_what_stands_for_it(stage: Loader) -> None:
+    named = 'string inputs:attribute = "tone"\ncolor3f inputs:default = (0.5, 0.25, 0.125)'
+    color = "color3f inputs:color.connect = </Look/T.outputs:out>"
+    shape = _of_arnold(stage, "arnold:flat", color, "arnold:user_data_rgb", named)
+    assert np.array_equal(shape.attributes["vertex_tone"], [(0.5, 0.25, 0.125)] * 4)
+
+
 def test_surfaces_of_arnold_are_those_of_materialx(stage: Loader) -> None:
     pytest.importorskip("MaterialX", reason="its library translates standard_surface")
     text = f"""

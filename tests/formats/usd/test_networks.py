@@ -86,12 +86,13 @@ def test_a_primvar(stage: Loader) -> None:
     def Shader "G" {
         uniform token info:id = "ND_geompropvalue_color3"
         string inputs:geomprop = "tone"
+        color3f inputs:default = (0.25, 0.5, 1)
         color3f outputs:out
     }"""
     mesh, _ = _mesh(stage, "color3f inputs:base_color.connect = </Look/G.outputs:out>", nodes)
     color = _leaf(mesh).base_color
     assert isinstance(color, MeshAttribute) and color.name == "vertex_tone"
-    assert np.shape(mesh.attributes["vertex_tone"]) == (4, 3)
+    assert np.array_equal(mesh.attributes["vertex_tone"], [(0.25, 0.5, 1.0)] * 4)
 
 
 DOCUMENT = """<?xml version="1.0"?>
