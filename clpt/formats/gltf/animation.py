@@ -21,7 +21,7 @@ from clpt.formats.gltf.document import Document, Element
 from clpt.geometry.motion import is_even
 from clpt.scene import Scene
 from clpt.scene.motion import Deformation, Shutter, placement, through
-from clpt.scene.shapes import Group, Instance, Mesh
+from clpt.scene.shapes import Group, Instance, Mesh, Shape
 
 PATHS = {
     "translation": ("VEC3",),
@@ -153,7 +153,7 @@ KEYS = 9  # while the shutter is open
 NEAR = 1e-3  # largest distance of a vertex from its path between keys, over the mesh's size
 
 
-def _lit_evenly(shape: Any, warnings: list[str]) -> Any:
+def _lit_evenly(shape: Shape, warnings: list[str]) -> Shape:
     """Return a shape without its light, with a warning, where its motion stretches it."""
     if shape.motion is None or shape.emission is None or is_even(shape.motion):
         return shape

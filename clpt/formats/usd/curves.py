@@ -12,7 +12,7 @@ from clpt.arrays import Floats, Integers
 from clpt.files import budget
 from clpt.formats.usd import meshes, skeletons
 from clpt.formats.usd.document import Document, rows
-from clpt.formats.usd.materials import surface
+from clpt.formats.usd.materials import Surface, surface
 from clpt.formats.usd.meshes import Topology
 from clpt.scene.shapes import Curves, Shape, Spheres
 from clpt.scene.textures import attributes_in
@@ -56,11 +56,7 @@ def curves(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
     if at_ends is not None:
         rows[:, 3] = _between(at_ends, [len(part) for part in kept], basis) / 2.0
     rows[:, 3] = np.maximum(rows[:, 3], 0.0)
-    look = surface(document, material, prim, both=True)
-    look = look.settled(_means(document, prim, look.fallbacks))
-    if look.emission is not None and attributes_in(look.emission):
-        document.warn("its light is left out, as it varies by a primvar", prim.GetPath())
-        look = dataclasses.replace(look, emission=None)
+    look = _look(document, prim, material)
     return [
         Curves(
             points=rows.astype(np.float32), lengths=tuple(len(part) for part in kept),
@@ -68,6 +64,16 @@ def curves(document: Document, prim: Usd.Prim, material: UsdShade.Material | Non
             name=prim.GetName(), material=look.material, emission=look.emission,
         )
     ]  # fmt: skip
+
+
+def _look(document: Document, prim: Usd.Prim, material: UsdShade.Material | None) -> Surface:
+    """Return the surface of curves: means stand for primvars, and light that these vary is dark."""
+    look = surface(document, material, prim, both=True)
+    look = look.settled(_means(document, prim, look.fallbacks))
+    if look.emission is None or not attributes_in(look.emission):
+        return look
+    document.warn("its light is left out, as it varies by a primvar", prim.GetPath())
+    return dataclasses.replace(look, emission=None)
 
 
 def _all_pieces(strands: Floats, counts: Integers, basis: str, wrap: str) -> list[Floats]:
