@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.blender.test_engine import table
-from tests.blender.test_nodes import CASES, LOOSE, LOST, documented, kinds, moved
-from tests.blender.test_shaders import COLOR, SHADERS, mixed, one
-from tests.blender.test_surfaces import material, painted, pictures, stage
-
 bpy: Any = pytest.importorskip("bpy")
+
+from tests.blender.test_engine import table  # noqa: E402
+from tests.blender.test_nodes import CASES, LOOSE, LOST, documented, kinds, moved  # noqa: E402
+from tests.blender.test_shaders import COLOR, SHADERS, mixed, one  # noqa: E402
+from tests.blender.test_surfaces import material, painted, pictures, stage  # noqa: E402
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("registered")]
 __all__ = ["stage"]
