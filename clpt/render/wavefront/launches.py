@@ -21,6 +21,8 @@ from clpt import device
 
 LOOP_SECONDS = 0.5  # after which a launch is cut
 AIM_SECONDS = LOOP_SECONDS / 2  # of a launch at most, by the time of the launch before
+LEAST_SECONDS = 0.02  # of a launch: the host looks at the end of each, which takes it .1 ms
+LONGER = 8  # times the usual bounces, at most, where launches are shorter
 LEAST_LAUNCH = 1 / 2  # of the usual launch: shorter launches cost too much
 LAUNCHES = 3  # launches that a run waits for, about, before it ends
 FIRST_PART = 16  # the first launches take this part of the slots
@@ -44,8 +46,8 @@ class Limits:
     """Limits of launches on a device.
 
     share: the most slots of a work-item; lanes: slots that are traced together; bounces: the most
-    bounces; cancel_seconds: the longest time from a request to stop to the end of the run [s], or
-    None.
+    bounces, but of launches shorter than LEAST_SECONDS; cancel_seconds: the longest time from a
+    request to stop to the end of the run [s], or None.
     """
 
     share: int
@@ -82,7 +84,10 @@ def next_size(
     if size.share < limits.share:
         return Size(limits.fit(2 * size.share), 1) if has_all_slots else size
     wanted = limits.bounces
-    if limits.cancel_seconds is not None:
+    if limits.cancel_seconds is None:
+        in_least = int(rate / limits.share * LEAST_SECONDS)
+        wanted = max(wanted, min(in_least, LONGER * wanted))
+    else:
         in_time = int(rate / limits.share * limits.cancel_seconds / LAUNCHES)
         in_time = max(in_time, bounces // 2)  # other commands take time too
         wanted = max(min(in_time, wanted), math.ceil(wanted * LEAST_LAUNCH))

@@ -132,6 +132,7 @@ def test_only_large_trees_of_triangles(monkeypatch: pytest.MonkeyPatch) -> None:
         return strategy.choose(on, lowered, Tuning(layout="wide8")).interleaved
 
     monkeypatch.setattr(strategy, "INTERLEAVED_TRIANGLES", 400)
+    monkeypatch.setattr("clpt.bvh.outgrows_caches", lambda *of: False)
     assert not interleaved(plain)
     monkeypatch.setattr("clpt.bvh.outgrows_caches", lambda *of: True)
     assert interleaved(plain) == (on.lanes > 1) and not interleaved(ball)

@@ -11,7 +11,15 @@ import pytest
 
 import clpt
 from clpt.render.wavefront import bounce_loop, launches
-from clpt.render.wavefront.launches import AIM_SECONDS, Limits, Size, first_size, next_size
+from clpt.render.wavefront.launches import (
+    AIM_SECONDS,
+    LEAST_SECONDS,
+    LONGER,
+    Limits,
+    Size,
+    first_size,
+    next_size,
+)
 from clpt.scene import Film, Scene, cameras, integrators, lights, materials, media, shapes
 from clpt.transforms import look_at, scale, translate
 
@@ -37,12 +45,14 @@ def test_a_launch_is_short_or_of_a_bounce_of_a_block(
     cost: float, cancel_seconds: float | None, most: int
 ) -> None:
     every = sizes(Limits(SHARE, LANES, most, cancel_seconds), cost, 80)
+    longer = min(int(LEAST_SECONDS / cost + 1e-9), LONGER * most)  # where all launches are short
+    longest = max(most, longer) if cancel_seconds is None else most
     for size in every[1:]:
         short = size.share * size.bounces / SHARE * cost <= AIM_SECONDS
         assert short or size == Size(LANES, 1)
-        assert size.share in (16, 32, 64, 128, 256, 512) and 1 <= size.bounces <= most
+        assert size.share in (16, 32, 64, 128, 256, 512) and 1 <= size.bounces <= longest
     if cancel_seconds is None and cost <= AIM_SECONDS:  # as many bounces as suit the device
-        assert every[-1] == Size(SHARE, max(1, min(most, int(AIM_SECONDS / cost + 1e-9))))
+        assert every[-1] == Size(SHARE, max(1, min(longest, int(AIM_SECONDS / cost + 1e-9))))
 
 
 def test_launches_take_all_slots_once_before_they_grow() -> None:
