@@ -109,19 +109,21 @@ def test_the_longest_texts_of_each_stage() -> None:
 def test_what_is_kept_spills_nothing() -> None:
     """Stack is for traversal alone; trees of wide8, which spill on AMD's, are for NVIDIA's.
 
-    Shadow rays through mixtures within mixtures also have the scene there, for a function.
-    Some of Intel's spill still: see docs/gpus.md. They may not get worse, as below.
+    Shadow rays and joins through mixtures within mixtures also have the scene there, for a
+    function. Some of Intel's spill still, and `emit` of a sky on AMD's: see docs/gpus.md. They may
+    not get worse, as below.
     """
     assert ROWS
     for kept in ROWS:
         assert "failed" not in kept, kept
         if FIRST[kept["device"]].name == "Intel":
             continue
-        most = {"intersect": 256, "shadow": 576, "splat": 256}
+        most = {"intersect": 256, "shadow": 576, "splat": 576}
+        most |= {"emit": 16, "shade_rough_plastic": 256}  # on gfx1100
         if "wide8" not in kept["stage"] or FIRST[kept["device"]].name == "NVIDIA":
             assert kept["stack"] <= most.get(kept["stage"].split()[0], 0), kept
         others = "wide8" in kept["stage"] and FIRST[kept["device"]].name != "NVIDIA"
-        assert kept["spilled"] == 0 or others, kept
+        assert kept["spilled"] <= (3 if kept["stage"] == "emit" else 0) or others, kept
 
 
 @functools.lru_cache(maxsize=2)

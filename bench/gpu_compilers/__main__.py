@@ -20,6 +20,8 @@ from bench.gpu_compilers import programs, results
 from bench.gpu_compilers.results import Row
 from bench.gpu_compilers.vendors import VENDORS, CompilerError, Vendor, fits
 
+NAMES = ("stage", "scene", "mode")
+
 
 def compiled(vendor: Vendor, device: str, program: programs.Program) -> Row:
     """A row: what became of a program, or the error."""
@@ -61,7 +63,11 @@ def present() -> list[Vendor]:
 @click.option("--json", "json_file", type=click.Path(path_type=Path), help="a row a program")
 @click.option("--device", "devices", multiple=True, help="these alone")
 @click.option("--scene", "names", multiple=True, help="these alone")
-@click.option("--longest", type=int, help="so many of each stage and mode alone, the longest texts")
+@click.option(
+    "--longest",
+    type=int,
+    help="so many of each stage and mode alone, the longest texts, and those that took most before",
+)
 @click.option("--seconds", type=float, help="after which no further program is compiled")
 @click.option("--fits", "fewest", is_flag=True, help="tell how few registers would do on NVIDIA's")
 @click.option("--keep", is_flag=True, help="write the page and the picture in bench/results")
@@ -77,7 +83,9 @@ def main(
     os.nice(5)
     selected = programs.of_scenes(p for p in programs.scenes() if not names or p.name in names)
     if longest:
-        selected = programs.longest(selected, longest)
+        most = {tuple(row.get(name) for name in NAMES) for row in results.read(results.STAGES)}
+        former = [p for p in selected if (p.stage, p.scene, p.mode) in most]
+        selected = list(dict.fromkeys([*programs.longest(selected, longest), *former]))
     if fewest:
         for program in selected:
             count = fits(program.text, devices[0] if devices else "sm_89")

@@ -19,9 +19,8 @@ LARGEST = ("stack", "spilled", "size", "memory", "arithmetic", "special", "secon
 HEAD = """# Programs through the compilers of GPUs that are not here
 
 WHICH of the scenes in `scenes/`, both modes, one lane, along queues; a stage whose text hangs on
-the layout of trees stands once for each. Where the texts of a stage have changed since, a row has
-those alone that took most. `python -m bench.gpu_compilers` measures; how, and what follows, stands
-in [docs/gpus.md](../../docs/gpus.md). Rows: [JSON lines](gpu_compilers.jsonl).
+the layout of trees stands once for each. `python -m bench.gpu_compilers` measures; how, and what
+follows, stands in [docs/gpus.md](../../docs/gpus.md). Rows: [JSON lines](gpu_compilers.jsonl).
 
 ![Registers, stage by stage](gpu_compilers.png)
 
@@ -68,6 +67,7 @@ def page(rows: list[Row], longest: int | None = None) -> str:
     """The tables, a device each; longest: how many texts of each stage and mode, None for all."""
     few = f"The {longest} longest" if longest and longest > 1 else "The longest program"
     some = f"{few}{'' if longest == 1 else ' programs'} of each stage and mode,"
+    some += " and those that took most before,"
     counts = {device: _programs(rows, device) for v in VENDORS for device in v.devices}
     half = max(counts.values()) / 2
     most = [device for device, count in counts.items() if count > half]
