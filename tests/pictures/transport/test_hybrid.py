@@ -343,7 +343,7 @@ def test_aiming_finds_the_caustic(monkeypatch: pytest.MonkeyPatch) -> None:
         if not aimed:
             leave_aims_out(monkeypatch)
         made = exposures(scene, 8, 64, device=narrow())
-        assert lower(scene).features.transport.aimed == aimed
+        assert bool(lower(scene).features.transport.aimed) == aimed
         variance.append(made.var(axis=0).mean())
     assert variance[0] < 0.1 * variance[1], variance
 
