@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -188,11 +189,16 @@ def _outshone(scene: Scene) -> Iterator[str]:
         yield f"{name} is {times} any other lamp: little is seen of what the others light"
 
 
+@cache
+def _white_watts() -> float:
+    """The watts of an emission of 1 [nm]: only scenes with lamps need them."""
+    return watts(RGBIlluminant(1.0, 1.0, 1.0))
+
+
 def _watts(lamp: Light, look: Look) -> float:
     """The emission of a lamp from 360 to 830 nm, such as its intensity [W/sr]."""
-    white = RGBIlluminant(1.0, 1.0, 1.0)
     values = [
-        watts(value) if isinstance(value, Spectrum) else watts(white) * mean(value, look)
+        watts(value) if isinstance(value, Spectrum) else _white_watts() * mean(value, look)
         for value in emissions_of(lamp).values()
     ]
     return float(np.mean(values)) if values else 0.0

@@ -163,11 +163,11 @@ def _left_to_the_camera(index: SceneIndex) -> list[str]:
     camera, integrator = index.camera, index.integrator
     kind, warnings = integrator.kind, []
     if integrator.light_tracing and not index.joined:
-        names = f"{', '.join(CONNECTED[:-1])} and {CONNECTED[-1]} can"
-        reason = f"a {camera.kind} camera cannot be joined to a point; {names}"
+        reason = f"a {camera.kind} camera cannot be joined to a point; {CONNECTED} can"
         if camera.connects:
-            rolls = "its shutter opens row by row; without readout it can"
-            reason = rolls if camera.rolls else f"its glass disperses; {names}, without such glass"
+            reason = f"its glass disperses; {CONNECTED} can, without such glass"
+            if camera.rolls:
+                reason = "its shutter opens row by row; without readout it can"
         name = "light_tracing" if kind == "vcm" else "light_paths"
         warnings.append(f"{kind}.{name}: left aside, as {reason}")
     if integrator.merging and not index.merged:

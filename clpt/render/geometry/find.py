@@ -124,7 +124,7 @@ class Geometry:
         corners = [corners_of(box) for box in boxes if len(box)]
         if not corners:
             return np.zeros(3), 1.0
-        low, high = np.concatenate(corners).min(axis=0), np.concatenate(corners).max(axis=0)
+        low, high = corners_of(np.concatenate(corners))
         if max(np.abs(low).max(), np.abs(high).max()) > triangles.FAR:
             low, high = low.astype(np.float64), high.astype(np.float64)
         if not fits_single(2.0 * (high - low)):

@@ -30,8 +30,7 @@ def check_light_paths(scene: Scene, shapes_: list[Shape]) -> None:
         return
     spectral = scene.film.mode == "spectral"
     if not scene.camera.connects:
-        names = f"{', '.join(CONNECTED[:-1])} and {CONNECTED[-1]}"
-        _refuse(f"the cameras {names}, not {scene.camera.kind}", "camera")
+        _refuse(f"the cameras {CONNECTED}, not {scene.camera.kind}", "camera")
     if scene.camera.rolls:
         _refuse("a shutter without readout", "camera.shutter.readout")
     if scene.film.alpha:

@@ -11,7 +11,8 @@ from clpt.scene.cameras.camera import (
 )
 
 KINDS = (Perspective, ThinLens, Lens, Orthographic, Spherical, Matrix, Rays, Calibrated)
-CONNECTED = tuple(camera.kind for camera in KINDS if camera.connects)
+_CONNECTED = [camera.kind for camera in KINDS if camera.connects]
+CONNECTED = f"{', '.join(_CONNECTED[:-1])} and {_CONNECTED[-1]}"  # names, for messages
 
 __all__ = [
     "CONNECTED", "KINDS", "Calibrated", "Camera", "Lens", "Matrix", "Orthographic", "Perspective",

@@ -202,7 +202,7 @@ class Calibrated(Camera):
         }  # fmt: skip
 
     def view_of(self, width: int, height: int) -> View:
-        """Return its view along the axis, in which the pixels with directions lie."""
+        """Return its view along the axis: it holds every pixel that has a direction."""
         pixels = self._pixels(width, height)
         angle = _widest(self._projection(), width, height, pixels.tobytes())
         return self._view(self.rigid_matrix(), width / float(pixels[0, 0] * pixels[1, 0]), angle)
