@@ -157,10 +157,8 @@ def rows_for(
         written = write(clpt.load(copy), size, folder)
         ours = {way: Contender(copy, *each, WAYS[way]) for way in ways}
         theirs = {
-            f"cycles{'-' * bool(options)}{''.join(options)}": Cycles(
-                written, *each, options, blender=blender
-            )
-            for options in ((), ("guiding",))
+            name: Cycles(written, *each, options, blender=blender)
+            for name, options in {"cycles": (), "cycles-guiding": ("guiding",)}.items()
         }
         records, failures = compare(scene, {**ours, **theirs}, spp, 1, seeds)
         if failures:
@@ -175,9 +173,10 @@ def rows_for(
         }
     about = {"scene": machine.scene_name(scene), "film": film, "mode": "rgb", "long": long}
     about |= {"quarters": quarters(*references)}
+    rows = rows_of(records, spp, values)
+    costs = [float(np.mean(row["relmse"])) * row["seconds"] for row in rows]
     return [
-        {**about, **row, "efficiency": 1.0 / (float(np.mean(row["relmse"])) * row["seconds"])}
-        for row in rows_of(records, spp, values)
+        {**about, **row, "efficiency": round(1 / c, 3)} for row, c in zip(rows, costs, strict=True)
     ]
 
 
