@@ -65,6 +65,8 @@ class Cycles(Contender):
 
 def write(scene: clpt.Scene, size: tuple[int, int], folder: Path) -> Path:
     """Write a scene for Cycles to a folder. Raises ValueError for what has no counterpart there."""
+    if scene.lights:
+        raise ValueError("lights beside those of shapes are not written for Cycles")
     camera = scene.camera
     view = np.asarray(camera.to_world) @ np.diag([-1.0, 1.0, -1.0, 1.0])
     shapes = []
