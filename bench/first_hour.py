@@ -104,7 +104,7 @@ STEPS = (
     Step("trees", 40, fixed("wide8 1", "compact 1", "binary 1", "wide8 32", "compact 32"), few=3),
     Step("rays", 40, fixed("wide8", "compact", "binary")),
     Step("stages", 30, fixed(*SIX)),
-    Step("sorting", 30, fixed("wide8", "compact"), few=2),
+    Step("sorting", 30, fixed("scenes/pool", "atrium", "scenes/bulb", "scenes/table_glasses")),
     Step("layouts", 40, fixed("atrium", "glass")),
     Step("registers", 30, fixed(*LIMITS), few=2),
     Step("host", 20, fixed("cornell", "atrium")),

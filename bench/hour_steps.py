@@ -118,28 +118,28 @@ def starting(part: str, settings: Settings) -> Iterator[Row]:
 
 
 def sorting(part: str, settings: Settings) -> Iterator[Row]:
-    """Rays of the atrium as they come, and by octant and cell of their origin."""
-    from bench.traversal import atrium
-    from bench.upward import crossing_rays
+    """Closest hits of a scene's paths in their slots, and sorted (with the sort); renders too."""
     from clpt import device as dev
-    from clpt.bench.rays import Rays, Traced
-    from clpt.rays import Accel
+    from clpt.bench import opened
+    from clpt.bench.launches import Flight
+    from clpt.bench.stages import BOUNCES, WARM
+    from clpt.render.wavefront.path_buffers import SORTING
+    from clpt.render.wavefront.strategy import Tuning
 
     on = dev.choose(settings.device, profiling=True)
-    vertices, faces = (np.asarray(a, t) for a, t in zip(atrium(), ("f4", "u4"), strict=True))
-    if settings.small:
-        faces = faces[::16]
-    rays = crossing_rays(vertices[faces], 1 << (12 if settings.small else 20))
-    o, d = rays[:, :3], rays[:, 4:7]
-    cells = np.int64(15.999 * (o - o.min(0)) / np.ptp(o, 0)) @ [256, 16, 1]
-    order = np.argsort((d > 0) @ [4, 2, 1] * 4096 + cells, kind="stable")
-    tree = Accel(on.queue, vertices, faces, layout=part)
-    for name, chosen in (("as they come", rays), ("by octant and cell", rays[order])):
-        parts = (np.ascontiguousarray(chosen[:, columns]) for columns in (slice(3), slice(4, 7), 7))
-        traced = Traced(on, Rays(*parts))
-        seconds = min(traced.closest(tree)[1].device for _ in range(4))
-        value = len(rays) * 1e-6 / seconds
-        yield {"figure": f"{part}, {name}", "value": value, "unit": "Mrays/s"}
+    slots = 1 << 12 if settings.small else None
+    for name, sort in (("in their slots", False), ("sorted", True)):
+        flight = Flight(on, opened(part), slots, tuning=Tuning(sorted_rays=sort))
+        count, seconds = 0, 0.0
+        for number in range(WARM + BOUNCES):
+            for step in flight.wavefront.stages:
+                items, taken = flight.timed(step)
+                if number >= WARM and step.name in ("intersect", *SORTING):
+                    count += items * (step.name == "intersect")
+                    seconds += taken.device
+        yield {"figure": f"{part}, {name}", "value": count * 1e-6 / seconds, "unit": "Mrays/s"}
+        value = rate(part, settings, sorted_rays=sort)
+        yield {"figure": f"{part}, rendered {name}", "value": value, "unit": "Msamples/s"}
 
 
 def rate(scene: str, settings: Settings, **options: object) -> float:

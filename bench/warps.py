@@ -37,7 +37,7 @@ from clpt.bench import opened
 from clpt.bench.launches import Flight
 from clpt.bench.rays import world
 from clpt.bench.stages import members_moved, words_of_members
-from clpt.records import PATH, SHADOW, SLABS
+from clpt.records import PATH, RAY_ORDER, SHADOW, SLABS
 from clpt.records.layout import Record
 from clpt.render.flow import programs
 
@@ -196,7 +196,8 @@ def rows(on: dev.Device, scene: str, slots: int) -> Iterator[Row]:
     if len(faces) > 96:  # fewer have no tree
         tree = bvh.build(on, vertices, faces, layout="wide8")
         for stage, several_rays in rays.items():
-            for order, share in _traversal(on, tree, several_rays).items():
+            settings = flight.wavefront.scene.lowered.settings
+            for order, share in _traversal(on, tree, several_rays, settings).items():
                 row = {"bench": "warps", "scene": Path(scene).stem}
                 yield {**row, "stage": f"{stage} rays, {order}", **share}
 
@@ -213,25 +214,27 @@ def _words(members: set[str], sizes: dict[str, int]) -> Words:
     return words
 
 
+def ray_keys(rays: NDArray[np.float32], settings: NDArray[np.void]) -> Slots:
+    """Return the keys of rays as of kernels/stage/sort_rays.cl; rays: rows of o, 0, d, t."""
+    scale = np.sqrt(3.0) / float(settings["scene_radius"])
+    cells = ((rays[:, :3] - settings["center"]) * scale + 1.0) * RAY_ORDER["cells"] / 2
+    x, y, z = np.clip(np.floor(cells), 0, RAY_ORDER["cells"] - 1).astype(np.int64).T
+    octants = (rays[:, 4:7] > 0.0) @ [4, 2, 1]
+    return ((octants * RAY_ORDER["cells"] + x) * RAY_ORDER["cells"] + y) * RAY_ORDER["cells"] + z
+
+
 def _traversal(
-    on: dev.Device, tree: bvh.Bvh, rays: NDArray[np.float32]
+    on: dev.Device, tree: bvh.Bvh, rays: NDArray[np.float32], settings: NDArray[np.void]
 ) -> dict[str, dict[str, float]]:
     """Return the work of groups in traversal, by the order of rays, a row for each slot."""
     some = np.isfinite(rays).all(1)
-    o, d = rays[some, :3].astype(float), rays[some, 4:7]
-    if len(o) < 64:
+    if np.count_nonzero(some) < 64:
         return {}
     work = np.zeros(len(rays))
     work[some] = visits(on, tree, np.nan_to_num(rays, nan=0.0)).sum(1)[some]
-    cells = np.int64(15.999 * (o - o.min(0)) / np.maximum(np.ptp(o, 0), 1e-9)) @ [256, 16, 1]
-    octant = (d > 0) @ [4, 2, 1]
-    orders = {
-        "in their slots": work,
-        "in a queue": work[some],
-        "by octant": work[some][np.argsort(octant, kind="stable")],
-        "by octant and cell": work[some][np.argsort(octant * 4096 + cells, kind="stable")],
-        "by cell and octant": work[some][np.argsort(cells * 8 + octant, kind="stable")],
-    }
+    windows = np.flatnonzero(some) // RAY_ORDER["window"]
+    order = np.lexsort((ray_keys(rays[some], settings), windows))
+    orders = {"in their slots": work, "in a queue": work[some], "sorted": work[some][order]}
     sizes = (32, 64)
     return {
         order: {f"lanes{size}": _evenness(values, size) for size in sizes}

@@ -10,12 +10,14 @@ from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pyopencl as cl
 import pytest
 
 from clpt import device
+from clpt.device import choosing
 from clpt.files import child_processes
 from tests import slow_tests
 
@@ -95,6 +97,14 @@ def assets() -> Path:
 def scenes() -> Path:
     """The folder of the small scenes that belong to the tests."""
     return HERE / "scenes"
+
+
+@pytest.fixture
+def no_trials(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No trial of the device has been made; those of a test are remembered in it."""
+    kept: dict[str, tuple[str, bytes]] = {}
+    memory = SimpleNamespace(load=kept.get, store=lambda key, *what: kept.update({key: what}))
+    monkeypatch.setattr(choosing, "disk_cache", memory)
 
 
 @cache

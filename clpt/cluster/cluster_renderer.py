@@ -277,8 +277,8 @@ class ClusterRenderer(ResumableRenderer):
     first_sample: the number of the first sample. device: of this machine, for pictures and noise
     measurements. beside: a renderer of the same cluster that renders at the same time; both use
     the same device class.
-    options: halves, layout, queued, looped, slots, texture_budget, tree_quality, programs, denoise,
-    see `Renderer`.
+    options: halves, layout, queued, sorted_rays, looped, slots, texture_budget, tree_quality,
+    programs, denoise, see `Renderer`.
 
     This process adds the films up and keeps the sum whatever happens to the cluster. At a stop
     workers send partial films; the next run renders the missing samples, but with a noise limit no

@@ -44,6 +44,7 @@ OPTIONS = (
     "halves",
     "layout",
     "queued",
+    "sorted_rays",
     "looped",
     "slots",
     "texture_budget",

@@ -10,6 +10,7 @@ import functools
 import hashlib
 import json
 import logging
+import math
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -180,14 +181,19 @@ def _by_speed(
     peers = [info for info in infos if _same_processor(info, infos[0])]
     if len(peers) < 2:
         return infos, {}
-    names = [f"{i.label} {i.version} {i.driver} {i.compute_units}" for i in peers]
-    times = remembered(names, lambda: _measured(peers))
+    texts = [_source(lanes).text for lanes in (8, 16)]
+    times = remembered([*map(identity, peers), *texts], lambda: _measured(peers))
     if times is None:
         return infos, {}
     seconds = dict(zip(peers, times, strict=True))
     close = _CLOSE * min(times)
     ranked = sorted(peers, key=lambda i: (seconds[i] > close, not i.is_pocl, seconds[i]))
     return ranked + [info for info in infos if info not in ranked], seconds
+
+
+def identity(info: DeviceInfo) -> str:
+    """Return a text that identifies a device and its driver in clpt's cache."""
+    return f"{info.label} {info.version} {info.driver} {info.compute_units}"
 
 
 def _same_processor(info: DeviceInfo, other: DeviceInfo) -> bool:
@@ -309,13 +315,28 @@ def measure_speed(runtimes: Sequence[tuple[cl.CommandQueue, int]]) -> list[float
     runtimes: a queue and its number of lanes for each. They run in turn, and the least of many
     short rounds counts, since other processes disturb only some rounds. Raises errors of drivers.
     """
-    timers = [_rounds(queue, lanes) for queue, lanes in runtimes]
-    rounds = [[next(timer) for timer in timers] for _ in range(1 + _ROUNDS)]  # the first compiles
-    return [min(times) for times in zip(*rounds[1:], strict=True)]
+    return least_seconds([_trial(queue, lanes) for queue, lanes in runtimes], _ROUNDS)
 
 
-def _rounds(queue: cl.CommandQueue, lanes: int) -> Iterator[float]:
-    """Run the trial kernel repeatedly; yield the time of each round [s]."""
+def least_seconds(
+    runs: Sequence[Callable[[], object]],
+    rounds: int,
+    clock: Callable[[], float] = time.perf_counter,
+) -> list[float]:
+    """Return the least time of each of some runs, which take turns [s]; the first may compile."""
+    least = [math.inf] * len(runs)
+    for number in range(1 + rounds):
+        for which, run in enumerate(runs):
+            start = clock()
+            run()
+            seconds = clock() - start
+            if number:
+                least[which] = min(least[which], seconds)
+    return least
+
+
+def _trial(queue: cl.CommandQueue, lanes: int) -> Callable[[], object]:
+    """Return a run of the trial kernel."""
     source, context = _source(lanes), queue.context
     options = ("-cl-std=CL1.2", "-w")
     program = native_programs.build(context, queue.device, source.text, options)
@@ -324,22 +345,18 @@ def _rounds(queue: cl.CommandQueue, lanes: int) -> Iterator[float]:
     nodes = cl.Buffer(context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=table)
     out = cl.Buffer(context, flags.WRITE_ONLY, 4 * lanes * _ITEMS)
     kernel = cl.Kernel(program, "trial")
-    while True:
-        start = time.perf_counter()
-        kernel(queue, (_ITEMS,), (_ITEMS,), nodes, out).wait()
-        yield time.perf_counter() - start
+    return lambda: kernel(queue, (_ITEMS,), (_ITEMS,), nodes, out).wait()
 
 
-def remembered(runtimes: Sequence[str], measured: Callable[[], list[float]]) -> list[float] | None:
-    """Return each runtime's seconds, cached or measured; None after a failure.
+def remembered(names: Sequence[str], measured: Callable[[], list[float]]) -> list[float] | None:
+    """Return the seconds of a trial, cached or measured; None after a failure.
 
-    runtimes: texts that identify drivers and processors; measured: runs the trial.
+    names: texts that identify drivers, processors and what runs; measured: runs the trial.
 
     A trial that started and did not end counts as failed: a driver that crashes the process does so
     once. Without a writable cache no trial runs. Another driver has another entry.
     """
-    texts = [_source(lanes).text for lanes in (8, 16)]
-    key = hashlib.sha256(repr((runtimes, texts)).encode()).hexdigest()
+    key = hashlib.sha256(repr(names).encode()).hexdigest()
     stored = disk_cache.load(key)
     if stored is None:
         disk_cache.store(key, "null", b"")
@@ -349,7 +366,7 @@ def remembered(runtimes: Sequence[str], measured: Callable[[], list[float]]) -> 
         try:
             stored = json.dumps(measured()), b""
         except Exception as error:  # any exception of a broken driver
-            log.debug("the trial of runtimes failed: %s", error)
+            log.debug("a trial failed: %s", error)
             return None
         disk_cache.store(key, *stored)
     seconds: list[float] | None = json.loads(stored[0])

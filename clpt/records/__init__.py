@@ -370,6 +370,13 @@ PHOTON_NUMBERS = Constants(
     none=(0xFFFFFFFF, "stands for the cell of one where there is none"),
     run=(1024, "cells that a work-item sums"),
 )
+RAY_ORDER = Constants(
+    "RAY_",
+    "The coarse order of rays: octants of directions, and cells of origins in them.",
+    cells=(4, "along each axis"),
+    keys=(8 * 4**3 + 1, "octants and cells, and the last for slots without a ray"),
+    window=(1 << 14, "slots that are sorted together"),
+)
 BRICK_SIZES = Constants(
     "BRICK_",
     "Sizes of the bricks of a grid.",
@@ -459,6 +466,7 @@ CONSTANTS: dict[str, Constants[int] | Constants[float]] = {
     "lobe_bits": LOBE_BITS,
     "counter_numbers": COUNTER_NUMBERS,
     "photon_numbers": PHOTON_NUMBERS,
+    "ray_order": RAY_ORDER,
     "brick_sizes": BRICK_SIZES,
     "brick_cells": BRICK_CELLS,
     "layer_sizes": LAYER_SIZES,

@@ -34,6 +34,8 @@ class RenderOptions(TypedDict, total=False):
     queued: whether stages that the host enqueues take slots from queues: of a material, of paths
     that have ended, of shadow rays. It is possible, and the default, for work-items that shade a
     single path, as on GPUs. The loop on the device sorts by itself.
+    sorted_rays: whether the rays of trees are put into a coarse order first, where `queued`. By
+    default a trial on a GPU decides.
     looped: whether a kernel on the device runs all bounces.
     first_sample: the number of the first sample, 0 to 2^31 - 1, by default 0. Renderers that take
     other numbers have other samples, and their films merge, see `Renderer.merge`.
@@ -57,6 +59,7 @@ class RenderOptions(TypedDict, total=False):
     tree_quality: bvh.Quality
     slots: int | None
     queued: bool | None
+    sorted_rays: bool | None
     looped: bool | None
     first_sample: int
     halves: bool
@@ -95,7 +98,7 @@ def check_options(scene: Scene, options: Mapping[str, Any]) -> None:
     programs = options.get("programs", "own")
     if programs not in get_args(Programs):
         raise UnknownKindError("programs", str(programs), get_args(Programs), where="programs")
-    for name in ("queued", "looped", "halves", "profiling"):
+    for name in ("queued", "sorted_rays", "looped", "halves", "profiling"):
         if options.get(name) is not None:
             flag(options[name], name)
     seconds = options.get("cancel_seconds")

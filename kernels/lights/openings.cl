@@ -79,6 +79,7 @@ inline LightSample lamp_in_room(Scene scene, LightRow l, LightView view, vec3 p,
         vec3 d = openings_direction(scene, p, hemisphere, u);
         Spectrum radiance;
         real pdf;
+        l.params = sel_i(through, l.params, (integer)(0)); /* other lights' parameters are no sky's */
         infinite_case(scene, l, view.hemisphere, light_view_direction(view, d), lambdas, &radiance, &pdf);
         s.wi = sel3(through, d, s.wi);
         s.t = sel(through, (real)(FAR), s.t);

@@ -20,6 +20,8 @@ from clpt.bench.launches import EXACT, FREE, Flight, Launch
 from clpt.device import native_programs
 from clpt.errors import SceneError, UnknownKindError
 from clpt.records import PATH
+from clpt.render.wavefront.path_buffers import SORTING
+from clpt.render.wavefront.strategy import Tuning
 from clpt.scene import Scene
 
 COUNT = 1024
@@ -226,7 +228,9 @@ def test_where_it_cannot_be_written(
 def test_queues_of_a_gpu_are_launches(on: device.Device, scene: Scene) -> None:
     """The kernel of each launch is in its text: queues of one program serve several stages."""
     info = dataclasses.replace(on.info, kind="gpu", compute_units=1)
-    queued = Flight(device.Device(on.context, on.queue, info), scene, COUNT)
+    tuning = Tuning(layout="compact", sorted_rays=True)
+    queued = Flight(device.Device(on.context, on.queue, info), scene, COUNT, tuning=tuning)
     every = [*launches.launches(queued)]
     assert all(each.kernel in each.text.text for each in every)
-    assert {"append_ended", "append", "append_shadows"} <= {each.stage for each in every}
+    kernels = {each.stage for each in every}
+    assert {"append_ended", "append", "append_shadows", *SORTING} <= kernels

@@ -70,8 +70,8 @@ def sources(
 
     layout: of the triangles, a name in clpt.bvh.LAYOUTS; lanes: paths that a work-item shades;
     queued: whether work-items that shade a single path take slots from queues, which `append`
-    fills; interleaved: whether a work-item of `intersect`, and with curves of `shadow` or `splat`,
-    has the rays of `lanes` paths in flight.
+    fills, and `sort_rays` where there are trees; interleaved: whether a work-item of `intersect`,
+    and with curves of `shadow` or `splat`, has the rays of `lanes` paths in flight.
     """
     queued = queued and lanes == 1
     texts = _stages(features, layout, lanes, interleaved, queued=queued)
@@ -80,9 +80,11 @@ def sources(
     texts |= _shading(features, layout, lanes, queued=queued)
     if queued:
         texts["append"] = append_source(features, layout, lanes)
+        files, defines = _shared(features, layout), _defines(features, lanes)
         if not features.transport.light_paths:
-            files, defines = _shared(features, layout), _defines(features, lanes)
             texts["append_some"] = _source("append_some", files, defines, 1)
+        if layout != "brute":
+            texts["sort_rays"] = _source("sort_rays", files, defines, 1)
     return _static(texts)
 
 
@@ -107,6 +109,7 @@ def _stages(
         rays["generated/trace.cl"] = (f"tracing/{file}.cl#interleaved",)
     joins = {**files, **(rays if features.geometry.analytic else {})}
     in_queue = {**defines, "QUEUED": int(queued)}
+    sortable = in_queue if layout != "brute" else defines
     if begin == "flare":
         return {
             begin: make(begin, files, defines, lanes),
@@ -115,7 +118,7 @@ def _stages(
     texts = {
         begin: make(begin, files, in_queue if begin == "generate" else defines, lanes),
         "intersect": make(
-            "intersect", {**files, **rays}, defines, lanes if interleaved else trace_lanes
+            "intersect", {**files, **rays}, sortable, lanes if interleaved else trace_lanes
         ),
     }
     if bounce.joins(features):

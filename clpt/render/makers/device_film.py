@@ -72,6 +72,17 @@ class Once:
             return self._values[key]
 
 
+def _tuning(options: RenderOptions) -> Tuning:
+    """The wishes of options."""
+    return Tuning(
+        layout=options.get("layout"),
+        queued=options.get("queued"),
+        looped=options.get("looped", None if options.get("queue") is None else True),
+        cancel_seconds=options.get("cancel_seconds"),
+        sorted_rays=options.get("sorted_rays"),
+    )
+
+
 class DeviceFilm:
     """A film on a device, with its scene; see clpt.render.makers.planning for another scene.
 
@@ -108,10 +119,7 @@ class DeviceFilm:
             texture_budget = texture_budget_of(device)
         self._texture_budget, self.successors = texture_budget, Successors()
         self._shared = options.get("programs") == "shared"
-        looped = options.get("looped", None if options.get("queue") is None else True)
-        self._tuning = Tuning(
-            options.get("layout"), options.get("queued"), looped, options.get("cancel_seconds")
-        )
+        self._tuning = _tuning(options)
         self.create = partial(
             Wavefront.create,
             device,

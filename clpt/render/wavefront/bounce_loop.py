@@ -10,6 +10,7 @@ import time
 from collections import OrderedDict, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -32,6 +33,7 @@ FIRST_PARTS = 8  # launches of a stage before the time of a launch is known
 LEAST_ITEMS = 1 << 12  # of a part
 ENDLESS = 0xFFFFFFFF  # bounces of a loop that goes on till all paths have ended
 MOST_IDLE = 16  # kernels that are kept for scenes that need them again
+TRIAL_BATCH = 2  # batches before the trial of sorted rays: paths of all depths are in flight then
 IDLE = {"samples": (0, 0), "begin": 0, "bounces": 0, "restart": 0, "leave": None}  # nothing to do
 
 OnBatch = Callable[[Any], bool]  # called with counters; returns whether a run goes on
@@ -167,6 +169,7 @@ class BounceLoop:
         self._size = launches.first_size(self._share, self.lanes)  # of the next launch of the loop
         self._begin = 0  # the first slot of that launch
         self._parts, self._batch_bounces = FIRST_PARTS, BATCH
+        self._sorted, self._batches = False, 0  # whether a trial has said that rays are sorted
 
     @property
     def features(self) -> Features:
@@ -292,11 +295,40 @@ class BounceLoop:
         if self.looped:
             self._launch_loop()
             return
-        for step in self.stages * self._batch_bounces:
+        if self._batches == TRIAL_BATCH and self.scene.strategy.sorted_rays is None:
+            self._try_sorting()
+        self._batches += 1
+        self._run_steps(self.stages * self._batch_bounces)
+
+    def _run_steps(self, steps: Iterable[Step]) -> None:
+        for step in steps:
             for first, items in step.parts(self._parts):
                 offset = (first,) if first else None
                 event = self.stream.run(step.bound, (items,), step.group, offset)
                 self.timings.add(step.name, event)
+
+    def _try_sorting(self) -> None:
+        """Run a bounce, in which a trial says whether rays are sorted from now on.
+
+        The trial finds the same hits of the same rays again and again.
+        """
+        stages, name = self.stages, f"{self._label}intersect"
+        at = next((i for i, step in enumerate(stages) if step.name == name), None)
+        if at is None:  # ghosts of a lens
+            return
+        ways = [self._bind_rays(sort, 1) for sort in (False, True)]
+        self._run_steps(stages[:at])
+        lowered, chosen = self.scene.lowered, self.scene.strategy
+        sizes = [n.bit_length() for n in (self.paths.slots, len(lowered.faces))]
+        names = [self._texts(lowered, chosen)[name].text, *map(str, sizes)]
+        plain, sorts = (partial(self._wait_for, way) for way in ways)
+        self._sorted = strategy.sorting_pays(self.device, names, plain, sorts)
+        stages[at : at + 1] = ways[self._sorted]
+        self._run_steps(stages[at:])
+
+    def _wait_for(self, steps: Iterable[Step]) -> None:
+        self._run_steps(steps)
+        device.wait(self.stream.mark())
 
     def _launch_loop(self) -> None:
         """Enqueue a launch of the loop over the next part of the slots."""
@@ -318,12 +350,23 @@ class BounceLoop:
         steps: list[Step] = []
         for stage in bounce.order(features, chosen.layout, self.lanes, chosen.interleaved):
             former = steps[-1].bound.kernel.name if steps else ""
+            if stage.kernel == "intersect":
+                sort = self._sorted if chosen.sorted_rays is None else chosen.sorted_rays
+                steps += self._bind_rays(sort, stage.lanes)
+                continue
             if chosen.queued and stage.kernel in QUEUEING and stage.kernel != former:
                 steps += self._bind_queues(stage.kernel, len(features.materials.kinds))
             samples = {"samples": (0, 0)} if stage.verb == "begin" else {}
             bound = self.kernels.bind(label + stage.program, stage.kernel, **samples)
             steps.append(Step(label + stage.program, bound, *self._sizes(stage.lanes)))
         return steps
+
+    def _bind_rays(self, sort: bool, lanes: int) -> list[Step]:
+        """The kernels that find closest hits, `lanes` a work-item; sort: in the order of rays."""
+        steps = self._bind_queues("intersect", 1) if sort else []
+        name, queue = self._label + "intersect", {} if sort else {"queue": None}
+        bound = self.kernels.bind(name, "intersect", **queue)
+        return [*steps, Step(name, bound, *self._sizes(lanes))]
 
     def _bind_queues(self, kernel: str, kinds: int) -> list[Step]:
         """The kernels that queue slots for a stage: by material for shading, else in a queue."""

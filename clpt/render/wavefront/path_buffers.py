@@ -20,7 +20,7 @@ from clpt import device
 from clpt.arrays import Integers
 from clpt.device.buffers import Buffers
 from clpt.errors import MemoryBudgetError
-from clpt.records import COUNTER_NUMBERS, PATH, PATH_BITS, SLABS
+from clpt.records import COUNTER_NUMBERS, PATH, PATH_BITS, RAY_ORDER, SLABS
 from clpt.records.layout import SLAB_BLOCK, Record
 from clpt.render.flow.scene_to_tables import Lowered
 
@@ -102,9 +102,12 @@ PADDING = 80  # words between runs of all slots: powers of two collide in a cach
 GROUP = 64  # slots are a multiple of it; the local size of kernels with a single lane
 # The kernel that fills the queue of a stage, by the stage's kernel.
 QUEUEING = {"shade": "append", "generate": "append_ended", "shadow": "append_shadows"}
+QUEUEING["intersect"] = "rays_place"  # only where rays are sorted
 # Kernels that fill queues, and their programs.
 APPENDING = {"append_begin": "append", "append": "append"}
 APPENDING |= {"append_ended": "append_some", "append_shadows": "append_some"}
+SORTING = ("rays_begin", "rays_count", "rays_sum", "rays_place")  # in order
+APPENDING |= dict.fromkeys(SORTING, "sort_rays")
 QUEUE_GROUP = 256  # work-items that append to queues together
 FRESH = PATH_BITS["fresh"]
 CPU_SLOTS = 1 << 14
@@ -133,7 +136,8 @@ def queue_sizes(slots: int, kinds: int, queued: bool) -> dict[str, int]:
     if not queued:
         return {"queue": slots}
     kinds = max(kinds, 1)  # the stages before and after shading have queue 0
-    return {"queue": slots * kinds, "queue_starts": kinds, "queue_counts": kinds}
+    keys = dict.fromkeys(("ray_counts", "ray_starts"), _ray_keys(slots))
+    return {"queue": slots * kinds, "queue_starts": kinds, "queue_counts": kinds, **keys}
 
 
 def queue_steps(
@@ -141,10 +145,18 @@ def queue_steps(
 ) -> list[tuple[str, int, int | None]]:
     """Return the kernels that fill queues, in order: name, work-items, work-items of a group.
 
-    kernel: a name in QUEUEING.
+    kernel: a value of QUEUEING.
     """
     appended = -(-slots // QUEUE_GROUP) * QUEUE_GROUP
+    if kernel in SORTING:
+        each, every = (_ray_keys(slots), None), (appended, QUEUE_GROUP)
+        return [(name, *size) for name, size in zip(SORTING, (each, every) * 2, strict=True)]
     return [("append_begin", kinds, None), (kernel, appended, QUEUE_GROUP)]
+
+
+def _ray_keys(slots: int) -> int:
+    """Keys of rays in all windows, see kernels/stage/sort_rays.cl."""
+    return -(-slots // RAY_ORDER["window"]) * RAY_ORDER["keys"]
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,11 @@ expectation, and queues and the loop do not change a bit of it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from clpt import bvh, device
+from clpt.device import choosing
 from clpt.errors import SceneError
 from clpt.render.flow.scene_to_tables import Lowered
 from clpt.render.records import Features
@@ -17,6 +19,8 @@ BRUTE_SHAPES = 32  # the most analytic shapes that a ray tests without a tree
 INTERLEAVED_TRIANGLES = 1 << 20  # least number for interleaved rays: bench/notes/traversal.md
 INTERLEAVED_PIECES = 1 << 14  # of curves; see bench/notes/traversal.md
 FEW_OTHERS = 64  # the most other analytic shapes beside curves, which all lanes test
+SORTED_GAIN = 1.05  # least gain in a trial for which rays are sorted
+SORTED_ROUNDS = 4  # of that trial
 SHARE = 512  # slots of a work-item of the loop on a CPU, which fit into the second cache of a core
 
 
@@ -25,13 +29,15 @@ class Tuning:
     """Wishes of the caller; None: the default of the device and the scene.
 
     layout, queued: as in `Strategy`; looped: whether a kernel on the device runs all bounces;
-    cancel_seconds: the longest time from a request to stop to the end of the run [s].
+    cancel_seconds: the longest time from a request to stop to the end of the run [s]; sorted_rays:
+    as in `Strategy`.
     """
 
     layout: str | None = None
     queued: bool | None = None
     looped: bool | None = None
     cancel_seconds: float | None = None
+    sorted_rays: bool | None = None
 
 
 UNTUNED = Tuning()
@@ -43,12 +49,14 @@ class Strategy:
 
     layout: of the trees over triangles, a name in clpt.bvh.LAYOUTS; queued: whether stages that the
     host enqueues take slots from queues; interleaved: whether a work-item traces the rays of
-    several paths at once.
+    several paths at once; sorted_rays: whether `intersect` gets the slots in a coarse order of
+    their rays, see kernels/stage/sort_rays.cl; None: as a trial says, see `sorting_pays`.
     """
 
     layout: str
     queued: bool
     interleaved: bool
+    sorted_rays: bool | None
 
 
 def choose(on: device.Device, lowered: Lowered, tuning: Tuning) -> Strategy:
@@ -58,7 +66,8 @@ def choose(on: device.Device, lowered: Lowered, tuning: Tuning) -> Strategy:
     """
     layout = _layout(on, lowered, tuning.layout)
     queued = _queued(on, tuning.queued)
-    return Strategy(layout, queued, _interleaved(on, lowered, layout))
+    sorted_rays = _sorted(on, layout, tuning.sorted_rays) if queued else False
+    return Strategy(layout, queued, _interleaved(on, lowered, layout), sorted_rays)
 
 
 def use_loop(on: device.Device) -> bool:
@@ -86,6 +95,28 @@ def _layout(on: device.Device, lowered: Lowered, layout: str | None) -> str:
 def _queued(on: device.Device, wanted: bool | None) -> bool:
     """Whether there are queues: only for work-items that shade a single path."""
     return on.lanes == 1 and wanted is not False
+
+
+def _sorted(on: device.Device, layout: str, wanted: bool | None) -> bool | None:
+    """Whether rays that work-items take from a queue are sorted: only for trees."""
+    if layout == "brute" or (on.info.is_cpu and wanted is None):
+        return False
+    return wanted
+
+
+def sorting_pays(
+    on: device.Device, names: list[str], plain: Callable[[], object], sorts: Callable[[], object]
+) -> bool:
+    """Return whether it is faster to sort rays; a trial says so once for a device.
+
+    names: texts that identify the trial beside the device; plain, sorts: find the closest hits of
+    the same rays, and wait.
+    """
+    seconds = choosing.remembered(
+        [choosing.identity(on.info), *names],
+        lambda: choosing.least_seconds([plain, sorts], SORTED_ROUNDS),
+    )
+    return seconds is not None and SORTED_GAIN * seconds[1] < seconds[0]
 
 
 def can_interleave(features: Features, layout: str, lanes: int) -> bool:

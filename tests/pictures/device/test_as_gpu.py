@@ -11,6 +11,7 @@ import pytest
 import clpt
 from clpt import device as dev
 from clpt import transforms as tf
+from clpt.device import choosing
 from clpt.render.wavefront.path_buffers import MOST_SLOTS, UNIT_SLOTS, default_slots
 from clpt.scene import materials as m
 from clpt.scene.integrators import Integrator, ParticleTracer, Vcm
@@ -46,6 +47,47 @@ def test_forms(gpu: dev.Device, scenes: Path) -> None:
     in_place = clpt.Renderer(scene, gpu, queued=False)
     in_place.run(2)
     np.testing.assert_array_equal(image, in_place.image())
+
+
+@pytest.mark.parametrize("mode", ["rgb", "spectral"])
+@pytest.mark.parametrize("name", ["instances", "glass_metal"])
+def test_the_order_of_rays_changes_no_bit(
+    gpu: dev.Device, scenes: Path, name: str, mode: str
+) -> None:
+    scene = with_film(clpt.load(scenes / f"{name}.xml"), mode=mode)
+    images = []
+    for sorts in (False, True):
+        renderer = clpt.Renderer(scene, gpu, layout="compact", sorted_rays=sorts)
+        renderer.run(2)
+        names = [step.name for step in renderer._wavefront.stages]
+        assert ("rays_place" in names) == sorts
+        images.append(renderer.image())
+    np.testing.assert_array_equal(*images)
+
+
+@pytest.mark.parametrize("sorts", [False, True])
+def test_a_trial_during_a_render_decides_on_the_order(
+    gpu: dev.Device, scenes: Path, monkeypatch: pytest.MonkeyPatch, no_trials: None, sorts: bool
+) -> None:
+    """Both ways are tried on the same rays; neither changes a bit."""
+    scene = with_film(clpt.load(scenes / "instances.xml"), mode="rgb")
+    least, trials = choosing.least_seconds, []
+
+    def seconds(runs: list, rounds: int) -> list[float]:
+        trials.append(least(runs, rounds))
+        return [1.0, 0.5 if sorts else 1.5]
+
+    monkeypatch.setattr(choosing, "least_seconds", seconds)
+    images = []
+    for wish in (None, None, False):
+        renderer = clpt.Renderer(scene, gpu, slots=4096, sorted_rays=wish)
+        renderer.run(32)
+        names = [step.name for step in renderer._wavefront.stages]
+        assert ("rays_place" in names) == (sorts and wish is None)
+        images.append(renderer.image())
+    assert len(trials) == 1 and min(trials[0]) > 0.0
+    np.testing.assert_array_equal(images[0], images[2])
+    np.testing.assert_array_equal(images[1], images[2])
 
 
 @pytest.mark.slow

@@ -164,6 +164,13 @@ def test_every_integrator(name: str, mode: str, monkeypatch: pytest.MonkeyPatch)
     both(scene_of(mode=mode, integrator=INTEGRATORS[name]), name, monkeypatch)
 
 
+def test_the_sun_beside_the_sky() -> None:
+    """Its direction lies where a sky has an index: followed, it leads out of all tables."""
+    sun = lights.Directional(direction=(0.31, -0.88, 0.37), irradiance=20.0)
+    scene = scene_of()
+    assert clpt.render(dataclasses.replace(scene, lights=[*scene.lights, sun]), 4).mean() > 0.0
+
+
 def test_a_film_in_parts_is_the_same_film() -> None:
     scene = scene_of()
     whole, parts = clpt.Renderer(scene), clpt.Renderer(scene)

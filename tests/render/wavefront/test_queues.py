@@ -11,9 +11,10 @@ import pyopencl as cl
 import pytest
 
 import clpt
+from bench.warps import ray_keys
 from clpt import device
 from clpt.device import Source
-from clpt.records import HIT, PATH, SHADOW, SLABS
+from clpt.records import HIT, PATH, RAY_ORDER, SETTINGS, SHADOW, SLABS
 from clpt.records.layout import SLAB_BLOCK, Record
 from clpt.render.flow import programs
 from clpt.render.flow.blocks import blocks_text, members, unused
@@ -199,6 +200,34 @@ def test_stages_get_the_slots_with_work(kernel: str, slots: int) -> None:
     count = words["queue_counts"][0]
     np.testing.assert_array_equal(np.sort(words["queue"][:count]), expected)
     assert (words["queue"][count:] == 0xDEAD).all()
+
+
+@pytest.mark.parametrize("slots", [64, 1088, RAY_ORDER["window"] + 320])
+def test_rays_are_sorted_by_octant_and_cell(slots: int) -> None:
+    """In each window; each slot is there once, those without a ray at the end of a window."""
+    rng = np.random.default_rng(slots)
+    settings = np.zeros(1, SETTINGS.dtype)
+    settings["center"], settings["scene_radius"] = [1.0, -2.0, 3.0], 2.5
+    rays = rng.normal(0, 2, (slots, 8)).astype(np.float32)
+    keys = ray_keys(rays, settings[0])
+    alive = rng.random(slots) < 0.9
+    keys[~alive] = RAY_ORDER["keys"] - 1
+    path = np.zeros((PATH.words, stride_of(slots)), np.uint32)
+    word = {member.name: member.word for member in PATH.members}
+    path[word["state"], :slots] = np.where(alive, ALIVE | 7, 7)
+    for name, rows in (("o", rays[:, :3]), ("d", rays[:, 4:7])):
+        path[word[name] : word[name] + 3, :slots] = rows.T.view(np.uint32)
+    host = {name: np.zeros(1, np.uint32) for name in ("hit_words", "shadow_words")}
+    host |= {"path_words": laid(PATH, path, 1), "settings": settings.view(np.uint32)}
+    host |= {n: np.full(k, 0xDEAD, np.uint32) for n, k in queue_sizes(slots, 1, True).items()}
+    steps, numbers = queue_steps(slots, 1, "rays_place"), {"stride": stride_of(slots)}
+    made = on_device(assembled("stage/sort_rays.cl"), tuple(steps), host, slots=slots, **numbers)
+    assert made["queue_counts"][0] == slots
+    window = np.arange(slots) // RAY_ORDER["window"]
+    queue = made["queue"].astype(int)
+    assert np.array_equal(np.sort(queue), np.arange(slots))
+    assert np.array_equal(window[queue], window)
+    assert np.array_equal(keys[queue], keys[np.lexsort((keys, window))])
 
 
 def test_nothing_waits() -> None:
