@@ -5,10 +5,10 @@
 PYTHON is an interpreter that has Blender's `bpy` of PyPI. Films, times and turns are those of
 `bench.peers`, but times are those of the film alone, since guides learn for as long as a render
 goes on, and all ways of clpt have the start of `path`, so that what others do before their first
-sample counts. Both render the same triangles, images and lamps; of materials, diffuse, glass with an
-absorbing inside and metals are equal, and plastics and principled surfaces are much alike. So the
-error of a picture is that beside a long render by the same renderer, and the ratio of clpt's mean
-to Cycles' is told for each quarter of the film.
+sample counts. Both render the same triangles, images and lamps; of materials, diffuse, glass with
+an absorbing inside and metals are equal, and plastics and principled surfaces are much alike. So
+the error of a picture is that beside a long render by the same renderer, and the ratio of clpt's
+mean to Cycles' is told for each quarter of the film.
 """
 
 from __future__ import annotations
