@@ -1,266 +1,216 @@
-"""clpt beside Cycles, with path guiding (OpenPGL) and without, at equal processor time on a core.
+"""clpt beside Cycles, with path guiding (OpenPGL) and without, by their efficiency on a core.
 
-    python -m bench.beside_cycles --blender PYTHON
+    python -m bench.beside_cycles --blender PYTHON SCENE.xml...
 
-PYTHON is an interpreter that has Blender's `bpy` of PyPI. Both render the same triangles with the
-same materials: diffuse, glass, lamps. `cornell_glass` is a Cornell box with a glass ball, `door` is
-the scene of `bench.hard_light`, and `ajar` (with `--assets`) the geometry of veach-ajar with
-diffuse surfaces in place of metal, coats and textures. The error is the variance of pictures of
-different seeds, relative to the mean of all, without the worst .1 % of the pixels. It is the whole
-error without bias: so the two renderers must agree in the mean, and in blocks of pixels. The time
-before a process's first sample is subtracted; the learning of clpt's guide counts. The renderers
-take turns.
+PYTHON is an interpreter that has Blender's `bpy` of PyPI. Films, times and turns are those of
+`bench.peers`, but times are those of the film alone, since guides learn for as long as a render
+goes on, and all ways of clpt have the start of `path`, so that what others do before their first
+sample counts. Both render the same triangles, images and lamps; of materials, diffuse, glass with
+an absorbing inside and metals are equal, and plastics and principled surfaces are much alike. So
+the error of a picture is that beside a long render by the same renderer, and the ratio of clpt's
+mean to Cycles' is told for each quarter of the film.
 """
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
-import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
-from numpy.typing import NDArray
 from rich.table import Table
 
 import clpt
 from bench import machine
-from bench.hard_light.scenes import (
-    GLASS,
-    SCENES,
-    WHITE,
-    Diffuse,
-    Glass,
-    HardScene,
-    Lamp,
-    ball,
-    inside,
-    mitsuba_text,
-    quads,
-    sides,
-)  # fmt: skip
-from bench.meshes import write_ply
-from bench.peer_figures import relative_mse
-from bench.peers import APART, WAYS, watched, way_option
-from clpt import transforms
+from bench.peer_figures import Picture, relative_mse
+from bench.peer_films import with_film
+from bench.peers import (
+    FILMS,
+    HEADINGS,
+    WAYS,
+    Contender,
+    Row,
+    compare,
+    rows_of,
+    table_cells,
+    way_option,
+)
+from clpt.formats import as_openpbr
+from clpt.geometry.triangles import triangulate
 from clpt.geometry.winding import triangles_of
 from clpt.scene import materials
+from clpt.scene.roles import REFLECTANCE
+from clpt.scene.shapes import Disk, Shape
+from clpt.scene.textures import Bitmap, Checkerboard
 
-CYCLES = Path(__file__).with_name("in_blender.py")
-WHOLE = (-1, -1, -1), (1, 1, 1)
-AJAR = "mitsuba/veach-ajar/scene.xml"
-PILOT = 16  # samples of the pilot, for the time of a sample
-BLOCK = 16  # pixels of a side
-
-Image = NDArray[np.float32]
-Row = dict[str, Any]
-
-
-def cornell_glass(assets: Path | None) -> HardScene:
-    """A Cornell box with a block and a glass ball."""
-    lamp = quads(
-        ((-0.25, 0.999, -0.25), (0.25, 0.999, -0.25), (0.25, 0.999, 0.25), (-0.25, 0.999, 0.25))
-    )
-    block = sides((-0.3, -1, -0.3), (0.3, 0.2, 0.3), turn=0.3)
-    block = [tuple((x - 0.35, y, z - 0.3) for x, y, z in side) for side in block]
-    return HardScene(
-        "walls of diffuse colours, and a caustic",
-        depth=16, eye=(0, 0, 3.9), at=(0, 0, 0), fov=39.3,
-        shapes={
-            "white": (quads(*inside(*WHOLE, "yYz"), *block), WHITE),
-            "red": (quads(*inside(*WHOLE, "x")), Diffuse((0.57, 0.04, 0.04))),
-            "green": (quads(*inside(*WHOLE, "X")), Diffuse((0.11, 0.38, 0.08))),
-            "lamp": (lamp, Lamp(15)),
-            "ball": (ball(5, (0.4, -0.59, 0.35), 0.4), GLASS),
-        },
-    )  # fmt: skip
-
-
-def ajar(assets: Path | None) -> HardScene:
-    """Veach's door: its triangles, and of its materials what both renderers have alike."""
-    if assets is None:
-        raise OSError("ajar: give --assets, the folder that has mitsuba/veach-ajar")
-    scene = clpt.load(assets / AJAR)
-    view = np.asarray(scene.camera.to_world)
-    shapes: dict[str, Any] = {}
-    for shape in scene.shapes:
-        surface: Diffuse | Glass | Lamp = WHITE
-        if isinstance(shape.material, materials.Dielectric):
-            surface = GLASS
-        elif shape.emission is not None:
-            surface = Lamp(float(shape.emission.radiance.r))
-        shapes[shape.name] = (triangles_of(shape), surface)
-    eye, at = view[:3, 3], view[:3, 3] + view[:3, 2]
-    return HardScene(
-        "a room that is lit through a door",
-        depth=13, eye=tuple(eye.tolist()), at=tuple(at.tolist()), fov=60, shapes=shapes,
-    )  # fmt: skip
-
-
-MADE: dict[str, Callable[[Path | None], HardScene]] = {
-    "cornell_glass": cornell_glass,
-    "door": lambda assets: SCENES["door"],
-    "ajar": ajar,
-}
-
-
-def write(scene: HardScene, folder: Path, side: int) -> None:
-    """Write a scene as scene.xml for clpt, and as scene.json for Cycles, with its meshes."""
-    shapes = []
-    for name, ((vertices, faces), surface) in scene.shapes.items():
-        write_ply(folder / f"{name}.ply", vertices, faces)
-        file = folder / f"{name}.npz"
-        np.savez(file, vertices=vertices, faces=faces)
-        shapes.append({"file": str(file), "kind": type(surface).__name__, **asdict(surface)})
-    view = transforms.look_at(scene.eye, scene.at, (0, 1, 0)) @ np.diag([-1.0, 1.0, -1.0, 1.0])
-    about = {"width": side, "height": side, "depth": scene.depth, "fov": scene.fov}
-    described = {**about, "camera": view.tolist(), "shapes": shapes}
-    (folder / "scene.json").write_text(json.dumps(described), "utf-8")
-    (folder / "scene.xml").write_text(mitsuba_text(scene), "utf-8")
+IN_BLENDER = Path(__file__).with_name("in_blender.py")
+LONG = 77  # the seed of long renders
 
 
 @dataclass(frozen=True)
-class Contender:
-    """A way to render the scene of a folder. python: of Cycles; None: it is clpt."""
+class Cycles(Contender):
+    """Cycles with a scene that `write` wrote; options: "guiding", or none."""
 
-    way: str
-    folder: Path
-    side: int
-    python: str | None
+    blender: str = sys.executable
 
-    @property
-    def name(self) -> str:
-        return f"{'clpt' if self.python is None else 'cycles'}:{self.way}"
+    def command(self, spp: int, seed: int, out: Path) -> list[str]:
+        program = [self.blender, "-I", str(IN_BLENDER)]
+        return [*program, str(self.file), str(spp), str(seed), str(out), *(self.options or ())]
 
-    def render(self, spp: int, seed: int) -> tuple[float, Image]:
-        """Return the seconds of processor time, and the picture. Raises RuntimeError."""
-        with tempfile.TemporaryDirectory() as temporary:
-            out = f"{temporary}/a.exr"
-            numbers = [str(spp), str(seed)]
-            if self.python is None:
-                size, film = f"{self.side}x{self.side}", ["--spp", numbers[0], "--seed", numbers[1]]
-                command = [sys.executable, "-m", "clpt", "render", f"{self.folder / 'scene.xml'}"]
-                command += [*WAYS[self.way], "--mode", "rgb", "--size", size, *film, "-o", out]
-            else:
-                guiding = str(int(self.way == "guiding"))
-                described = str(self.folder / "scene.json")
-                command = [self.python, "-I", str(CYCLES), described, *numbers, guiding, out]
-            cpu, _, _ = watched(command, CORE, self.folder / "caches")
-            return cpu, np.asarray(clpt.read_image(out), np.float32)[..., :3]
+
+def write(scene: clpt.Scene, size: tuple[int, int], folder: Path) -> Path:
+    """Write a scene for Cycles to a folder. Raises ValueError for what has no counterpart there."""
+    if scene.lights:
+        raise ValueError("lights beside those of shapes are not written for Cycles")
+    camera = scene.camera
+    view = np.asarray(camera.to_world) @ np.diag([-1.0, 1.0, -1.0, 1.0])
+    shapes = []
+    for number, shape in enumerate(scene.shapes):
+        if isinstance(shape, Disk):
+            vertices, faces, normals, uvs = *triangles_of(shape), None, None
+        else:
+            vertices, faces, normals, uvs = triangulate(shape)
+        described, to_uv = surface(shape, folder / f"{number}.exr")
+        arrays = {"vertices": vertices, "faces": faces, "normals": normals}
+        if uvs is not None:
+            arrays["uvs"] = uvs @ to_uv[:2, :2].T + to_uv[:2, 2]
+        file = folder / f"{number}.npz"
+        np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
+        shapes.append({"file": str(file), **described})
+    about = {"size": size, "depth": scene.integrator.max_depth, "fov": camera.fov}
+    file = folder / "scene.json"
+    file.write_text(json.dumps({**about, "camera": view.tolist(), "shapes": shapes}), "utf-8")
+    return file
+
+
+def surface(shape: Shape, image: Path) -> tuple[Row, Any]:
+    """Return a shader of Cycles with its inputs, and what takes uv to its image; it writes it."""
+    material: Any = shape.material
+    if isinstance(material, materials.TwoSided):
+        material = material.front
+    if shape.emission is not None:
+        return {"kind": "Emission", "Color": colour(shape.emission.radiance)}, np.eye(3)
+    textured: Any = None
+    match material:
+        case materials.Diffuse():
+            described, textured = {"kind": "BsdfDiffuse"}, material.reflectance
+        case materials.Dielectric():
+            described = {"kind": "BsdfGlass", "Roughness": 0.0, "IOR": index(material)}
+            if shape.interior is not None:
+                described["absorbs"] = colour(shape.interior.sigma_t)
+        case materials.RoughConductor():
+            described = {"kind": "BsdfMetallic", "distribution": material.distribution.upper()}
+            described |= {"IOR": colour(material.eta), "Extinction": colour(material.k)}
+            described |= {"Roughness": material.alpha_u**0.5}
+            textured = material.specular_reflectance
+        case materials.RoughPlastic():
+            described = {"kind": "BsdfPrincipled", "Roughness": material.alpha**0.5}
+            described |= {"IOR": index(material)}
+            textured = as_openpbr.surface(material, lambda _: None).base.base_color
+        case materials.Principled():
+            described = {"kind": "BsdfPrincipled", "Roughness": material.roughness, "IOR": 1.5}
+            described |= {"Metallic": material.metallic}
+            textured = material.base_color
+        case _:
+            raise ValueError(f"Cycles has no {type(material).__name__}")
+    if isinstance(textured, Bitmap):
+        pixels, closest = textured.pixels(REFLECTANCE), textured.filter == "nearest"
+    elif isinstance(textured, Checkerboard):
+        a, b = colour(textured.color0), colour(textured.color1)
+        pixels, closest = np.array([[b, a], [a, b]], np.float32), True
+    else:
+        return described | ({} if textured is None else {"Color": colour(textured)}), np.eye(3)
+    clpt.write_image(image, np.broadcast_to(pixels, (*pixels.shape[:2], 3)))
+    return {**described, "image": str(image), "closest": closest}, textured.to_uv
+
+
+def index(material: Any) -> float:
+    """Return a material's index relative to what is outside, at the D line."""
+    inside, outside = (as_openpbr.dispersion(n)[0] for n in (material.int_ior, material.ext_ior))
+    return inside / outside
+
+
+def colour(value: Any) -> list[float]:
+    """Return three numbers. Raises AttributeError for what is no colour."""
+    return [float(value)] * 3 if np.isscalar(value) else [value.r, value.g, value.b]
+
+
+def quarters(ours: Picture, theirs: Picture) -> list[float]:
+    """Return the ratio of the means of two pictures in each quarter of the film."""
+    h, w = (n // 2 for n in ours.shape[:2])
+    parts = [np.s_[:h, :w], np.s_[:h, w:], np.s_[h:, :w], np.s_[h:, w:]]
+    return [round(float(ours[part].mean() / theirs[part].mean()), 4) for part in parts]
+
+
+def rows_for(
+    scene: Path, blender: str, ways: Sequence[str], film: str, seeds: int, long: int
+) -> list[Row]:
+    """Return a row for each contender. Raises RuntimeError, ValueError and OSError."""
+    width, spp, _ = FILMS[film]
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        copy, size = with_film(scene, folder / "film", width, "rgb")
+        each = ("rgb", CORE, folder / "caches")
+        written = write(clpt.load(copy), size, folder)
+        ours = {way: Contender(copy, *each, WAYS[way]) for way in ways}
+        theirs = {
+            name: Cycles(written, *each, options, blender=blender)
+            for name, options in {"cycles": (), "cycles-guiding": ("guiding",)}.items()
+        }
+        records, failures = compare(scene, {**ours, **theirs}, spp, 1, seeds)
+        if failures:
+            raise RuntimeError("; ".join(failures))
+        for way in ways:  # a guide is learnt before the first sample
+            records[way].seconds += records[way].start - records["path"].start
+        long_renders = [next(iter(group.values())) for group in (ours, theirs)]
+        references = [contender.render(long, LONG).image for contender in long_renders]
+        values = {
+            name: [relative_mse(image, references[name in theirs]) for image in record.images]
+            for name, record in records.items()
+        }
+    about = {"scene": machine.scene_name(scene), "film": film, "mode": "rgb", "long": long}
+    about |= {"quarters": quarters(*references)}
+    rows = rows_of(records, spp, values)
+    costs = [float(np.mean(row["relmse"])) * row["seconds"] for row in rows]
+    return [
+        {**about, **row, "efficiency": round(1 / c, 3)} for row, c in zip(rows, costs, strict=True)
+    ]
 
 
 CORE = (min(os.sched_getaffinity(0)),) if hasattr(os, "sched_getaffinity") else (0,)
 
 
-def measure(contenders: list[Contender], seconds: float, seeds: int) -> list[Row]:
-    """Return a row for each contender. Raises RuntimeError if the renderers have other pictures."""
-    for contender in contenders:  # compiles
-        contender.render(1, 1)
-    start = {
-        contender.name: min(contender.render(1, seed)[0] for seed in (2, 3))
-        for contender in contenders
-    }
-    if "clpt:guiding" in start:  # which learns before its first sample
-        start["clpt:guiding"] = start["clpt:path"]
-    each = {}
-    for contender in contenders:
-        plain = contender.render(1, 4)[0]
-        each[contender.name] = max(contender.render(1 + PILOT, 5)[0] - plain, 0.01) / PILOT
-    rows: list[Row] = [
-        {"renderer": contender.name, "spp": max(1, round(seconds / each[contender.name]))}
-        for contender in contenders
-    ]
-    shots: list[list[tuple[float, Image]]] = [[] for _ in contenders]
-    for seed in range(11, 11 + seeds):
-        for contender, row, taken in zip(contenders, rows, shots, strict=True):
-            taken.append(contender.render(row["spp"], seed))
-    images = [np.array([image for _, image in taken]) for taken in shots]
-    ours = [contender.python is None for contender in contenders]
-    means = [
-        np.mean(
-            [i.mean(0) for i, pictures in zip(images, ours, strict=True) if pictures is which],
-            axis=0,
-        )
-        for which in (True, False)
-    ]
-    apart, middle = agreement(*means), (means[0] + means[1]) / 2
-    for contender, row, taken, pictures in zip(contenders, rows, shots, images, strict=True):
-        cpu = float(np.mean([shot[0] for shot in taken])) - start[contender.name]
-        error = float(np.mean([
-            relative_mse(middle + (a - b) / np.sqrt(2), middle)
-            for a, b in itertools.combinations(pictures, 2)
-        ]))  # fmt: skip
-        row |= {"cpu": round(cpu, 2), "relmse": round(error, 5)}
-        row |= {"efficiency": round(1 / (error * cpu), 4), **apart}
-    best = max(row["efficiency"] for row in rows if row["renderer"].startswith("cycles"))
-    return [{**row, "over_cycles": round(row["efficiency"] / best, 3)} for row in rows]
-
-
-def agreement(ours: Image, theirs: Image) -> Row:
-    """Return the means of two pictures, and the median relative difference of their blocks.
-
-    Raises RuntimeError if they differ too much to be pictures of the same scene.
-    """
-    means = [float(image.mean()) for image in (ours, theirs)]
-    h, w = (n // BLOCK for n in ours.shape[:2])
-    a, b = (
-        image[: h * BLOCK, : w * BLOCK].reshape(h, BLOCK, w, BLOCK, 3).mean((1, 3, 4))
-        for image in (ours, theirs)
-    )
-    blocks = float(np.median(np.abs(a - b) / np.maximum((a + b) / 2, 1e-6)))
-    if max(abs(means[0] / means[1] - 1), blocks / 2) > APART:
-        raise RuntimeError(f"the pictures differ: means {means}, blocks by {blocks:.1%}")
-    return {"means": [round(mean, 5) for mean in means], "blocks_apart": round(blocks, 5)}
-
-
-def has_cycles(python: str) -> bool:
-    """Return whether an interpreter has `bpy`."""
-    try:
-        return subprocess.run([python, "-c", "import bpy"], capture_output=True).returncode == 0
-    except OSError:
-        return False
-
-
 @click.command(help=__doc__)
+@click.argument("scenes", nargs=-1, type=click.Path(path_type=Path, exists=True))
 @click.option("--blender", default=sys.executable, help="an interpreter that has bpy")
-@click.option("--assets", type=click.Path(path_type=Path, file_okay=False), envvar="ASSETS")
-@click.option("--scene", "scenes", multiple=True, type=click.Choice(list(MADE)))
+@click.option("--film", default="preview", show_default=True, type=click.Choice(list(FILMS)))
 @way_option
-@click.option("--side", default=128, show_default=True, help="of the picture [pixels]")
-@click.option("--seconds", default=10.0, show_default=True, help="of processor time each")
-@click.option("--seeds", default=2, show_default=True)
+@click.option("--seeds", type=click.IntRange(min=2), default=4, show_default=True)
+@click.option("--long", default=2048, show_default=True, help="samples of the long renders")
 @click.option("--json", "json_file", type=click.Path(), help="append the figures as JSON lines")
 def main(
-    blender: str, assets: Path | None, scenes: tuple[str, ...], side: int, **options: Any
+    scenes: Sequence[Path], blender: str, ways: Sequence[str], json_file: str | None, **options: Any
 ) -> None:
-    if not has_cycles(blender):
-        print(f"left out: {blender} has no bpy (pip install bpy==4.2.0 --extra-index-url ...)")
-        return
-    table = Table("scene", "renderer", "samples", "s", "relMSE", "efficiency", ": best of Cycles")
-    for name in scenes or MADE:
-        with tempfile.TemporaryDirectory() as folder:
-            try:
-                write(MADE[name](assets), Path(folder), side)
-                sides_ = (Path(folder), side)
-                ours = [Contender(way, *sides_, None) for way in options["ways"]]
-                theirs = [Contender(way, *sides_, blender) for way in ("path", "guiding")]
-                found = measure(ours + theirs, options["seconds"], options["seeds"])
-            except (RuntimeError, OSError) as error:
-                print(f"{name}: {error}", file=sys.stderr)
-                continue
-        rows = [{"scene": name, "mode": "rgb", "size": [side, side], **row} for row in found]
-        machine.append(options["json_file"], "beside_cycles", rows)
-        for row in rows:
-            names = ("scene", "renderer", "spp", "cpu", "relmse", "efficiency", "over_cycles")
-            table.add_row(*(str(row[name]) for name in names))
-            print(" | ".join(str(row[name]) for name in names), file=sys.stderr, flush=True)
+    table = Table(*HEADINGS, title=machine.processor())
+    for scene in scenes:
+        try:
+            rows = rows_for(
+                scene, blender, list(dict.fromkeys([*(ways or ["file"]), "path"])), **options
+            )
+        except (RuntimeError, ValueError, OSError) as error:
+            print(f"{scene}: {error}", file=sys.stderr)
+            continue
+        machine.append(json_file, "beside_cycles", rows)
+        print(scene, "quarters:", rows[0]["quarters"], file=sys.stderr)
+        for cells in table_cells(rows):
+            table.add_row(*cells)
+            print(" | ".join(cells), file=sys.stderr, flush=True)
     machine.console().print(table)
 
 

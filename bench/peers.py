@@ -113,7 +113,7 @@ class Contender:
         """Return a picture. Raises RuntimeError with the process's last words if it fails twice."""
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / ("a.npy" if self.options is None else "a.exr")
-            command = [sys.executable, *self._command(spp, seed, out)]
+            command = self.command(spp, seed, out)
             where = (self.cores, self.caches, self.checkout)
             try:
                 cpu, seconds, peak = watched(command, *where)
@@ -123,12 +123,15 @@ class Contender:
             image = np.load(out) if self.options is None else clpt.read_image(out)
         return Taken(cpu, seconds, peak, np.asarray(image, np.float32)[..., :3])
 
-    def _command(self, spp: int, seed: int, out: Path) -> list[str]:
+    def command(self, spp: int, seed: int, out: Path) -> list[str]:
+        """Return a process that writes a picture to `out`."""
         if self.options is None:
             variant = f"llvm_ad_{self.mode}"
-            return ["-c", MITSUBA, variant, str(self.file), str(spp), str(seed), str(out)]
+            program = [sys.executable, "-c", MITSUBA, variant]
+            return [*program, str(self.file), str(spp), str(seed), str(out)]
         options = ["--mode", self.mode, "--spp", str(spp), "--seed", str(seed), "-o", str(out)]
-        return ["-m", "clpt", "render", str(self.file), *self.options, *options, "--quiet"]
+        program = [sys.executable, "-m", "clpt", "render", str(self.file)]
+        return [*program, *self.options, *options, "--quiet"]
 
 
 def watched(
@@ -197,11 +200,12 @@ def compare(
     return records, failures
 
 
-def rows_of(records: Mapping[str, Record], spp: int) -> list[Row]:
-    """Return a row for each contender: its time, error and cost of each seed."""
+def rows_of(
+    records: Mapping[str, Record], spp: int, relmse: Mapping[str, Sequence[float]]
+) -> list[Row]:
+    """Return a row for each contender: its time, and its error of each seed."""
     rows = []
-    for name, values in errors({name: record.images for name, record in records.items()}).items():
-        record = records[name]
+    for name, record in records.items():
         height, width, _ = record.images[0].shape
         rows.append({
             "contender": name,
@@ -209,7 +213,7 @@ def rows_of(records: Mapping[str, Record], spp: int) -> list[Row]:
             "spp": spp,
             "start": round(record.start, 3),
             "seconds": round(record.seconds, 4),
-            "relmse": [round(value, 7) for value in values],
+            "relmse": [round(value, 7) for value in relmse[name]],
             "mean": round(float(np.mean(record.images)), 6),
             "peak_mib": round(record.peak / 2**20),
         })  # fmt: skip
@@ -305,7 +309,8 @@ class Settings:
             "as_file": self.as_file,
             "runtime": device.choose().info.platform,
         }
-        return [{**about, **row} for row in rows_of(records, spp)]
+        relmse = errors({name: record.images for name, record in records.items()})
+        return [{**about, **row} for row in rows_of(records, spp, relmse)]
 
 
 @click.command(help=__doc__)
