@@ -138,7 +138,6 @@ log = logging.getLogger(__name__)
 
 BRUTE_LIMIT = 96  # triangles: brute force is faster up to here; see bench/notes/traversal.md
 
-UNKNOWN_CACHE = 32 << 20  # where a driver does not tell its size, as PoCL in some virtual machines
 WIDE8_BYTES = 54  # of a triangle with its share of nodes, in large scenes
 MOST = (2**31 - 1) // 3  # triangles or vertices: kernels count their words by an int
 _REACH = TREE_REACHES["reach"]
@@ -186,7 +185,7 @@ def choose_tree(device: Device) -> str:
 
 def outgrows_caches(device: Device, layout: str, n_triangles: int) -> bool:
     """Return whether incoherent rays wait for memory, so that interleaving pays."""
-    caches = device.info.cl_device.global_mem_cache_size or UNKNOWN_CACHE
+    caches = device.info.cl_device.global_mem_cache_size or 32 << 20  # PoCL may tell 0
     return device.info.is_cpu and layout == "wide8" and WIDE8_BYTES * n_triangles > caches
 
 
