@@ -15,6 +15,7 @@ import clpt
 from clpt import transforms as tf
 from clpt.render.flow import find as analysis
 from clpt.render.flow.scene_to_tables import lower
+from clpt.render.lights import openings
 from clpt.render.lights.openings import CLOSED, find
 from clpt.scene import Film, Scene, lights
 from clpt.scene import materials as m
@@ -178,3 +179,15 @@ def test_a_film_in_parts_is_the_same_film() -> None:
     assert parts.run(3)
     assert parts.run(5)
     assert np.array_equal(whole.image(), parts.image())
+
+
+def test_another_process_need_not_search(monkeypatch):
+    triangles = room().astype(np.float32)
+    first = openings._remembered(triangles, EYE + 0.01, None)
+    assert first.rectangles
+    monkeypatch.setattr(openings, "find", None)
+    again = openings._remembered(triangles, EYE + 0.01, None)
+    assert again.share == first.share
+    np.testing.assert_array_equal(again.words(), first.words())
+    with pytest.raises(TypeError):  # another eye has to search
+        openings._remembered(triangles, EYE + 0.02, None)
