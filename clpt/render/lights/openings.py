@@ -147,7 +147,8 @@ def _remembered(triangles: NDArray[np.float32], eye: Floats, view: View | None) 
         disk_cache.store(key, json.dumps((new.share, rows)), b"")
         return new
     share, rows = json.loads(stored[0])
-    return Openings(tuple(Rectangle(*map(np.array, row)) for row in rows), share) if rows else CLOSED
+    rectangles = tuple(Rectangle(*map(np.array, row)) for row in rows)
+    return Openings(rectangles, share) if rows else CLOSED
 
 
 def find(triangles: NDArray[np.floating], eye: Floats, view: View | None = None) -> Openings:
