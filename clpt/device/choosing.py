@@ -368,6 +368,9 @@ def remembered(names: Sequence[str], measured: Callable[[], list[float]]) -> lis
         except Exception as error:  # any exception of a broken driver
             log.debug("a trial failed: %s", error)
             return None
+        except BaseException:  # Ctrl-C says nothing about the driver
+            disk_cache.forget(key)
+            raise
         disk_cache.store(key, *stored)
     seconds: list[float] | None = json.loads(stored[0])
     return seconds

@@ -176,6 +176,12 @@ def holds(entry: str) -> bool:
     return (folder() / "programs" / entry).exists()
 
 
+def forget(entry: str) -> None:
+    """Remove what `store` has written."""
+    with suppress(OSError):
+        (folder() / "programs" / entry).unlink()
+
+
 def load(entry: str) -> tuple[str, bytes] | None:
     """Return the header and binary of `store`; None if they are missing or damaged.
 

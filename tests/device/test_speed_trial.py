@@ -106,3 +106,13 @@ def test_without_a_cache_there_is_no_trial(runtimes, tried, monkeypatch):
 def test_a_trial_takes_time(device):
     for seconds in choosing.measure_speed([(device.queue, device.lanes), (device.queue, 8)]):
         assert 0.0 < seconds < 60.0
+
+
+def test_a_trial_that_is_interrupted_is_made_again(cache_folder):
+    def interrupted() -> list[float]:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        choosing.remembered(["a driver"], interrupted)
+    assert choosing.remembered(["a driver"], lambda: [1.0, 2.0]) == [1.0, 2.0]
+    assert choosing.remembered(["a driver"], interrupted) == [1.0, 2.0]
