@@ -138,6 +138,7 @@ log = logging.getLogger(__name__)
 
 BRUTE_LIMIT = 96  # triangles: brute force is faster up to here; see bench/notes/traversal.md
 
+USUAL_CACHE = 32 << 20  # where a driver tells 0, as PoCL does in some virtual machines
 WIDE8_BYTES = 54  # of a triangle with its share of nodes, in large scenes
 MOST = (2**31 - 1) // 3  # triangles or vertices: kernels count their words by an int
 _REACH = TREE_REACHES["reach"]
@@ -185,7 +186,7 @@ def choose_tree(device: Device) -> str:
 
 def outgrows_caches(device: Device, layout: str, n_triangles: int) -> bool:
     """Return whether incoherent rays wait for memory, so that interleaving pays."""
-    caches = device.info.cl_device.global_mem_cache_size or 32 << 20  # PoCL may tell 0
+    caches = device.info.cl_device.global_mem_cache_size or USUAL_CACHE
     return device.info.is_cpu and layout == "wide8" and WIDE8_BYTES * n_triangles > caches
 
 

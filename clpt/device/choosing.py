@@ -33,6 +33,7 @@ log = logging.getLogger(__name__)
 ENVIRONMENT = "CLPT_DEVICE"
 GROUPS = ("all", "gpu")  # of devices, for `choose_all`
 _ORDER = ("gpu", "accelerator", "cpu")
+Run = Callable[[], object]  # runs a kernel and waits
 _CLOSE = 1.1  # over the least seconds of a trial: runtimes count as equally fast
 _TRIAL = "__kernel void trial(__global uint *out) { out[get_global_id(0)] = 7u; }"
 _opened: dict[tuple[int, DeviceInfo], Device] = {}  # by process and device
@@ -319,9 +320,7 @@ def measure_speed(runtimes: Sequence[tuple[cl.CommandQueue, int]]) -> list[float
 
 
 def least_seconds(
-    runs: Sequence[Callable[[], object]],
-    rounds: int,
-    clock: Callable[[], float] = time.perf_counter,
+    runs: Sequence[Run], rounds: int, clock: Callable[[], float] = time.perf_counter
 ) -> list[float]:
     """Return the least time of each of some runs, which take turns [s]; the first may compile."""
     least = [math.inf] * len(runs)
@@ -335,7 +334,7 @@ def least_seconds(
     return least
 
 
-def _trial(queue: cl.CommandQueue, lanes: int) -> Callable[[], object]:
+def _trial(queue: cl.CommandQueue, lanes: int) -> Run:
     """Return a run of the trial kernel."""
     source, context = _source(lanes), queue.context
     options = ("-cl-std=CL1.2", "-w")

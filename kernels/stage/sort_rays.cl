@@ -10,7 +10,7 @@ inline uint ray_cell(float from_center, float radius)
     return clamp((int)((from_center * 1.7320508f / radius + 1.0f) * (0.5f * RAY_CELLS)), 0, RAY_CELLS - 1);
 }
 
-/* The key of a slot; the last key is for slots without a ray, RAY_KEYS for what is no slot. */
+/* The key of a slot. A slot without a ray has the last key; a number beyond the slots has RAY_KEYS. */
 inline uint ray_key(Slab path, global const Settings *settings, uint slot, uint slots)
 {
     if (slot >= slots) return RAY_KEYS;

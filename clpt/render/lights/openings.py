@@ -136,7 +136,7 @@ def _openings(index: SceneIndex, geometry: Geometry, eye: Floats, view: View | N
 
 
 def _remembered(triangles: NDArray[np.float32], eye: Floats, view: View | None) -> Openings:
-    """Return what `find` does, of an earlier process if it was asked the same."""
+    """Return the result of `find`; read it from the disk if a process has stored it."""
     texts = [Path(file).read_bytes() for file in (__file__, casting.__file__)]
     asked = repr((eye.tolist(), view and (view.axis.tolist(), view.angle))).encode()
     key = hashlib.sha256(b"".join([*texts, asked, triangles.tobytes()])).hexdigest()

@@ -308,7 +308,7 @@ class BounceLoop:
                 self.timings.add(step.name, event)
 
     def _try_sorting(self) -> None:
-        """Run a bounce, in which a trial says whether rays are sorted from now on.
+        """Run a bounce with a trial, which decides whether later bounces sort their rays.
 
         The trial finds the same hits of the same rays again and again.
         """

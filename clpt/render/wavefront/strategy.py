@@ -6,7 +6,6 @@ expectation, and queues and the loop do not change a bit of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from clpt import bvh, device
@@ -19,7 +18,7 @@ BRUTE_SHAPES = 32  # the most analytic shapes that a ray tests without a tree
 INTERLEAVED_TRIANGLES = 1 << 20  # least number for interleaved rays: bench/notes/traversal.md
 INTERLEAVED_PIECES = 1 << 14  # of curves; see bench/notes/traversal.md
 FEW_OTHERS = 64  # the most other analytic shapes beside curves, which all lanes test
-SORTED_GAIN = 1.05  # least gain in a trial for which rays are sorted
+SORTED_GAIN = 1.05  # rays are sorted if a trial gains at least this
 SORTED_ROUNDS = 4  # of that trial
 SHARE = 512  # slots of a work-item of the loop on a CPU, which fit into the second cache of a core
 
@@ -105,7 +104,7 @@ def _sorted(on: device.Device, layout: str, wanted: bool | None) -> bool | None:
 
 
 def sorting_pays(
-    on: device.Device, names: list[str], plain: Callable[[], object], sorts: Callable[[], object]
+    on: device.Device, names: list[str], plain: choosing.Run, sorts: choosing.Run
 ) -> bool:
     """Return whether it is faster to sort rays; a trial says so once for a device.
 
