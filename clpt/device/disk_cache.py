@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import json
 import logging
 import os
 import re
@@ -17,9 +18,10 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import platformdirs
 
@@ -201,6 +203,20 @@ def load(entry: str) -> tuple[str, bytes] | None:
         return None
     header, _, binary = content.partition(b"\n")
     return header.decode(), binary
+
+
+def remembered(texts: Iterable[bytes], make: Callable[[], Any]) -> Any:
+    """Return a value of JSON; read it if a process has stored it.
+
+    texts: all that the value depends on; make: returns it anew.
+    """
+    entry = hashlib.sha256(b"\0".join(texts)).hexdigest()
+    stored = load(entry)
+    if stored is not None:
+        return json.loads(stored[0])
+    value = make()
+    store(entry, json.dumps(value), b"")
+    return value
 
 
 @contextmanager

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from clpt.records.layout import Constants, Record, bits
 
+REUSE_GROUP = 8  # slots whose paths share vertices, see kernels/transport/reuse.cl
+
 PATH = Record(
     "Path",
     "State of one light path; stays in its slot.",
@@ -76,6 +78,19 @@ PATH = Record(
         "cone around the ray, see kernels/textures/cone.cl; of a scene with mip levels",
     ),
     slope=("real", "d ln n / d ln lambda of the index n at the ray, where time is that of pulses"),
+    reuse=("integer", "what the path shares with its group, see kernels/transport/reuse.cl"),
+    reuse_n=("natural", "geometric normal at its first vertex, see kernels/core/warp.cl"),
+    reuse_ns=("natural", "shading normal there"),
+    reuse_x=("vec3", "that vertex, off its surface [m]"),
+    reuse_beta=("spectrum", "throughput behind it"),
+    reuse_before=("spectrum", "radiance gathered before the second vertex"),
+    reuse_y=("vec3", "the second vertex, off its surface [m]"),
+    reuse_yn=("natural", "geometric normal there, toward the first"),
+    reuse_yns=("natural", "shading normal there"),
+    **{
+        f"reuse_density{k}": ("real", "with which it would have found y of its group [1/m^2]")
+        for k in range(REUSE_GROUP)
+    },
 )
 
 HIT = Record(

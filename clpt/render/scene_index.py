@@ -224,6 +224,24 @@ class SceneIndex:
         return self.integrator.guiding and not self.weighed and self.lights_reach
 
     @property
+    def reused(self) -> bool:
+        """Whether pixels close to each other may share second vertices of their paths.
+
+        They do not where wavelengths part, which the features of the scene tell.
+        """
+        return self.integrator.reuse and self.can_reuse and not self.weighed
+
+    @property
+    def can_reuse(self) -> bool:
+        """Whether nothing tells apart the paths of pixels: no medium, time, or group of light.
+
+        All pixels have as many samples then.
+        """
+        depth = self.integrator.max_depth
+        apart = self.motions or self.has_insides or self.shifts or self.shared
+        return not (apart or self.light_layers or self.adaptive or 0 <= depth < 3)
+
+    @property
     def shifts(self) -> bool:
         """Whether some material fluoresces."""
         return self.spectral and any(cls.fluoresces for cls in self.leaves)

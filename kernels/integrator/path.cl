@@ -23,6 +23,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #if BSDF_ABSORBS /* as most surfaces of lights do */
     next = next & (spectrum_max(bsdf_albedo(scatter.bsdf)) > 0.0f);
 #endif
+    reuse_second(scene, path, at, met, &v, scatter);
     MisRatio mis_ratio = mis_ratio_of_camera_path(scene, path, at, v, sampler);
     merge_at_vertex(scene, path, at, met, &v, &scatter, mis_ratio, ratio SHADE_PASSED);
     Guided guided = guide_at(scene, v.s, v.d MERGE_PASSED);
@@ -49,6 +50,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     mask on = path_roulette(scene, path, at, next, null, v, scatter, guided, eta, &beta);
 
     vertex_leave(path, at, on, null, v, onward, beta);
+    reuse_first(scene, path, at, on, v, scatter, onward);
     store_path_cone(path, at, on, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
     path_scatters(scene, path, at, on, null, &v, scatter, mis_ratio, bs, onward);
     store_path_eta(path, at, on, eta);

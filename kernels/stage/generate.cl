@@ -25,6 +25,7 @@
 #include "generated/scouts_begin.cl"
 #include "generated/row_delay.cl"
 #include "generated/optical_length.cl"
+#include "generated/reuse.cl"
 
 /* The beginning of a sample. */
 typedef struct {
@@ -42,7 +43,7 @@ inline SampleBegin sample_begin(Scene scene, Slab path, uint at, mask go, intege
     vec2 pixel = pixel_of_index(settings, pixel_index);
     Sampler sampler = pixel_sampler(settings, pixel_key(settings, pixel_index), sample);
     vec2 offset = exposure_begin(scene, path, at, go, sampler);
-    vec2 u = sampler_pair(sampler, (natural)(DIMENSION_WAVELENGTH));
+    vec2 u = sampler_pair(reuse_sampler(scene, path, at, sampler, sample), (natural)(DIMENSION_WAVELENGTH));
     SampleBegin b;
     b.position = film_position(settings, pixel, offset);
     b.time = motion_time(scene, merging_moment(scene, u.x, u.y, sample)) + row_delay(scene, b.position);
@@ -59,7 +60,7 @@ inline SampleBegin sample_begin(Scene scene, Slab path, uint at, mask go, intege
 inline void add_sample(Scene scene, Slab path, uint at, BEGIN_ARGS, PathEnd end, integer part, integer pixel_index,
                        integer sample)
 {
-    Spectrum radiance = sky_gather(scene, path, at, end);
+    Spectrum radiance = reuse_gather(path, at, end.ended, sky_gather(scene, path, at, end));
     Wavelengths lambdas = load_path_lambdas(path, at);
     sky_layers(scene, path, at, end, lambdas LIGHT_LAYER_PASSED);
     lambdas = seen_wavelengths(scene, path, at, lambdas);
@@ -111,6 +112,7 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_escape_width(path, at, go, (real)(0.0f));
     store_path_bodies(path, at, go, (integer)(settings->camera_bodies));
     store_path_ratio(path, at, go, camera_start());
+    store_path_reuse(path, at, go, (integer)(0));
     length_begin(scene, path, at, go, b.ray.far);
 }
 
@@ -118,7 +120,7 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
 {
     STAGE_BEGIN
     scene.time = load_path_time(path, at);
-    PathEnd end = path_end(path, hit, at);
+    PathEnd end = reuse_end(path_end(path, hit, at));
     if (sky_due(end)) {
         integer slot = LANE_INDEX + (int)at;
         integer pixel_index = load_path_pixel_index(path, at), sample = load_path_sample(path, at);

@@ -5,6 +5,7 @@
 #include "shapes/shape.cl"
 #include "shapes/surface.cl#flags"
 #include "generated/trace.cl"
+#include "generated/reuse_meets.cl"
 
 STAGE(intersect)(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS STAGE_AT_ARG)
 {
@@ -14,6 +15,7 @@ STAGE(intersect)(SLAB_ARGS, SCENE_ARGS, TRACE_ARGS STAGE_AT_ARG)
     if (any(active)) {
         scene.time = load_path_time(path, at);
         vec3 o = load_path_o(path, at), d = load_path_d(path, at);
+        reuse_meets(path, at, active, state, o);
         /* at depth 0 Path.pdf is minus the range of the camera ray */
         real far = sel((state & PATH_DEPTH) == 0, -load_path_pdf(path, at), (real)(FAR));
         TraceHit h = trace_closest(TRACE_PASSED, scene, o, d, far, active);

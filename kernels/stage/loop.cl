@@ -12,6 +12,12 @@
 #include "transport/queue.cl"
 #include "generated/bounce_stages.cl"
 
+/* Whether a slot waits for a stage that takes single slots: to ask is cheaper than to call the stage. */
+inline uint slot_word(Slab s, uint word, uint slot) { return as_uint(*slab_at(s, word, slot)); }
+inline int slot_flies(Slab path, uint slot) { return (slot_word(path, PATH_STATE_WORD, slot) & PATH_ALIVE) != 0; }
+inline int slot_joins(Slab shadow, uint slot) { return as_float(slot_word(shadow, SHADOW_T_WORD, slot)) > 0.0f; }
+#include "generated/reuse_due.cl"
+
 /* A bounce of the paths of a work-item: the slots from `first` to `end` go through all stages but the beginning of
  * paths. Each verb `bounce_...` takes slots through a stage for the kind of paths, and does nothing where no path of
  * the scene has that stage. Before they are shaded, the slots are sorted by material, so that a block of LANES slots
@@ -51,6 +57,7 @@ inline void bounce_paths(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, uint which, global ui
         }
     }
     bounce_join(first, end); /* to lights or, paths from lights, to the camera */
+    bounce_reuse(first, end); /* paths share their second vertices */
 }
 
 kernel NO_VECTORIZE void loop(SLAB_ARGS, SCENE_ARGS, LOOP_ARGS, global uint *queue, uint share, uint begin,

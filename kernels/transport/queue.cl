@@ -4,6 +4,7 @@
 /* Step. */
 #include "transport/queue.cl#waiting"
 #include "generated/block.cl"
+#include "generated/slab_words.cl"
 
 /* Sorts the slots from `first` to `end` by a counting sort: slots of kind k go to queue[starts[k]] up to, but without,
  * queue[starts[k + 1]], in ascending order. Queue entries from `first` to `end` belong to this work-item. */
@@ -43,7 +44,7 @@ called void queue_take(Slab path, Slab hit, Slab shadow, constant BlockWords *wo
     integer slots = gather_i(queue, min_i(LANE_INDEX + (int)entry, (integer)((int)end - 1)));
     for (uint i = 0; i < words->path; i++) slab_gather(path, words->path_words[i], slots, block);
     for (uint i = 0; i < words->hit; i++) slab_gather(hit, words->hit_words[i], slots, block);
-    slab_gather(shadow, SHADOW_T, slots, block);
+    slab_gather(shadow, SHADOW_T_WORD, slots, block);
 #if USES_LAYERS || LIGHT_LAYERS /* shading adds to pixels, so copies of the last path are inactive */
     store_path_state(path, block, LANE_INDEX + (int)entry >= (int)end, (integer)(0));
 #endif

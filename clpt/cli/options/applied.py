@@ -20,6 +20,7 @@ PARAMETERS = {  # of integrators, with their names in messages
     "light_paths": "light paths beside it",
     "radius": "photons",
     "guiding": "guiding",
+    "reuse": "path reuse",
 }
 
 

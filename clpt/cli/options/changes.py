@@ -78,11 +78,12 @@ class Transport:
     light_paths: float | str | None = None
     radius: float | None = None
     guiding: bool | None = None
+    reuse: bool | None = None
 
     @property
     def implied(self) -> str:
         """The kind in the place of "auto": a number of light paths, or a radius, is a choice."""
-        of_path = self.light_paths is not None or self.guiding is not None
+        of_path = any(x is not None for x in (self.light_paths, self.guiding, self.reuse))
         return "vcm" if self.radius is not None else "path" if of_path else "auto"
 
 

@@ -99,7 +99,7 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "Samples": ("spp", "noise", "limit", "numbers", "sampler", "seed", "period", "resume"),
     "Camera and picture": ("camera", "size", "crop", "env", "env_rotation"),
     "Light transport": (
-        "mode", "kinds", "integrator", "max_depth", "light_paths", "guiding", "radius",
+        "mode", "kinds", "integrator", "max_depth", "light_paths", "guiding", "reuse", "radius",
         "lambda_min", "lambda_max", "bands", "time_bins", "time_min", "time_max",
     ),
     "Colour": (

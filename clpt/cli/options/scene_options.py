@@ -284,6 +284,10 @@ _OPTIONS = (
         help="Of path: learn first where light comes from, for rooms that are lit through a door.",
     ),
     click.option(
+        "--reuse", is_flag=True, default=None,
+        help="Of path: pixels close to each other share what their paths find, for diffuse rooms.",
+    ),
+    click.option(
         "--radius", type=click.FloatRange(0.0),
         help="Of vcm: where photons are gathered in the first pass [m]; 0: as suits the picture.",
     ),

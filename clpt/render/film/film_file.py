@@ -312,14 +312,17 @@ class Origin:
     @property
     def chosen_integrator(self) -> Integrator | None:
         """The integrator, without its depths, that `auto` may have chosen; else None."""
-        names = ("integrator", "light_paths", "guide_paths")
-        kind, paths, guide = (self.settings.get(f"chosen.{name}") for name in names)
+        names = ("integrator", "light_paths", "guide_paths", "reuse")
+        kind, paths, guide, reuse = (self.settings.get(f"chosen.{name}") for name in names)
         if kind == Vcm.kind:
             return Vcm(light_paths=int(paths or 1))
         if kind == integrators.Path.kind:
             count = int(guide or 0)
             return integrators.Path(
-                light_paths=float(paths or 0), guiding=count > 0, guide_paths=count
+                light_paths=float(paths or 0),
+                guiding=count > 0,
+                guide_paths=count,
+                reuse=bool(reuse),
             )
         return None
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-from clpt.records import HIT, SHADOW, SLABS
+from clpt.records import HIT, REUSE_GROUP, SHADOW, SLABS
 from clpt.render.records import Features
 
 ESCAPE = ("escape", "escape_axis", "escape_width", "escape_plane", "escape_depth")
+REUSE = ("reuse", "reuse_n", "reuse_ns", "reuse_y", "reuse_yn", "reuse_yns")
 CHANGED = (
     "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "sampled_wo",
     "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "length", "slope", "medium",
     "around", "bodies", "ray_offset", "mis_ratio", "merge_ratio", "expected", *ESCAPE, "state",
-    "cone",
+    "cone", *REUSE,
 )  # fmt: skip
 READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and not written
 # optional members, each with the features that need it
@@ -32,11 +33,14 @@ NEEDED: dict[str, Callable[[Features], bool]] = {
     "ray_offset": lambda f: f.media.absorbing,
     "through": lambda f: f.shadow_media,
     "into": lambda f: f.lights.volumes,
+    # kernels take these words by their number
+    **dict.fromkeys((f"reuse_density{k}" for k in range(REUSE_GROUP)), lambda _: False),
     "mis_ratio": lambda f: f.transport.balanced,
     "merge_ratio": lambda f: f.transport.merged,
     "expected": lambda f: f.transport.guided,
     **dict.fromkeys(ESCAPE, lambda f: f.media.escapes),
     "cone": lambda f: f.textures.mips,
+    **dict.fromkeys((*REUSE, "reuse_x", "reuse_beta", "reuse_before"), lambda f: f.film.reuse),
     "weight": lambda f: f.transport.light_paths or _has_layers(f),
     "light": lambda f: f.transport.balanced,
     "time": lambda f: f.motion.present,
@@ -95,8 +99,7 @@ def blocks_text(kinds: Sequence[Features]) -> str:
     """
     counted = "".join(f"    uint {name};\n" for name in ("path", "changed", "hit", "shadow"))
     arrays = "".join(f"    uchar {r.name.lower()}_words[{r.words}];\n" for r in SLABS)
-    t = next(m.word for m in SHADOW.members if m.name == "t")
-    rows = [f"typedef struct {{\n{counted}{arrays}}} BlockWords;", f"#define SHADOW_T {t}"]
+    rows = [f"typedef struct {{\n{counted}{arrays}}} BlockWords;"]
     values = []
     for features in kinds:
         kept = members(features)

@@ -11,7 +11,18 @@ from clpt.render.records.dispatch import function
 from clpt.scene.scatterer import Scatterer
 
 # steps of a bounce, in order
-VERBS = ("begin", "show", "intersect", "flight", "deposit", "train", "mix", "shade", "join")
+VERBS = (
+    "begin", "show", "intersect", "flight", "deposit", "train", "mix", "shade", "join", "reuse",
+)  # fmt: skip
+
+
+# whether a stage of a single slot has work there, which is cheaper to ask than to call it
+ASKED = {
+    "intersect": "if (slot_flies(path, slot)) ",
+    "shadow": "if (slot_joins(shadow, slot)) ",
+    "splat": "if (slot_joins(shadow, slot)) ",
+    "reuse": "if (slot_reuses(path, hit, slot)) ",
+}
 
 
 @dataclass(frozen=True)
@@ -53,6 +64,8 @@ def _order(features: Features, layout: str, lanes: int, interleaved: bool) -> It
         yield Stage("shade", f"shade_{kind}", "shade", lanes)
     if joins(features) and any(not cls.delta for cls in features.materials.leaves):
         yield Stage("join", join, join, joining)
+    if features.film.reuse and lanes > 1:
+        yield Stage("reuse", "reuse", "reuse", tracing)
 
 
 def begin_and_join(features: Features) -> tuple[str, str]:
@@ -140,7 +153,8 @@ class _Call:
     def through(self) -> str:
         """The statement that calls it for the slots from `first` to `end`."""
         step = "LANES" if self.stage.lanes > 1 else "1"
-        return f"for (uint slot = first; slot < end; slot += {step}) {self.text}"
+        asked = ASKED.get(self.stage.kernel, "") if self.stage.lanes == 1 else ""
+        return f"for (uint slot = first; slot < end; slot += {step}) {asked}{self.text}"
 
 
 def stages_text(features: Features, layout: str, lanes: int, interleaved: bool) -> str:
@@ -181,6 +195,7 @@ def _call(features: Features, paths: Features, layout: str, stage: Stage) -> _Ca
         begin: flags.begin_args(paths),
         "intersect": flags.trace_args(paths, layout),
         "flight": flags.flight_args(paths),
+        "reuse": flags.trace_args(paths, layout),
         "gather_along": flags.gather_args(paths),
         "deposit": flags.deposit_args(paths),
         "train": flags.deposit_args(paths),

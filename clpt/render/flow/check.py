@@ -98,6 +98,11 @@ def warnings_of(index: SceneIndex) -> list[str]:
         warnings += _left_to_the_camera(index)
     if integrator.guiding and not index.lights_reach:
         warnings.append(f"{integrator.kind}.guiding: left aside, as {index.lit_media}")
+    if integrator.reuse and not index.can_reuse:
+        warnings.append(
+            f"{integrator.kind}.reuse: left aside, because of motion, media, fluorescence, "
+            "layers of light, a limit of noise, or a max_depth below 3"
+        )
     depth, most = integrator.max_depth, light_caches.DEEPEST if index.merged else DEEPEST
     if depth > most:
         warnings.append(f"integrator.max_depth: {depth} counts as {most}, the longest path")

@@ -52,6 +52,9 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
     "generated/train_steps.cl": lambda f, _: either(
         f.media.present, "transport/guiding/guide.cl#collisions"
     ),
+    "generated/reuse_meets.cl": lambda f, _: either(f.film.reuse, "transport/reuse.cl#meets"),
+    "generated/reuse.cl": lambda f, _: either(f.film.reuse, "transport/reuse.cl#end"),
+    "generated/reuse_due.cl": lambda f, _: either(f.film.reuse, "transport/reuse.cl#due"),
     "generated/cone.cl": lambda f, _: either(f.textures.mips, "textures/cone.cl"),
     "generated/vertex_media.cl": lambda f, _: (
         when(f.media.bodies, "media/bodies.cl#vertex")
@@ -324,6 +327,7 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         *when(_merges(f, cls), "generated/photon.cl", "transport/photons/gather.cl"),
         *either(_merges(f, cls), "integrator/steps/merge.cl"),
         *either(f.lights.kinds and not cls.delta, "integrator/steps/next_event.cl"),
+        *either(f.film.reuse and not flags.is_null(f, cls), "transport/reuse.cl#vertex"),
         *either(not flags.is_null(f, cls), "integrator/steps/roulette.cl#path"),
         *either(not flags.is_null(f, cls), "integrator/steps/scatters.cl"),
         _escapes(f, cls),

@@ -14,7 +14,16 @@ from __future__ import annotations
 from collections.abc import Callable, Container
 
 from clpt import device
-from clpt.records import INSTANCE, LAYER_SETTINGS, LIGHT, SETTINGS, SHAPE, SLABS, TABLES
+from clpt.records import (
+    INSTANCE,
+    LAYER_SETTINGS,
+    LIGHT,
+    REUSE_GROUP,
+    SETTINGS,
+    SHAPE,
+    SLABS,
+    TABLES,
+)
 from clpt.render.flow import blocks
 from clpt.render.records import Features
 from clpt.render.records.macros import macros_of
@@ -110,6 +119,8 @@ def between_bodies(features: Features, cls: type[Scatterer]) -> bool:
 
 BETWEEN_BODIES = ("dielectric", "rough_dielectric")  # kinds with an outer index of refraction
 
+REUSED = "diffuse"  # the kind on which paths share vertices, see kernels/transport/reuse.cl
+
 # name: its value, of the features and the kind that a program shades
 MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
     "BSDF_KIND": lambda f, cls: f.materials.leaves.index(cls),
@@ -127,6 +138,7 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
     "BSDF_IS_PHASE": lambda f, cls: cls.is_phase,
     "BSDF_IS_NULL": is_null,
     "BSDF_IS_PANE": lambda f, cls: cls.is_pane and f.materials.free_panes,
+    "BSDF_REUSED": lambda f, cls: int(f.film.reuse and cls.kind == REUSED),
     "STOCHASTIC_FILTERING": filters_at_random,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or not f.lights.few,
 }
@@ -183,11 +195,25 @@ def virtual_files(features: Features, layout: str) -> dict[str, str]:
         "flight": (flight_args(features), True),
         "gather": (gather_args(features), True),
     }
-    files = {"generated/scene.cl": scene_text(blocks.unused(features), features)}
+    files = {
+        "generated/scene.cl": scene_text(blocks.unused(features), features),
+        "generated/slab_words.cl": slab_words_text(),
+    }
     for name, (args, behind) in groups.items():
         rows = args_text(name.upper(), args, behind)
         files[f"generated/{name}_args.cl"] = "\n".join([*rows, ""])
     return files
+
+
+def slab_words_text() -> str:
+    """Return `RECORD_MEMBER_WORD`, the first word of each member of the slabs, and REUSE_GROUP."""
+    rows = [f"#define REUSE_GROUP {REUSE_GROUP}"]
+    rows += [
+        f"#define {record.name.upper()}_{member.name.upper()}_WORD {member.word}"
+        for record in SLABS
+        for member in record.members
+    ]
+    return "\n".join([*rows, ""])
 
 
 def scene_text(unused: Container[str] = (), features: Features | None = None) -> str:

@@ -13,6 +13,7 @@ import functools
 import re
 
 from clpt import bvh, device
+from clpt.device.source import TWIN
 from clpt.errors import SceneError, UnknownKindError
 from clpt.records.layout import SLAB_BLOCK
 from clpt.render.flow import blocks, bounce, choices, flags, stages, vertices
@@ -36,6 +37,10 @@ _ALONE: device.Virtual = {
     **bvh.ALONE,
     "core/spectrum.cl#at_once": ("core/spectrum.cl#in_turn",),
     "core/grid.cl#texels_at_once": ("core/grid.cl#texels_in_turn",),
+    **{
+        f"transport/reuse.cl#{step}": (f"transport/reuse.cl#{step}{TWIN}",)
+        for step in ("vertex", "end")
+    },
     "materials/film_stack.cl#at_once": ("materials/film_stack.cl#in_turn",),
 }
 # The fewest registers of a work-item of a GPU, by program, as limits that are tried by
@@ -123,6 +128,8 @@ def _stages(
     }
     if bounce.joins(features):
         texts[join] = make(join, joins, in_queue if join == "shadow" else defines, join_lanes)
+    if features.film.reuse and lanes > 1:
+        texts["reuse"] = make("reuse", files, defines, trace_lanes)
     if bounce.deposits(features):
         texts["deposit"] = make("deposit", files, defines, lanes)
     if bounce.trains(features):

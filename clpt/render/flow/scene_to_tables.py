@@ -178,7 +178,7 @@ def encode(analysis: Analysis, cache: LoweringCache, texture_budget: int | None 
     motion_row = tables.append_motion()
     names, layers = lower_names(index, geometry, tables.lights, encoder.store, cache)
     features = tables.features(motion_row, layers)
-    settings = tables.settings(layers, features.dispersion)
+    settings = tables.settings(layers, features)
     cache.settle()
     arrays = encoder.store.arrays()
     encoder.textures.images.joined(arrays["images"])
@@ -267,6 +267,7 @@ class _Tables:
                 layers=layers,
                 bands=bool(index.film.bands),
                 alpha=index.film.alpha,
+                reuse=index.reused,
             ),
             transport=self._transport_features(aimed=bool(index.balanced) and aimed),
             lights=self.lights.features(
@@ -279,6 +280,8 @@ class _Tables:
             spectra=SpectraFeatures(index.mode, spectra.samples, spectra.step, self.tabulated),
             materials=self.materials.features(index),
         )
+        if own.ratios:  # wavelengths part, so that paths differ in them
+            own = replace(own, film=replace(own.film, reuse=False))
         return usual.widened(own) if index.shared else own
 
     def _transport_features(self, *, aimed: bool) -> TransportFeatures:
@@ -297,11 +300,11 @@ class _Tables:
             light_filter=(*index.spread, self.profile) if weighed else (0, 0, 0),
         )
 
-    def settings(self, layers: LayerFeatures, disperses: bool) -> NDArray[np.void]:
-        """Return the record SETTINGS of the scene; disperses: whether wavelengths part."""
+    def settings(self, layers: LayerFeatures, features: Features) -> NDArray[np.void]:
+        """Return the record SETTINGS of the scene."""
         settings = settings_of(
             self.index, self.geometry, self.lights, self.wavelengths, self.analysis.sphere,
-            layers, disperses,
+            layers, features,
         )  # fmt: skip
         settings["aims"], settings["aim_count"] = self.aims, len(self.analysis.aims)
         settings["openings"] = self.openings

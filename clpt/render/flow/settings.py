@@ -11,7 +11,7 @@ from clpt.records import SETTINGS
 from clpt.render.film.colour import film_scale, output_matrix
 from clpt.render.geometry.find import Geometry
 from clpt.render.lights.encode import LightRows, light_level
-from clpt.render.records import LayerFeatures
+from clpt.render.records import Features, LayerFeatures
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.find import Density
 from clpt.render.transport import light_caches
@@ -21,6 +21,7 @@ from clpt.spectra.cie import tanh_ends
 
 LARGEST = 62  # exponent of 4 of a unit of areas, which is float32
 ORDINARY_SIZE = 10  # exponent of 2 of the radius of a scene [m], up and down
+SQUARE = 8  # pixels of a side, in which paths have groups, see kernels/transport/reuse.cl
 MOST_SAMPLE_BITS = 16  # of a zsobol pixel's part of its sequence
 
 
@@ -31,19 +32,18 @@ def settings_of(
     density: Density,
     sphere: tuple[NDArray[np.float64], float],
     layers: LayerFeatures,
-    disperses: bool,
+    features: Features,
 ) -> NDArray[np.void]:
     """Return the record SETTINGS of a scene, without indices of tables.
 
     The wavefront adds settings of the device. density: of wavelengths; sphere: centre and radius of
-    a sphere around the scene [m]; layers: of the film; disperses: whether directions depend on
-    wavelengths.
+    a sphere around the scene [m]; layers: of the film.
     """
     settings = np.zeros((), SETTINGS.dtype)
-    _set_film(settings, index)
+    _set_film(settings, index, features.film.reuse)
     _set_paths(settings, index)
     if index.merged:
-        _set_photons(settings, index, geometry, sphere[1], disperses)
+        _set_photons(settings, index, geometry, sphere[1], features.dispersion)
     if index.guided:
         paths = settings["guide_paths"] = index.integrator.guide_paths or light_caches.GUIDE_PATHS
         settings["photon_cells"], side = light_caches.guide_cells_for(paths)
@@ -65,19 +65,27 @@ def settings_of(
     return settings
 
 
-def _set_film(settings: NDArray[np.void], index: SceneIndex) -> None:
+def _set_film(settings: NDArray[np.void], index: SceneIndex, shares: bool) -> None:
     """Write the size of the film, and which of its pixels and wavelengths are rendered."""
     film = index.film
     width, height = film.size
     settings["width"], settings["height"] = width, height
     settings["crop_x"], settings["crop_y"] = (0, 0) if film.crop is None else film.crop[:2]
     settings["film_width"], settings["film_height"] = film.width, film.height
-    margin = settings["margin"] = 0 if index.light_paths else index.filter_reach
+    margin = settings["margin"] = 0 if index.light_paths else _margin(index, shares)
     settings["tiles_x"] = -(-(width + 2 * margin) // 4)
     settings["padded_pixels"] = 16 * settings["tiles_x"] * -(-(height + 2 * margin) // 4)
     settings["alpha"] = index.film.alpha
     settings["lambda_min"], settings["lambda_max"] = film.lambda_min, film.lambda_max
     settings["bands"] = film.bands
+
+
+def _margin(index: SceneIndex, shares: bool) -> int:
+    """Return how far samples go beyond the picture: to whole squares where paths have groups.
+
+    Every crop of a film has the same: the numbers of a pixel depend on it.
+    """
+    return index.filter_reach + (SQUARE - 1) * shares
 
 
 def _set_paths(settings: NDArray[np.void], index: SceneIndex) -> None:

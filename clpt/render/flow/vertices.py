@@ -106,8 +106,9 @@ def common_part_text(functions: Sequence[Common]) -> str:
     return "\n".join([*rows, ""])
 
 
+# kinds of a vertex may differ in these flags
 RUN_TIME = ("BSDF_KIND", "BSDF_TRANSMITS", "BSDF_SHINES", "BSDF_ABSORBS", "USES_CHOICE",
-            "STOCHASTIC_FILTERING")  # kinds of a vertex may differ in these flags  # fmt: skip
+            "STOCHASTIC_FILTERING", "BSDF_REUSED")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -177,7 +178,7 @@ def defines(features: Features, vertex: Vertex) -> flags.Defines:
     values = {**each[0], "SHADES_SEVERAL": 1, "BSDF_KIND": "scene.kind", "BSDF_ABSORBS": 0}
     for name in ("BSDF_SHINES", "STOCHASTIC_FILTERING"):
         values[name] = max(material[name] for material in each)
-    for name in ("BSDF_TRANSMITS", "USES_CHOICE"):
+    for name in ("BSDF_TRANSMITS", "USES_CHOICE", "BSDF_REUSED"):
         bits = sum(1 << k for k, material in zip(vertex.kinds, each, strict=True) if material[name])
         every = sum(1 << kind for kind in vertex.kinds)
         values[name] = int(bits > 0) if bits in (0, every) else f"((0x{bits:x} >> scene.kind) & 1)"

@@ -9,12 +9,11 @@ so no light is lost where an opening was overlooked.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,18 +136,19 @@ def _openings(index: SceneIndex, geometry: Geometry, eye: Floats, view: View | N
 
 def _remembered(triangles: NDArray[np.float32], eye: Floats, view: View | None) -> Openings:
     """Return the result of `find`; read it from the disk if a process has stored it."""
-    texts = [Path(file).read_bytes() for file in (__file__, casting.__file__)]
+    sources = [Path(file).read_bytes() for file in (__file__, casting.__file__)]
     asked = repr((eye.tolist(), view and (view.axis.tolist(), view.angle))).encode()
-    key = hashlib.sha256(b"".join([*texts, asked, triangles.tobytes()])).hexdigest()
-    stored = disk_cache.load(key)
-    if stored is None:
+
+    def rectangles() -> Any:
         new = find(triangles, eye, view)
-        rows = [(each.center.tolist(), each.x.tolist(), each.y.tolist()) for each in new.rectangles]
-        disk_cache.store(key, json.dumps((new.share, rows)), b"")
-        return new
-    share, rows = json.loads(stored[0])
-    rectangles = tuple(Rectangle(*map(np.array, row)) for row in rows)
-    return Openings(rectangles, share) if rows else CLOSED
+        return new.share, [
+            (each.center.tolist(), each.x.tolist(), each.y.tolist()) for each in new.rectangles
+        ]
+
+    share, rows = disk_cache.remembered([*sources, asked, triangles.tobytes()], rectangles)
+    return (
+        Openings(tuple(Rectangle(*map(np.array, row)) for row in rows), share) if rows else CLOSED
+    )
 
 
 def find(triangles: NDArray[np.floating], eye: Floats, view: View | None = None) -> Openings:

@@ -46,7 +46,9 @@ log = logging.getLogger("clpt.render.renderer")  # which the documentation names
 
 MOST_SPARE = 2  # replaced wavefronts that are kept
 TEXTURE_SHARE = 0.5  # of a device's free memory, for bitmaps
-WAY = tuple(f"chosen.{name}" for name in ("integrator", "light_paths", "guide_paths", "splatting"))
+WAY = tuple(
+    f"chosen.{name}" for name in ("integrator", "light_paths", "guide_paths", "reuse", "splatting")
+)
 TO_OUTPUT = ("to_first", "to_second", "to_third")
 
 Value = TypeVar("Value")
@@ -287,6 +289,7 @@ class DeviceFilm:
             "chosen.integrator": lowered.integrator.kind,
             "chosen.light_paths": float(lowered.settings["light_paths"]),
             "chosen.guide_paths": int(lowered.settings["guide_paths"]),
+            "chosen.reuse": lowered.integrator.reuse,
             "chosen.splatting": features.film.filter.reach > 0,
             "chosen.texels": int(lowered.tables["texels"].size),
             "halves": first.film.halves == 2,

@@ -151,6 +151,7 @@ class FilmFeatures:
     first_word: int = 0  # the first of a pixel's words that paths add to
     bands: bool = flag("USES_BANDS")  # a spectral film
     alpha: bool = flag("USES_ALPHA")  # a film with coverage
+    reuse: bool = False  # its pixels share second vertices of paths
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from clpt.render.lights.find import Sources, environment_of
 from clpt.render.records.tables import LoweringCache
 from clpt.render.scene_index import SceneIndex
 from clpt.render.spectra.find import Look
-from clpt.render.transport import light_caches
+from clpt.render.transport import light_caches, reuse
 from clpt.scene import materials as mt
 from clpt.scene.integrators import Integrator, Path, Vcm, shared
 from clpt.scene.shapes import Shape
@@ -103,7 +103,7 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
     if not wanted.leaves_choice:
         return index, ""
     if former is None:
-        chosen, reason = _choice(lit)
+        chosen, reason = _reusing(lit, *_choice(lit))
     else:
         keeps = former.has_photons and wanted.asks_photons
         guiding = former.guiding and not wanted.guiding
@@ -113,6 +113,7 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
             aimed=former.aimed,
             guiding=guiding,
             guide_paths=guide_paths,
+            reuse=former.reuse,
         )
         chosen = former if keeps else plain
         reason = "as before the scene was edited"
@@ -125,9 +126,21 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
     if wanted.guiding:
         chosen = Path(light_paths=0, guiding=True, guide_paths=wanted.guide_paths)
         reason = "directions are guided"
+    elif wanted.reuse:
+        chosen, reason = Path(light_paths=0, reuse=True), "paths are reused"
     chosen = replace(chosen, **shared(wanted, chosen))
     index = replace(index, integrator=chosen)
     return replace(index, candidates=_candidates(index, chosen) if former is None else ()), reason
+
+
+def _reusing(lit: Lit, chosen: Integrator, reason: str) -> tuple[Integrator, str]:
+    """The integrator, and the reason, where path reuse may replace few light paths, or none."""
+    index, wanted = lit.index, lit.index.integrator
+    other = Path(light_paths=0, reuse=True)
+    alone = replace(index, integrator=replace(other, **shared(wanted, other)))
+    if chosen.light_paths not in (0, FEW) or not reuse.pays(alone, lit.geometry):
+        return chosen, reason
+    return other, f"{reason}; paths go from diffuse to diffuse surfaces, so pixels reuse them"
 
 
 def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]:

@@ -23,6 +23,7 @@ from clpt.errors import MemoryBudgetError
 from clpt.records import COUNTER_NUMBERS, PATH, PATH_BITS, RAY_ORDER, SLABS
 from clpt.records.layout import SLAB_BLOCK, Record
 from clpt.render.flow.scene_to_tables import Lowered
+from clpt.render.flow.settings import SQUARE
 
 FOREVER = np.iinfo(np.int32).max  # an end that no sample reaches
 SIDE = 16  # pixels of a square's side, a multiple of four
@@ -52,6 +53,34 @@ def picture(settings: NDArray[np.void], stored: NDArray[np.uint32]) -> NDArray[n
 def sampled_pixels(settings: NDArray[np.void]) -> Integers:
     """Return the pixels that have samples, ascending: those of the picture and its margin."""
     return _within(settings, int(settings["margin"]))
+
+
+def in_groups(settings: NDArray[np.void], reach: int) -> Integers:
+    """Return the pixels that have samples in the order of groups, see kernels/transport/reuse.cl.
+
+    The pixels of a group lie anywhere in a square of the whole film, so that their noise, which is
+    alike, forms no pattern. All of a square have samples: so a crop has the groups of the film.
+    reach: of the filter [pixels].
+    """
+    crop = [int(settings[name]) for name in ("crop_x", "crop_y")]
+    places = [xy + at for xy, at in zip(pixels(settings), crop, strict=True)]
+    squares: list[Integers] = []
+    inside = np.ones(len(places[0]), bool)
+    for place, at, size in zip(places, crop, ("width", "height"), strict=True):
+        squares.append(place // SQUARE)
+        inside &= (at - reach) // SQUARE <= squares[-1]
+        inside &= squares[-1] <= (at + int(settings[size]) + reach - 1) // SQUARE
+    keys: list[NDArray[Any]] = [_scattered(*places), *squares]
+    order = np.lexsort(keys)
+    return order[inside[order]]
+
+
+def _scattered(x: Integers, y: Integers) -> NDArray[np.uint32]:
+    """Return a number for each pixel of the whole film, without any order among neighbours."""
+    word = x.astype(np.uint32) * np.uint32(0x9E3779B1) ^ y.astype(np.uint32) * np.uint32(0x85EBCA77)
+    for shift in (15, 13):
+        word = (word ^ word >> np.uint32(shift)) * np.uint32(0x2C1B3C6D)
+    return word ^ word >> np.uint32(16)
 
 
 def _within(settings: NDArray[np.void], margin: int) -> Integers:
@@ -269,6 +298,8 @@ class PathBuffers:
         self._fixed["counters"] = buffers.allocate("the counters", 8 * len(COUNTERS))
         self._fixed["settings"] = buffers.upload("the settings", _words(self.settings))
         sampled = sampled_pixels(self.settings)
+        if lowered.features.film.reuse:
+            sampled = in_groups(self.settings, lowered.features.film.filter.reach)
         self.pixels = len(sampled)
         every_pixel = work_table(self.settings, sampled)
         self._fixed["work_list"] = buffers.upload("the work list", every_pixel)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from clpt.arrays import is_number, is_whole, plain, whole
@@ -28,6 +28,7 @@ class Integrator(Kind):
     free_panes = False
     guiding = False
     guide_paths = 0
+    reuse = False
     light_tracing = True
     merging = False
     aimed = 0.7  # share of the light paths that start toward specular surfaces
@@ -68,6 +69,7 @@ LIGHT_FINDING = {
     "aimed",
     "guiding",
     "guide_paths",
+    "reuse",
 }  # parameters of how light is found
 LONG = 64  # least depth of paths where panes of thin glass on the way do not matter
 
@@ -117,6 +119,14 @@ class Path(Integrator):
         False, "directions are learned from light paths before the first sample; without others"
     )
     guide_paths: int = host(0, "light paths from which `guiding` learns; 0: a million")
+    reuse: bool = host(
+        False,
+        "pixels close to each other share the second surfaces of their paths; without light paths",
+    )
+
+    def for_denoiser(self) -> Integrator:
+        """Return `path` without reuse, by which the noise of pixels is alike."""
+        return replace(self, reuse=False)
 
     def check(self) -> None:
         super().check()
@@ -125,6 +135,9 @@ class Path(Integrator):
         if self.guiding and light_paths not in (0, AUTO):
             message = "guiding is for paths from the camera alone: ask for no light_paths"
             raise SceneError(message, where=f"{self.kind}.guiding")
+        if self.reuse and (self.guiding or light_paths not in (0, AUTO)):
+            message = "paths are reused without light_paths and guiding: ask for one of these"
+            raise SceneError(message, where=f"{self.kind}.reuse")
         whole(self.guide_paths, 0, MOST_GUIDE_PATHS, where=f"{self.kind}.guide_paths")
         if isinstance(light_paths, str) and light_paths == AUTO:
             return

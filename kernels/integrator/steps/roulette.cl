@@ -5,7 +5,7 @@
 inline mask path_roulette(Scene scene, Slab path, uint at, mask next, mask null, Vertex v, Scattering scatter,
                           Guided guided, real eta, Spectrum *beta)
 {
-    mask play = !null & (v.depth + 1 >= scene.settings->rr_depth);
+    mask play = !null & (v.depth + 1 >= scene.settings->rr_depth) & !reuse_begins(scene, v);
     real strength = spectrum_max(*beta);
     next = next & (strength > 0.0f);
     play = play & !guided_plays(path, at, guided, v.beta, scatter, &next, beta);

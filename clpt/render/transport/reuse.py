@@ -1,0 +1,97 @@
+"""Whether path reuse pays, see kernels/transport/reuse.cl.
+
+It does where most paths go from one diffuse surface to another. So a few rays are cast first.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clpt.arrays import Floats
+from clpt.denoise import needs
+from clpt.device import disk_cache
+from clpt.geometry import casting
+from clpt.geometry.casting import Caster
+from clpt.render.geometry.find import Geometry
+from clpt.render.scene_index import SceneIndex, leaves_of
+from clpt.scene import materials as mt
+from clpt.scene.cameras.camera import View
+from clpt.scene.shapes import Shape
+
+SAMPLES = 1 << 19  # of a film that is worth the rays: some hundredths of a second
+RAYS = 512
+OFFSET = 1e-4  # from a surface, of the distance of a hit
+SHARE = 0.45  # of the rays whose paths share; measured, see bench/notes/light_paths.md
+
+
+def pays(index: SceneIndex, geometry: Geometry) -> bool:
+    """Return whether so many paths have diffuse first and second vertices that to share pays.
+
+    It does not under a sky: there most noise is that of the light that comes straight from it. For
+    denoisers the noise of pixels must be independent.
+    """
+    view = index.camera.view_of(index.film.width, index.film.height)
+    open_ = any(light.reach == "infinite" for light in index.lights)
+    told = not {*needs.LAYERS}.isdisjoint(index.film.layers)
+    if index.samples < SAMPLES or not index.reused or index.prototypes or open_ or told:
+        return False
+    if view is None:
+        return False
+    diffuse = np.zeros(len(geometry.faces), bool)
+    for shape, _, faces in geometry.meshes():
+        diffuse[faces] = _is_diffuse(shape)
+    if not diffuse.any():
+        return False
+    triangles = geometry.vertices[geometry.faces]
+    sources = [Path(file).read_bytes() for file in (__file__, casting.__file__)]
+    asked = repr((view.origin.tolist(), view.axis.tolist(), view.angle)).encode()
+    texts = [*sources, asked, triangles.tobytes(), diffuse.tobytes()]
+    return bool(disk_cache.remembered(texts, lambda: _share(triangles, diffuse, view)) >= SHARE)
+
+
+def _share(triangles: NDArray[np.float32], diffuse: NDArray[np.bool_], view: View) -> float:
+    """Return the share of paths whose first and second vertices are diffuse.
+
+    triangles: (n, 3, 3) [m]; diffuse: (n,) whether they are.
+    """
+    random, caster = np.random.default_rng(0), Caster(triangles)
+    origins = np.tile(view.origin, (RAYS, 1))
+    directions = _in_cone(random, view.axis, math.cos(view.angle))
+    for vertex in (1, 2):
+        met, far = caster.nearest(origins, directions)
+        stays = (met >= 0) & diffuse[met]
+        if vertex == 2 or not stays.any():
+            break
+        corners, directions = triangles[met[stays]].astype(np.float64), directions[stays]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        normals *= -np.sign((normals * directions).sum(axis=1))[:, None]
+        far = far[stays, None]
+        origins = origins[stays] + far * directions + OFFSET * far * normals
+        directions = normals + _sphere(random, len(normals))
+    return int(stays.sum()) / RAYS
+
+
+def _is_diffuse(shape: Shape) -> bool:
+    """Whether paths share vertices on a shape."""
+    parts = [*mt.parts(shape.material)]
+    bent = any(isinstance(part, mt.NormalMapped) for part in parts)
+    kinds = {cls.kind for cls in leaves_of(shape.material)}
+    return kinds == {"diffuse"} and shape.emission is None and not bent
+
+
+def _in_cone(random: np.random.Generator, axis: Floats, least: float) -> Floats:
+    """Return directions (RAYS, 3) about an axis, whose cosine is `least` or more."""
+    directions = _sphere(random, 64 * RAYS)
+    inside = directions[directions @ axis >= least]
+    return inside[:RAYS] if len(inside) >= RAYS else np.resize(inside, (RAYS, 3))
+
+
+def _sphere(random: np.random.Generator, count: int) -> NDArray[np.float64]:
+    """Return directions at random (count, 3)."""
+    directions = random.normal(size=(count, 3))
+    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
