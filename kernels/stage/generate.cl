@@ -112,7 +112,6 @@ inline void begin_path(Scene scene, Slab path, uint at, mask go, integer pixel_i
     store_path_escape_width(path, at, go, (real)(0.0f));
     store_path_bodies(path, at, go, (integer)(settings->camera_bodies));
     store_path_ratio(path, at, go, camera_start());
-    store_path_reuse(path, at, go, (integer)(0));
     length_begin(scene, path, at, go, b.ray.far);
 }
 
@@ -148,5 +147,6 @@ STAGE(generate)(SLAB_ARGS, SCENE_ARGS, BEGIN_ARGS STAGE_AT_ARG)
         integer begun = PATH_BEGUN | ghost_bit(scene, next.pixel_index, next.sample);
         begun |= scouts_begin(scouted, next.sample);
         store_path_state(path, at, begins, sel_i(next.done, (integer)(PATH_DONE), begun));
+        store_path_reuse(path, at, begins, (integer)(0)); /* a slot without a path has nothing to share */
     }
 }
