@@ -24,6 +24,7 @@ from .pictures import gallery as pictures
 ROOT = Path(__file__).resolve().parents[1]
 PLACE = re.compile(r"(<!-- figures: (\w+) -->\n).*?(<!-- end of figures -->)", re.S)
 AVX2 = "AMD EPYC avx2"
+FILMS = {"preview": AVX2, "final": "Intel(R) Xeon(R) Processor avx512f"}  # and their processors
 KINDS = ("noisy", "`oidn`", "`statistical`")
 NAMES = {"cornell": "Cornell box", "glass": "glass with caustics"}
 
@@ -68,10 +69,11 @@ def shown(value: float) -> str:
 
 def efficiency() -> str:
     """Return clpt's efficiency over Mitsuba's on scenes of others, each as `clpt render` does."""
-    rows = [row for row in records() if row["bench"] == "peers" and row["mode"] == "rgb"]
-    films = peer_films(report_newest(rows))
+    every = [row for row in records() if row["bench"] == "peers" and row["mode"] == "rgb"]
     columns: dict[str, dict[str, float]] = {}
-    for name in ("preview", "final"):
+    for name, processor in FILMS.items():
+        rows = [row for row in every if row["processor"] == processor]
+        films = peer_films(report_newest(rows))
         for scene, group in films.get((name, "rgb", POCL, False), {}).items():
             by_name = {row["contender"]: row for row in group}
             ratio, _ = gain(by_name["file"], by_name["mitsuba"])
