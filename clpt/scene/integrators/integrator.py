@@ -126,7 +126,7 @@ class Path(Integrator):
 
     def for_denoiser(self) -> Integrator:
         """Return `path` without reuse, by which the noise of pixels is alike."""
-        return replace(self, reuse=False)
+        return replace(self, reuse=False) if self.reuse else self
 
     def check(self) -> None:
         super().check()

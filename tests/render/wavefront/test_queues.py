@@ -18,7 +18,7 @@ from clpt.records import HIT, PATH, RAY_ORDER, SETTINGS, SHADOW, SLABS
 from clpt.records.layout import SLAB_BLOCK, Record
 from clpt.render.flow import programs
 from clpt.render.flow.blocks import blocks_text, members, unused
-from clpt.render.flow.flags import scene_text
+from clpt.render.flow.flags import scene_text, slab_words_text
 from clpt.render.flow.scene_to_tables import lower
 from clpt.render.wavefront.path_buffers import queue_sizes, queue_steps
 from clpt.scene import Scene, integrators
@@ -42,6 +42,7 @@ VIRTUAL = {
     "generated/scene.cl": scene_text(),
     "generated/spectrum.cl": '#include "spectra/rgb.cl"\n',
     "generated/spectrum_read.cl": '#include "spectra/rgb.cl#read"\n',
+    "generated/slab_words.cl": slab_words_text(),
     "generated/block.cl": blocks_text([lower(Scene(camera=Perspective())).features]),
     "sorting.cl": """
 #include "core/base.cl"
