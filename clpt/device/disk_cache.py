@@ -205,12 +205,13 @@ def load(entry: str) -> tuple[str, bytes] | None:
     return header.decode(), binary
 
 
-def remembered(texts: Iterable[bytes], make: Callable[[], Any]) -> Any:
+def remembered(code: Iterable[str], texts: Iterable[bytes], make: Callable[[], Any]) -> Any:
     """Return a value of JSON; read it if a process has stored it.
 
-    texts: all that the value depends on; make: returns it anew.
+    code: the files whose program makes it; texts: what else it depends on; make: returns it anew.
     """
-    entry = hashlib.sha256(b"\0".join(texts)).hexdigest()
+    sources = (Path(file).read_bytes() for file in code)
+    entry = hashlib.sha256(b"\0".join([*sources, *texts])).hexdigest()
     stored = load(entry)
     if stored is not None:
         return json.loads(stored[0])

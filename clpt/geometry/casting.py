@@ -5,12 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.arrays import Floats32
+from clpt.arrays import Floats, Floats32
 
 LEAF = 4  # triangles
 LARGE = 64  # triangles that stand outside of the tree: their boxes would be met by most rays
 MORTON_BITS = 10  # for each axis
 BIAS = np.float32(1e-12)  # of a direction's components, whose inverse must be finite
+
+
+def sphere(random: np.random.Generator, count: int) -> Floats:
+    """Return directions at random (count, 3)."""
+    directions = random.normal(size=(count, 3))
+    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
 class Caster:

@@ -1,4 +1,4 @@
-/* Finds the densities with which paths would have found the second vertices of their group: see transport/reuse.cl. */
+/* Computes, for each path of a group, the density of each second vertex of the group: see transport/reuse.cl. */
 #include "stage/stage.cl"
 #include "shapes/shape.cl"
 #include "generated/trace.cl"

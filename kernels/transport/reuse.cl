@@ -1,8 +1,8 @@
 /* Paths of a group share their second vertices (Bekaert et al. 2002, "Accelerating path tracing by re-using paths").
  * The slots of a group begin their samples together, in pixels that are close to each other. Where a path goes from a
- * diffuse surface at x to a diffuse surface at y, all paths of the group take the light that leaves y: each of them
- * from its own x, if that sees y. The balance heuristic weighs them by the densities with which each path would have
- * found y. So nothing counts twice, and the mean of a pixel stays as it is. Light that y itself emits is not shared:
+ * diffuse surface at x to a diffuse surface at y, all paths of the group take the light that leaves y, if their x sees
+ * y. The balance heuristic weighs the paths by their densities of y. So nothing counts twice, and the mean of a pixel
+ * stays as it is. Light that y itself emits is not shared:
  * next-event estimation finds it at x.
  *
  * `intersect` and shading keep x and y, stage/reuse.cl finds the densities, and stage/generate.cl adds up the light
@@ -43,7 +43,7 @@ inline natural reuse_vertices(Slab path, integer slots)
     return as_natural(reuse_word(path, PATH_REUSE_WORD, slots)) & REUSE_VERTICES;
 }
 
-/* The throughput with which a path leaves y, before the reflection there; beta: that with which it leaves x. */
+/* The throughput of a path at y, before the reflection there; beta: its throughput behind x. */
 inline Spectrum reuse_throughput(Spectrum beta)
 {
 #define C(c) beta.c = max_r(beta.c, (real)(REUSE_LEAST));

@@ -21,7 +21,7 @@ from clpt.spectra.cie import tanh_ends
 
 LARGEST = 62  # exponent of 4 of a unit of areas, which is float32
 ORDINARY_SIZE = 10  # exponent of 2 of the radius of a scene [m], up and down
-SQUARE = 8  # pixels of a side, in which paths have groups, see kernels/transport/reuse.cl
+SQUARE = 8  # pixels of a side; it holds whole groups of paths: kernels/transport/reuse.cl
 MOST_SAMPLE_BITS = 16  # of a zsobol pixel's part of its sequence
 
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -107,17 +106,11 @@ def _sees_sky_beside(geometry: Geometry, eye: Floats) -> bool:
     """
     if not len(geometry.mesh_corners):
         return True
-    around = _sphere(np.random.default_rng(0), AROUND).T
+    around = casting.sphere(np.random.default_rng(0), AROUND).T
     with np.errstate(divide="ignore", invalid="ignore"):
         one, other = (geometry.mesh_corners - eye)[:, :, None] / around
         near, far = np.minimum(one, other).max(axis=0), np.maximum(one, other).min(axis=0)
     return int((np.maximum(near, 0.0) <= far).sum()) < (1.0 - OUTDOORS) * AROUND
-
-
-def _sphere(random: np.random.Generator, count: int) -> Floats:
-    """Return directions at random (count, 3)."""
-    directions = random.normal(size=(count, 3))
-    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
 def _openings(index: SceneIndex, geometry: Geometry, eye: Floats, view: View | None) -> Openings:
@@ -136,7 +129,6 @@ def _openings(index: SceneIndex, geometry: Geometry, eye: Floats, view: View | N
 
 def _remembered(triangles: NDArray[np.float32], eye: Floats, view: View | None) -> Openings:
     """Return the result of `find`; read it from the disk if a process has stored it."""
-    sources = [Path(file).read_bytes() for file in (__file__, casting.__file__)]
     asked = repr((eye.tolist(), view and (view.axis.tolist(), view.angle))).encode()
 
     def rectangles() -> Any:
@@ -145,7 +137,8 @@ def _remembered(triangles: NDArray[np.float32], eye: Floats, view: View | None) 
             (each.center.tolist(), each.x.tolist(), each.y.tolist()) for each in new.rectangles
         ]
 
-    share, rows = disk_cache.remembered([*sources, asked, triangles.tobytes()], rectangles)
+    texts, code = (asked, triangles.tobytes()), (__file__, casting.__file__)
+    share, rows = disk_cache.remembered(code, texts, rectangles)
     return (
         Openings(tuple(Rectangle(*map(np.array, row)) for row in rows), share) if rows else CLOSED
     )
@@ -192,12 +185,14 @@ class _Search:
 
         Returns whether the place is a room with openings.
         """
-        around = _sphere(self.random, AROUND)
+        around = casting.sphere(self.random, AROUND)
         points, normals = self._met(np.broadcast_to(eye, around.shape), around)
         if len(points) < (1.0 - OUTDOORS) * AROUND:
             return False
         if view is not None:
-            ahead = view.axis + math.tan(min(view.angle, WIDE)) * _sphere(self.random, AROUND)
+            ahead = view.axis + math.tan(min(view.angle, WIDE)) * casting.sphere(
+                self.random, AROUND
+            )
             ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
             seen = self._met(np.broadcast_to(eye, ahead.shape), ahead)
             points, normals = (
@@ -232,7 +227,7 @@ class _Search:
     def _onward(self, points: Floats, normals: Floats) -> tuple[Floats, Floats]:
         """Return ONWARD rays from each point, by the cosine."""
         points, normals = np.repeat(points, ONWARD, axis=0), np.repeat(normals, ONWARD, axis=0)
-        directions = normals + _sphere(self.random, len(points))
+        directions = normals + casting.sphere(self.random, len(points))
         return points, directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
     def _escape(self, origins: Floats, directions: Floats) -> NDArray[np.bool_]:

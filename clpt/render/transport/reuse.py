@@ -6,7 +6,6 @@ It does where most paths go from one diffuse surface to another. So a few rays a
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,6 @@ from clpt.arrays import Floats
 from clpt.denoise import needs
 from clpt.device import disk_cache
 from clpt.geometry import casting
-from clpt.geometry.casting import Caster
 from clpt.render.geometry.find import Geometry
 from clpt.render.scene_index import SceneIndex, leaves_of
 from clpt.scene import materials as mt
@@ -34,11 +32,11 @@ def pays(index: SceneIndex, geometry: Geometry) -> bool:
     It does not under a sky: there most noise is that of the light that comes straight from it. For
     denoisers the noise of pixels must be independent.
     """
-    view = index.camera.view_of(index.film.width, index.film.height)
     open_ = any(light.reach == "infinite" for light in index.lights)
     told = not {*needs.LAYERS}.isdisjoint(index.film.layers)
     if index.samples < SAMPLES or not index.reused or index.prototypes or open_ or told:
         return False
+    view = index.camera.view_of(index.film.width, index.film.height)
     if view is None:
         return False
     diffuse = np.zeros(len(geometry.faces), bool)
@@ -47,10 +45,11 @@ def pays(index: SceneIndex, geometry: Geometry) -> bool:
     if not diffuse.any():
         return False
     triangles = geometry.vertices[geometry.faces]
-    sources = [Path(file).read_bytes() for file in (__file__, casting.__file__)]
     asked = repr((view.origin.tolist(), view.axis.tolist(), view.angle)).encode()
-    texts = [*sources, asked, triangles.tobytes(), diffuse.tobytes()]
-    return bool(disk_cache.remembered(texts, lambda: _share(triangles, diffuse, view)) >= SHARE)
+    texts = asked, triangles.tobytes(), diffuse.tobytes()
+    code = __file__, casting.__file__
+    share = disk_cache.remembered(code, texts, lambda: _share(triangles, diffuse, view))
+    return bool(share >= SHARE)
 
 
 def _share(triangles: NDArray[np.float32], diffuse: NDArray[np.bool_], view: View) -> float:
@@ -58,7 +57,7 @@ def _share(triangles: NDArray[np.float32], diffuse: NDArray[np.bool_], view: Vie
 
     triangles: (n, 3, 3) [m]; diffuse: (n,) whether they are.
     """
-    random, caster = np.random.default_rng(0), Caster(triangles)
+    random, caster = np.random.default_rng(0), casting.Caster(triangles)
     origins = np.tile(view.origin, (RAYS, 1))
     directions = _in_cone(random, view.axis, math.cos(view.angle))
     for vertex in (1, 2):
@@ -72,7 +71,7 @@ def _share(triangles: NDArray[np.float32], diffuse: NDArray[np.bool_], view: Vie
         normals *= -np.sign((normals * directions).sum(axis=1))[:, None]
         far = far[stays, None]
         origins = origins[stays] + far * directions + OFFSET * far * normals
-        directions = normals + _sphere(random, len(normals))
+        directions = normals + casting.sphere(random, len(normals))
     return int(stays.sum()) / RAYS
 
 
@@ -86,12 +85,6 @@ def _is_diffuse(shape: Shape) -> bool:
 
 def _in_cone(random: np.random.Generator, axis: Floats, least: float) -> Floats:
     """Return directions (RAYS, 3) about an axis, whose cosine is `least` or more."""
-    directions = _sphere(random, 64 * RAYS)
+    directions = casting.sphere(random, 64 * RAYS)
     inside = directions[directions @ axis >= least]
     return inside[:RAYS] if len(inside) >= RAYS else np.resize(inside, (RAYS, 3))
-
-
-def _sphere(random: np.random.Generator, count: int) -> NDArray[np.float64]:
-    """Return directions at random (count, 3)."""
-    directions = random.normal(size=(count, 3))
-    return directions / np.linalg.norm(directions, axis=1, keepdims=True)

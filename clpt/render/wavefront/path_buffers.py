@@ -297,9 +297,11 @@ class PathBuffers:
             self._fixed["footprints"] = buffer
         self._fixed["counters"] = buffers.allocate("the counters", 8 * len(COUNTERS))
         self._fixed["settings"] = buffers.upload("the settings", _words(self.settings))
-        sampled = sampled_pixels(self.settings)
-        if lowered.features.film.reuse:
-            sampled = in_groups(self.settings, lowered.features.film.filter.reach)
+        film = lowered.features.film
+        if film.reuse:
+            sampled = in_groups(self.settings, film.filter.reach)
+        else:
+            sampled = sampled_pixels(self.settings)
         self.pixels = len(sampled)
         every_pixel = work_table(self.settings, sampled)
         self._fixed["work_list"] = buffers.upload("the work list", every_pixel)

@@ -125,7 +125,7 @@ class Path(Integrator):
     )
 
     def for_denoiser(self) -> Integrator:
-        """Return `path` without reuse, by which the noise of pixels is alike."""
+        """Return `path` without reuse, which makes the noise of pixels alike."""
         return replace(self, reuse=False) if self.reuse else self
 
     def check(self) -> None:
