@@ -68,7 +68,6 @@ FIRST_SEED = 1000  # Mitsuba adds the samples to it
 SAMPLERS = {"mitsuba": None, "mitsuba best": "multijitter"}
 FILMS = {"preview": (200, 32, 4), "final": (640, 96, 1)}
 """Width, samples a pixel, and how many times as many are timed."""
-TIMED = 2  # renders
 PLAIN = ("--integrator", "path", "--light-paths", "0")
 WAYS: dict[str, tuple[str, ...]] = {  # of clpt, and their options
     "file": (),
@@ -165,7 +164,7 @@ class Record:
     the largest resident set [bytes].
     """
 
-    start: float
+    start: float = math.inf
     seconds: float = math.inf
     peak: int = 0
     images: list[Picture] = field(default_factory=list)
@@ -183,20 +182,22 @@ def compare(
             if contender.options is not None:
                 contender.render(spp, 1)  # a long film of clpt has programs of its own
             machine.settle(contender.caches)
-            records[name] = Record(min(contender.render(1, seed).cpu for seed in (2, 3, 4)))
+            records[name] = Record()
         except RuntimeError as error:
             failures.append(f"{scene}: {name}: {error}")
-    if "guiding" in records and "path" in records:
-        records["guiding"].start = records["path"].start
-    for seed in range(seeds):
+    for seed in range(FIRST_SEED, FIRST_SEED * (seeds + 1), FIRST_SEED):
         for name, record in records.items():
-            taken = contenders[name].render(spp, FIRST_SEED * (seed + 1))
+            record.start = min(record.start, contenders[name].render(1, seed).cpu)
+            taken = contenders[name].render(spp, seed)
             record.images.append(taken.image)
             record.peak = max(record.peak, taken.peak)
-            if times > 1 and seed < TIMED:
-                taken = contenders[name].render(spp * times, FIRST_SEED * (seed + 1))
-            if times == 1 or seed < TIMED:
-                record.seconds = min(record.seconds, (taken.cpu - record.start) / times)
+            if times > 1:
+                taken = contenders[name].render(spp * times, seed)
+            record.seconds = min(record.seconds, taken.cpu)
+    if "guiding" in records and "path" in records:
+        records["guiding"].start = records["path"].start
+    for record in records.values():
+        record.seconds = (record.seconds - record.start) / times
     return records, failures
 
 
