@@ -87,6 +87,8 @@ PATH = Record(
     reuse_y=("vec3", "the second vertex, off its surface [m]"),
     reuse_yn=("natural", "geometric normal there, toward the first"),
     reuse_yns=("natural", "shading normal there"),
+    reuse_coat=("natural", "the coat at the first vertex"),
+    reuse_y_coat=("natural", "the coat at the second vertex"),
     **{
         f"reuse_density{k}": ("real", "with which it would have found y of its group [1/m^2]")
         for k in range(REUSE_GROUP)

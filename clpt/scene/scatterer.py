@@ -24,6 +24,7 @@ class Scatterer(Kind):
         False  # all its lobes are delta functions: no light can be sampled through it
     )
     uses_lobe_sample: ClassVar[bool] = False  # `sample` uses u.z
+    has_diffuse_lobe: ClassVar[bool] = False  # alone, or below a coat: paths of pixels share it
     chromatic: ClassVar[bool] = False  # the pdf differs between wavelengths: it has `pdfs`
     lobes_apart: ClassVar[bool] = (
         False  # a direction has light of a single lobe, if a lobe refracts

@@ -23,19 +23,19 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
 #if BSDF_ABSORBS /* as most surfaces of lights do */
     next = next & (spectrum_max(bsdf_albedo(scatter.bsdf)) > 0.0f);
 #endif
-    reuse_second(scene, path, at, met, &v, scatter);
     MisRatio mis_ratio = mis_ratio_of_camera_path(scene, path, at, v, sampler);
     merge_at_vertex(scene, path, at, met, &v, &scatter, mis_ratio, ratio SHADE_PASSED);
     Guided guided = guide_at(scene, v.s, v.d MERGE_PASSED);
 
     NextEvent event = next_event_seek(scene, next, v, scatter);
     bsdf_ask(scene, scatter, event.wi, 0);
-    event = next_event_weigh(scene, event, v, scatter, mis_ratio, guided, ratio SHADE_PASSED);
+    ReuseLobe lobe = reuse_second(scene, path, at, met, &v, scatter);
+    event = next_event_weigh(scene, event, v, scatter, mis_ratio, guided, ratio, lobe SHADE_PASSED);
     if (LANES == 1) { /* a GPU has too few registers to hold the event and wo longer: wo is computed anew */
         v.state += next_event_keep(scene, path, shadow, at, active, v, event);
         scatter.wo = to_frame(scatter.shading.frame, neg3(load_path_d(path, at)));
     }
-    BsdfSample bs = onward_sample(scatter, guided, &ratio MERGE_PASSED);
+    BsdfSample bs = reuse_sample(lobe, scatter.wo, onward_sample(scatter, guided, &ratio MERGE_PASSED));
     if (LANES > 1) v.state += next_event_keep(scene, path, shadow, at, active, v, event);
 
     mask null = vertex_is_null(bs.lobe);
@@ -50,7 +50,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     mask on = path_roulette(scene, path, at, next, null, v, scatter, guided, eta, &beta);
 
     vertex_leave(path, at, on, null, v, onward, beta);
-    reuse_first(scene, path, at, on, v, scatter, onward);
+    reuse_first(scene, path, at, on, v, scatter, onward, lobe, bs);
     store_path_cone(path, at, on, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
     path_scatters(scene, path, at, on, null, &v, scatter, mis_ratio, bs, onward);
     store_path_eta(path, at, on, eta);

@@ -5,6 +5,7 @@
  *   real       <kind>_pdf   (<Kind> m, vec3 wo, vec3 wi);    [1/sr], likewise
  *   Spectrum   <kind>_albedo(<Kind> m);                      the colour a person would name
  *   Spectrum   <kind>_pdfs  (<Kind> m, vec3 wo, vec3 wi);    of `chromatic` kinds: pdf, were each wavelength the hero
+ *   DiffuseLobe <kind>_diffuse_lobe(<Kind> m, vec3 wo);      of kinds with `has_diffuse_lobe`
  *   real       <kind>_across(<Kind> m);                      of kinds that refract and are not delta, or `has_across`:
  *                                                            the hero's index behind the front over that before
  *
@@ -38,11 +39,22 @@ typedef struct {
     real p, p_back;  /* of wi and of wo, as mis_pdf has them */
 } BsdfPair;
 
-/* What a vertex asks of its material. */
+/* The diffuse lobe of a material below a coat with transmittance T (materials/coat.cl): f |cos| is
+ * value T(wo) T(wi) cos(wi) / pi. A sample is of this lobe if u.z >= other. */
 typedef struct {
-    BsdfPair pair;
-    BsdfSample sample;
-} BsdfAnswer;
+    Spectrum value;
+    real other; /* probability of the other lobe */
+    real eta;   /* index of the coat over outside; 0: there is no coat, -1: it varies with wavelength */
+    real alpha; /* its roughness; 0: it is smooth, below 0: of Beckmann's facets */
+} DiffuseLobe;
+
+inline DiffuseLobe diffuse_lobe_nothing(void)
+{
+    DiffuseLobe lobe = {spectrum_of(0.0f), (real)(1.0f), (real)(0.0f), (real)(0.0f)};
+    return lobe;
+}
+
+#include "generated/bsdf_answer.cl"
 
 /* Of two lobes with albedos a and b: the factor 1 / max(1, a + b), per wavelength. */
 inline Spectrum two_lobes_scale(Spectrum a, Spectrum b)
@@ -71,6 +83,21 @@ inline BsdfSample bsdf_nothing(void)
     return s;
 }
 
+/* Step answer: what a vertex asks of its material. */
+typedef struct {
+    BsdfPair pair;
+    BsdfSample sample;
+} BsdfAnswer;
+#define answer_diffuse_lobe(a, m, wo)
+
+/* Step answer_lobe: in place of `answer`, where paths share vertices. */
+typedef struct {
+    BsdfPair pair;
+    BsdfSample sample;
+    DiffuseLobe lobe;
+} BsdfAnswer;
+#define answer_diffuse_lobe(a, m, wo) (a).lobe = bsdf_diffuse_lobe(m, wo)
+
 /* Step pair: what a vertex asks of its material for a pair of directions. */
 inline BsdfPair bsdf_pair(Bsdf m, vec3 wo, vec3 wi, Spectrum ratio)
 {
@@ -95,6 +122,7 @@ inline void pair_of_sample(Bsdf m, vec3 wo, BsdfSample *s)
 /* Step pair_apart: in place of `pair`, where a material's functions are a part of their own, see `apart`. */
 #define bsdf_pair(m, wo, wi, ratio) ((m).answer.pair)
 #define bsdf_sample(m, wo, u) ((m).answer.sample)
+#define bsdf_diffuse_lobe(m, wo) ((m).answer.lobe)
 #define pair_of_sample(m, wo, s)
 #define bsdf_ask(scene, scatter, wi, adjoint) (scatter).bsdf.answer = apart_asked(scene, scatter, wi, adjoint)
 

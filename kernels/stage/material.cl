@@ -20,6 +20,7 @@ inline BsdfAnswer material_answer(Bsdf m, vec3 wo, vec3 wi, vec3 u, int adjoint)
     pair_of_sample(m, wo, &a.sample);
     if (adjoint) a.pair = bsdf_pair(m, wi, wo, every);
     else a.pair = bsdf_pair(m, wo, wi, every);
+    answer_diffuse_lobe(a, m, wo);
     return a;
 }
 

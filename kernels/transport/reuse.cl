@@ -5,6 +5,9 @@
  * stays as it is. Light that y itself emits is not shared:
  * next-event estimation finds it at x.
  *
+ * Of a surface below a coat the diffuse lobe is shared. So at x a path goes on by one lobe, and at y all its light is
+ * of one lobe: of that which the sample chooses. Transmittances of coats depend on the direction between x and y.
+ *
  * `intersect` and shading keep x and y, stage/reuse.cl finds the densities, and stage/generate.cl adds up the light
  * when all paths of the group have ended. Groups begin and end together where a work-item shades all of a group. In
  * single lanes, as on GPUs, nothing is shared. */
@@ -52,13 +55,116 @@ inline Spectrum reuse_throughput(Spectrum beta)
     return beta;
 }
 
+#define COAT_LARGEST 3.99f /* index of a coat */
+
+/* A coat as a word: its roughness, its distribution, its index in units of 2^-13; 0: there is none. */
+inline natural coat_pack(real eta, real alpha)
+{
+    integer beckmann = sel_i(alpha < 0.0f, (integer)(0x8000), (integer)(0));
+    integer rough = to_integer(min_r(fabs(alpha), (real)(1.0f)) * 32767.0f + 0.5f) | beckmann;
+    integer index = to_integer(min_r(eta, (real)(COAT_LARGEST)) * 8192.0f + 0.5f);
+    return as_natural(sel_i(eta > 0.0f, (index << 16) | rough, (integer)(0)));
+}
+
+/* Step lobe: of materials below a coat a path shares the diffuse lobe alone. */
+#include "transport/reuse.cl"
+#include "materials/coat.cl"
+
+typedef struct {
+    DiffuseLobe lobe;
+    mask base;   /* the sample is of this lobe */
+    mask onward; /* the next direction is of one lobe, as at x */
+    mask all;    /* and all light is, as at y */
+    real passed; /* the coat's transmittance toward wo */
+} ReuseLobe;
+
+inline ReuseLobe reuse_lobe(Scattering scatter)
+{
+    ReuseLobe r;
+    r.lobe = bsdf_diffuse_lobe(scatter.bsdf, scatter.wo);
+    r.base = scatter.choice.y >= r.lobe.other;
+    r.passed = coat_passes(max_r(scatter.wo.z, (real)(0.0f)), r.lobe.eta, r.lobe.alpha);
+    r.onward = r.all = mask_of(0);
+    return r;
+}
+
+inline mask reuse_lobe_suits(ReuseLobe r) { return (r.lobe.eta >= 0.0f) & (r.lobe.eta < COAT_LARGEST); }
+inline mask reuse_lobe_is_base(ReuseLobe r) { return r.base; }
+inline natural reuse_coat(ReuseLobe r) { return coat_pack(r.lobe.eta, r.lobe.alpha); }
+
+/* f |cos| of the diffuse lobe over its probability, but for the coat's transmittance toward wo. */
+inline Spectrum reuse_base(ReuseLobe r, real cosine)
+{
+    real f = coat_passes(cosine, r.lobe.eta, r.lobe.alpha) * cosine * INV_PI;
+    return spectrum_scale(r.lobe.value, f / max_r(1.0f - r.lobe.other, (real)(1e-20f)));
+}
+
+/* The light of next-event estimation at y. */
+inline BsdfPair reuse_pair(ReuseLobe r, vec3 wo, vec3 wi, BsdfPair pair)
+{
+    if (!any(r.all)) return pair;
+    mask front = (wo.z > 0.0f) & (wi.z > 0.0f), base = r.all & r.base & front, other = r.all & !r.base & front;
+    real cosine = max_r(wi.z, (real)(0.0f)), share = 1.0f - r.lobe.other, over = max_r(r.lobe.other, (real)(1e-20f));
+    Spectrum f = reuse_base(r, cosine);
+#define C(c) \
+    pair.f.c = sel(other, max_r(pair.f.c - f.c * share * r.passed, (real)(0.0f)) / over, sel(base, f.c, pair.f.c));
+    SPECTRUM_EACH(C)
+#undef C
+    real p = cosine_hemisphere_pdf(cosine);
+    pair.pdf = sel(other, max_r(pair.pdf - share * p, (real)(0.0f)) / over, sel(base, p, pair.pdf));
+    return pair;
+}
+
+/* The sample at x and at y. */
+inline BsdfSample reuse_sample(ReuseLobe r, vec3 wo, BsdfSample s)
+{
+    mask rough = (s.lobe & LOBE_DELTA) == 0, split = (r.onward | r.all) & (s.pdf > 0.0f) & rough;
+    if (!any(split)) return s;
+    mask base = split & r.base, other = split & !r.base;
+    real cosine = max_r(s.wi.z, (real)(1e-20f)), share = 1.0f - r.lobe.other;
+    real p = cosine_hemisphere_pdf(cosine), left = max_r(s.pdf - share * p, (real)(0.0f));
+    Spectrum f = reuse_base(r, cosine);
+    real toward = sel(r.all, (real)(1.0f), r.passed) / p, over = 1.0f / max_r(left, (real)(1e-20f));
+#define C(c)                                                                                          \
+    real CAT(of_other_, c) = max_r(s.weight.c * s.pdf - f.c * share * r.passed, (real)(0.0f)) * over; \
+    s.weight.c = sel(other, CAT(of_other_, c), sel(base, f.c * toward, s.weight.c));
+    SPECTRUM_EACH(C)
+#undef C
+    real pdf = sel(base, p, left / max_r(r.lobe.other, (real)(1e-20f)));
+    s.pdf = sel(r.all & split, pdf, s.pdf);
+    return s;
+}
+
+/* The weight of the sample at x, but for the coat's transmittance toward y. */
+inline Spectrum reuse_weight(ReuseLobe r, BsdfSample s)
+{
+    return spectrum_scale(r.lobe.value, r.passed / max_r(1.0f - r.lobe.other, (real)(1e-20f)));
+}
+
+/* Twin, without coats. */
+typedef struct {
+    mask onward, all;
+} ReuseLobe;
+inline ReuseLobe reuse_lobe(Scattering scatter)
+{
+    ReuseLobe r = {mask_of(0), mask_of(0)};
+    return r;
+}
+inline mask reuse_lobe_suits(ReuseLobe r) { return mask_of(1); }
+inline mask reuse_lobe_is_base(ReuseLobe r) { return mask_of(1); }
+inline natural reuse_coat(ReuseLobe r) { return 0u; }
+inline BsdfPair reuse_pair(ReuseLobe r, vec3 wo, vec3 wi, BsdfPair pair) { return pair; }
+inline BsdfSample reuse_sample(ReuseLobe r, vec3 wo, BsdfSample s) { return s; }
+inline Spectrum reuse_weight(ReuseLobe r, BsdfSample s) { return s.weight; }
+
 /* Step vertex: what shading keeps. */
 #include "transport/reuse.cl"
 
 /* Whether paths share vertices on the surface, which no map may bend: then its frame depends on the direction. */
-inline mask reuse_suits(Scene scene, Slab path, uint at, Vertex v)
+inline mask reuse_suits(Scene scene, Slab path, uint at, Vertex v, ReuseLobe r)
 {
-    return mask_of(BSDF_REUSED) & (load_path_nulls(path, at) == 0) & !shading_frame_turns(scene, v.row);
+    mask alone = (load_path_nulls(path, at) == 0) & !shading_frame_turns(scene, v.row);
+    return mask_of(BSDF_REUSED) & alone & reuse_lobe_suits(r);
 }
 
 /* Whether roulette leaves the paths alone: all paths of a group must go on from x. */
@@ -66,33 +172,48 @@ inline mask reuse_begins(Scene scene, Vertex v) { return mask_of(BSDF_REUSED) & 
 
 /* Keeps the normals at x, where paths go `on`. `intersect` keeps x itself, where the next ray begins. A path that goes
  * below the surface, as a shading normal lets it, shares nothing: it would not see what others meet above. */
-inline void reuse_first(Scene scene, Slab path, uint at, mask on, Vertex v, Scattering scatter, vec3 onward)
+inline void reuse_first(Scene scene, Slab path, uint at, mask on, Vertex v, Scattering scatter, vec3 onward,
+                        ReuseLobe r, BsdfSample bs)
 {
-    mask keeps = on & (v.depth == 0) & reuse_suits(scene, path, at, v) & (dot3(v.s.n, onward) > 0.0f);
+    mask keeps = on & (v.depth == 0) & reuse_suits(scene, path, at, v, r) & (dot3(v.s.n, onward) > 0.0f);
+    keeps = keeps & reuse_lobe_is_base(r);
     store_path_reuse(path, at, keeps, (integer)(REUSE_FIRST));
     store_path_reuse_n(path, at, keeps, octahedral_pack(v.s.n));
     store_path_reuse_ns(path, at, keeps, octahedral_pack(scatter.shading.frame.n));
+    store_path_reuse_beta(path, at, keeps, spectrum_mul(v.beta, reuse_weight(r, bs)));
+    store_path_reuse_coat(path, at, keeps, reuse_coat(r));
 }
 
 /* Keeps y. From here on paths gather light apart from the light before. */
-inline void reuse_second(Scene scene, Slab path, uint at, mask met, Vertex *v, Scattering scatter)
+inline ReuseLobe reuse_second(Scene scene, Slab path, uint at, mask met, Vertex *v, Scattering scatter)
 {
-    mask keeps = met & (v->depth == 1) & (load_path_reuse(path, at) == REUSE_FIRST);
-    keeps = keeps & reuse_suits(scene, path, at, *v) & (v->s.light < 0) & (scatter.wo.z > 0.0f);
-    if (!any(keeps)) return;
+    ReuseLobe r = reuse_lobe(scatter);
+    mask suits = met & reuse_suits(scene, path, at, *v, r);
+    r.onward = suits & (v->depth == 0);
+    mask keeps = suits & (v->depth == 1) & (load_path_reuse(path, at) == REUSE_FIRST);
+    keeps = keeps & (v->s.light < 0) & (scatter.wo.z > 0.0f);
+    r.all = keeps;
+    keeps = keeps & reuse_lobe_is_base(r);
+    if (!any(keeps)) return r;
     vec3 back = neg3(v->d), n = sel3(dot3(v->s.n, back) < 0.0f, neg3(v->s.n), v->s.n);
     store_path_reuse(path, at, keeps, (integer)(REUSE_SECOND));
     store_path_reuse_y(path, at, keeps, surface_offset(v->s, back));
     store_path_reuse_yn(path, at, keeps, octahedral_pack(n));
     store_path_reuse_yns(path, at, keeps, octahedral_pack(scatter.shading.frame.n));
+    store_path_reuse_y_coat(path, at, keeps, reuse_coat(r));
     store_path_radiance(path, at, keeps, spectrum_of((real)(0.0f)));
-    v->beta = spectrum_sel(keeps, reuse_throughput(v->beta), v->beta);
+    v->beta = spectrum_sel(keeps, reuse_throughput(load_path_reuse_beta(path, at)), v->beta);
+    return r;
 }
 
 /* Twin, where nothing is shared. */
 inline mask reuse_begins(Scene scene, Vertex v) { return mask_of(0); }
-inline void reuse_first(Scene scene, Slab path, uint at, mask on, Vertex v, Scattering scatter, vec3 onward) {}
-inline void reuse_second(Scene scene, Slab path, uint at, mask met, Vertex *v, Scattering scatter) {}
+inline void reuse_first(Scene scene, Slab path, uint at, mask on, Vertex v, Scattering scatter, vec3 onward,
+                        ReuseLobe r, BsdfSample bs) {}
+inline ReuseLobe reuse_second(Scene scene, Slab path, uint at, mask met, Vertex *v, Scattering scatter)
+{
+    return reuse_lobe(scatter);
+}
 
 /* Step meets: what `intersect` keeps of rays that leave x. */
 #include "transport/reuse.cl"
@@ -103,12 +224,36 @@ inline void reuse_meets(Slab path, uint at, mask active, integer state, vec3 o)
     second = second & (load_path_nulls(path, at) == 0);
     if (!any(second)) return;
     store_path_reuse_x(path, at, second, o);
-    store_path_reuse_beta(path, at, second, load_path_beta(path, at));
     store_path_reuse_before(path, at, second, load_path_radiance(path, at));
 }
 
 /* Twin, where nothing is shared. */
 inline void reuse_meets(Slab path, uint at, mask active, integer state, vec3 o) {}
+
+/* Step passed: transmittances of coats. */
+#include "transport/reuse.cl"
+#include "materials/coat.cl"
+
+inline real coat_word_passes(real cos_i, natural word)
+{
+    integer bits = as_integer(word);
+    real alpha = to_real(bits & 0x7fff) * (1.0f / 32767.0f);
+    alpha = sel((bits & 0x8000) != 0, -alpha, alpha);
+    return coat_passes(max_r(cos_i, (real)(0.0f)), to_real(bits >> 16) * (1.0f / 8192.0f), alpha);
+}
+
+/* Of the coats at x of slots and at y of others. */
+inline real reuse_passed(Slab path, uint at, integer others)
+{
+    vec3 to = normalize3(sub3(reuse_point(path, PATH_REUSE_Y_WORD, others), load_path_reuse_x(path, at)));
+    real departs = dot3(octahedral_unpack(load_path_reuse_ns(path, at)), to);
+    real arrives = -dot3(reuse_normal(path, PATH_REUSE_YNS_WORD, others), to);
+    real passed = coat_word_passes(departs, load_path_reuse_coat(path, at));
+    return passed * coat_word_passes(arrives, as_natural(reuse_word(path, PATH_REUSE_Y_COAT_WORD, others)));
+}
+
+/* Twin, without coats. */
+inline real reuse_passed(Slab path, uint at, integer others) { return 1.0f; }
 
 /* Step end: groups begin and end together. */
 #include "transport/reuse.cl"
@@ -151,6 +296,7 @@ inline Spectrum reuse_gather(Slab path, uint at, mask ended, Spectrum radiance)
         }
         real share = slab_read(path, PATH_REUSE_DENSITY0_WORD + (uint)k, at) / max_r(all, (real)(1e-30f));
         uint word = PATH_RADIANCE_WORD;
+        share *= reuse_passed(path, at, group + k);
 #define C(c) leaves.c = share * reuse_word(path, word++, group + k);
         SPECTRUM_EACH(C)
 #undef C

@@ -8,12 +8,13 @@ from clpt.records import HIT, REUSE_GROUP, SHADOW, SLABS
 from clpt.render.records import Features
 
 ESCAPE = ("escape", "escape_axis", "escape_width", "escape_plane", "escape_depth")
-REUSE = ("reuse", "reuse_n", "reuse_ns", "reuse_y", "reuse_yn", "reuse_yns")
+REUSE = ("reuse", "reuse_n", "reuse_ns", "reuse_beta", "reuse_y", "reuse_yn", "reuse_yns")
+COATS = ("reuse_coat", "reuse_y_coat")
 CHANGED = (
     "o", "d", "beta", "radiance", "lambdas", "pdf", "sampled_hemisphere", "sampled_wo",
     "sampled_gloss", "null_distance", "nulls", "ratio", "eta", "length", "slope", "medium",
     "around", "bodies", "ray_offset", "mis_ratio", "merge_ratio", "expected", *ESCAPE, "state",
-    "cone", *REUSE,
+    "cone", *REUSE, *COATS,
 )  # fmt: skip
 READ = ("weight", "light", "time", "pixel_index", "pixel_key", "sample")  # and not written
 # optional members, each with the features that need it
@@ -40,7 +41,8 @@ NEEDED: dict[str, Callable[[Features], bool]] = {
     "expected": lambda f: f.transport.guided,
     **dict.fromkeys(ESCAPE, lambda f: f.media.escapes),
     "cone": lambda f: f.textures.mips,
-    **dict.fromkeys((*REUSE, "reuse_x", "reuse_beta", "reuse_before"), lambda f: f.film.reuse),
+    **dict.fromkeys((*REUSE, "reuse_x", "reuse_before"), lambda f: f.film.reuse),
+    **dict.fromkeys(COATS, lambda f: f.film.coats),
     "weight": lambda f: f.transport.light_paths or _has_layers(f),
     "light": lambda f: f.transport.balanced,
     "time": lambda f: f.motion.present,

@@ -53,7 +53,13 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         f.media.present, "transport/guiding/guide.cl#collisions"
     ),
     "generated/reuse_meets.cl": lambda f, _: either(f.film.reuse, "transport/reuse.cl#meets"),
-    "generated/reuse.cl": lambda f, _: either(f.film.reuse, "transport/reuse.cl#end"),
+    "generated/reuse.cl": lambda f, _: (
+        *either(f.film.coats, "transport/reuse.cl#passed"),
+        *either(f.film.reuse, "transport/reuse.cl#end"),
+    ),
+    "generated/bsdf_answer.cl": lambda f, _: (
+        f"materials/bsdf.cl#answer{'_lobe' * f.film.coats}",
+    ),
     "generated/reuse_due.cl": lambda f, _: either(f.film.reuse, "transport/reuse.cl#due"),
     "generated/cone.cl": lambda f, _: either(f.textures.mips, "textures/cone.cl"),
     "generated/vertex_media.cl": lambda f, _: (
@@ -326,8 +332,9 @@ MATERIAL_CHOICES: dict[str, Callable[[Features, type[Scatterer]], tuple[str, ...
         *either(cls.kind in f.materials.shining, "integrator/steps/met_emission.cl"),
         *when(_merges(f, cls), "generated/photon.cl", "transport/photons/gather.cl"),
         *either(_merges(f, cls), "integrator/steps/merge.cl"),
-        *either(f.lights.kinds and not cls.delta, "integrator/steps/next_event.cl"),
+        *either(f.film.coats and not flags.is_null(f, cls), "transport/reuse.cl#lobe"),
         *either(f.film.reuse and not flags.is_null(f, cls), "transport/reuse.cl#vertex"),
+        *either(f.lights.kinds and not cls.delta, "integrator/steps/next_event.cl"),
         *either(not flags.is_null(f, cls), "integrator/steps/roulette.cl#path"),
         *either(not flags.is_null(f, cls), "integrator/steps/scatters.cl"),
         _escapes(f, cls),

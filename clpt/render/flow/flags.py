@@ -119,7 +119,11 @@ def between_bodies(features: Features, cls: type[Scatterer]) -> bool:
 
 BETWEEN_BODIES = ("dielectric", "rough_dielectric")  # kinds with an outer index of refraction
 
-REUSED = "diffuse"  # paths share vertices on this kind, see kernels/transport/reuse.cl
+
+def is_coated(cls: type[Scatterer]) -> bool:
+    """Whether a material's diffuse lobe is below a coat."""
+    return cls.has_diffuse_lobe and cls.uses_lobe_sample
+
 
 # name: its value, of the features and the kind that a program shades
 MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
@@ -138,7 +142,7 @@ MATERIAL: dict[str, Callable[[Features, type[Scatterer]], int]] = {
     "BSDF_IS_PHASE": lambda f, cls: cls.is_phase,
     "BSDF_IS_NULL": is_null,
     "BSDF_IS_PANE": lambda f, cls: cls.is_pane and f.materials.free_panes,
-    "BSDF_REUSED": lambda f, cls: f.film.reuse and cls.kind == REUSED,
+    "BSDF_REUSED": lambda f, cls: f.film.reuse and cls.has_diffuse_lobe,
     "STOCHASTIC_FILTERING": filters_at_random,
     "USES_CHOICE": lambda f, cls: cls.uses_lobe_sample or cls.fluoresces or not f.lights.few,
 }

@@ -39,7 +39,7 @@ _ALONE: device.Virtual = {
     "core/grid.cl#texels_at_once": ("core/grid.cl#texels_in_turn",),
     **{
         f"transport/reuse.cl#{step}": (f"transport/reuse.cl#{step}{TWIN}",)
-        for step in ("vertex", "end")
+        for step in ("lobe", "vertex", "passed", "end")
     },
     "materials/film_stack.cl#at_once": ("materials/film_stack.cl#in_turn",),
 }

@@ -20,6 +20,7 @@ from clpt.records import SHAPE_BITS
 from clpt.render.camera import encode_camera
 from clpt.render.film import filters
 from clpt.render.film.colour import sensor
+from clpt.render.flow import flags
 from clpt.render.flow.check import warnings_of
 from clpt.render.flow.find import Analysis, analyse
 from clpt.render.flow.layer_names import lower_names
@@ -268,6 +269,7 @@ class _Tables:
                 bands=bool(index.film.bands),
                 alpha=index.film.alpha,
                 reuse=index.reused,
+                coats=index.reused and any(map(flags.is_coated, index.leaves)),
             ),
             transport=self._transport_features(aimed=bool(index.balanced) and aimed),
             lights=self.lights.features(
@@ -281,7 +283,7 @@ class _Tables:
             materials=self.materials.features(index),
         )
         if own.ratios:  # wavelengths part, so that paths differ in them
-            own = replace(own, film=replace(own.film, reuse=False))
+            own = replace(own, film=replace(own.film, reuse=False, coats=False))
         return usual.widened(own) if index.shared else own
 
     def _transport_features(self, *, aimed: bool) -> TransportFeatures:

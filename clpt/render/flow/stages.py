@@ -256,7 +256,12 @@ def bsdf_text(features: Features, cls: type[Scatterer]) -> str:
     """Return a kind's struct, functions and loader, under the names that the integrators use."""
     kind = cls.kind
     reflectivity = "(m).reflectivity" if "reflectivity" in device_params(cls) else "(real)(0.0f)"
-    others = {"pdfs": cls.chromatic, "across": flags.refracts_widely(features, cls)}
+    others = {
+        "pdfs": cls.chromatic,
+        "across": flags.refracts_widely(features, cls),
+        "diffuse_lobe": features.film.coats and cls.has_diffuse_lobe,
+    }
+    lobeless = features.film.coats and not cls.has_diffuse_lobe
     verbs = ("sample", "eval", "pdf", "albedo", "load", *(verb for verb in others if others[verb]))
     return "\n".join(
         [
@@ -271,6 +276,7 @@ def bsdf_text(features: Features, cls: type[Scatterer]) -> str:
             f"#define BSDF_REFLECTIVITY(m) {reflectivity}",
             *(f"#define bsdf_{verb} {kind}_{verb}" for verb in verbs),
             "#define bsdf_albedo_in(scene, m) bsdf_albedo(m)",
+            "#define bsdf_diffuse_lobe(m, wo) diffuse_lobe_nothing()" if lobeless else "",
             f"#define BSDF_INTERIOR(row) {interior(cls)}" if features.media.absorbing else "",
             *(_shift_text(cls) if flags.fluoresces(features, cls) else ()),
             "",

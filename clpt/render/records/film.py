@@ -152,6 +152,7 @@ class FilmFeatures:
     bands: bool = flag("USES_BANDS")  # a spectral film
     alpha: bool = flag("USES_ALPHA")  # a film with coverage
     reuse: bool = False  # its pixels share second vertices of paths
+    coats: bool = False  # and some of these are below a coat
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ class Diffuse(Material):
     """Lambertian reflection of the front side."""
 
     absorbs = True
+    has_diffuse_lobe = True
 
     reflectance: Textured = reflectance(0.5, "albedo", linear=True)
 

@@ -173,6 +173,7 @@ class Plastic(Material):
     """A diffuse base under a smooth dielectric coat, with all internal reflections; front side."""
 
     uses_lobe_sample = True
+    has_diffuse_lobe = True
 
     diffuse_reflectance: Textured = reflectance(0.5, "albedo of the base")
     int_ior: IndexLike = index(1.49, "index of the coat")
@@ -190,6 +191,7 @@ class RoughPlastic(Material):
         roughness: InitVar[float | None] = None
 
     uses_lobe_sample = True
+    has_diffuse_lobe = True
 
     diffuse_reflectance: Textured = reflectance(0.5, "albedo of the base")
     int_ior: IndexLike = index(1.49, "index of the coat")

@@ -29,9 +29,9 @@ inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering sc
 
 /* Evaluates the BSDF and the MIS weight of the point's light. */
 inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering scatter, MisRatio mis_ratio,
-                                  Guided guided, Spectrum ratio SHADE_ARGS)
+                                  Guided guided, Spectrum ratio, ReuseLobe lobe SHADE_ARGS)
 {
-    BsdfPair pair = bsdf_pair(scatter.bsdf, scatter.wo, e.wi, ratio);
+    BsdfPair pair = reuse_pair(lobe, scatter.wo, e.wi, bsdf_pair(scatter.bsdf, scatter.wo, e.wi, ratio));
     Spectrum f = spectrum_scale(pair.f, shading_frame_share(scatter.shading, e.ls.wi));
     real p = guided_pdf(guided, e.ls.wi, pair.pdf MERGE_PASSED);
     real w = event_weight(scene, mis_ratio, v.s, e.ls, e.begins, pair, p);
@@ -67,7 +67,7 @@ inline NextEvent next_event_seek(Scene scene, mask next, Vertex v, Scattering sc
     return e;
 }
 inline NextEvent next_event_weigh(Scene scene, NextEvent e, Vertex v, Scattering scatter, MisRatio mis_ratio,
-                                  Guided guided, Spectrum ratio SHADE_ARGS) { return e; }
+                                  Guided guided, Spectrum ratio, ReuseLobe lobe SHADE_ARGS) { return e; }
 inline integer next_event_keep(Scene scene, Slab path, Slab shadow, uint at, mask active, Vertex v, NextEvent e)
 {
     return (integer)(0);

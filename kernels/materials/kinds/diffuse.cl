@@ -21,3 +21,9 @@ real diffuse_pdf(Diffuse m, vec3 wo, vec3 wi)
 }
 
 Spectrum diffuse_albedo(Diffuse m) { return m.reflectance; }
+
+DiffuseLobe diffuse_diffuse_lobe(Diffuse m, vec3 wo)
+{
+    DiffuseLobe lobe = {m.reflectance, (real)(0.0f), (real)(0.0f), (real)(0.0f)};
+    return lobe;
+}

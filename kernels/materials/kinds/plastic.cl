@@ -63,3 +63,14 @@ real plastic_pdf(Plastic m, vec3 wo, vec3 wi)
 }
 
 Spectrum plastic_albedo(Plastic m) { return m.diffuse_reflectance; }
+
+DiffuseLobe plastic_diffuse_lobe(Plastic m, vec3 wo)
+{
+    DiffuseLobe lobe;
+    Spectrum eta = relative_index(m.int_ior, m.ext_ior);
+    lobe.value = plastic_base(m, eta, spectrum_of(0.0f));
+    lobe.other = plastic_mirror_probability(m, spectrum_mean(fresnel_spectrum(fabs(wo.z), eta)));
+    lobe.eta = sel(spectrum_varies(eta), (real)(-1.0f), eta.x);
+    lobe.alpha = 0.0f;
+    return lobe;
+}

@@ -14,6 +14,19 @@ inline real rough_plastic_coat_probability(RoughPlastic m, real t)
     return sel(r + d > 0.0f, r / max_r(r + d, (real)(1e-20f)), (real)(0.5f));
 }
 
+/* The base, but for T(wo) T(wi): pi f. */
+inline Spectrum rough_plastic_base(RoughPlastic m, Microfacets d, Spectrum eta)
+{
+    Spectrum inside = coat_inside_reflectance_spectrum(d, eta), r;
+    mask nonlinear = m.nonlinear != 0;
+#define C(c)                                                           \
+    inside.c *= sel(nonlinear, m.diffuse_reflectance.c, (real)(1.0f)); \
+    r.c = m.diffuse_reflectance.c / (eta.c * eta.c * (1.0f - inside.c));
+    SPECTRUM_EACH(C)
+#undef C
+    return r;
+}
+
 /* eval and pdf, given T(wo). */
 inline Spectrum rough_plastic_value(RoughPlastic m, vec3 wo, vec3 wi, Spectrum t_wo)
 {
@@ -24,14 +37,8 @@ inline Spectrum rough_plastic_value(RoughPlastic m, vec3 wo, vec3 wi, Spectrum t
     real v = microfacet_d(d, h) * g / max_r(4.0f * wo.z, (real)(1e-20f));
     Spectrum f = fresnel_spectrum(clamp_r(dot3(wo, h), (real)(0.0f), (real)(1.0f)), eta);
     Spectrum coat = spectrum_scale(spectrum_mul(m.specular_reflectance, f), v);
-    Spectrum t_wi = coat_transmittance_spectrum(d, fabs(wi.z), eta), r;
-    Spectrum inside = coat_inside_reflectance_spectrum(d, eta);
-    mask nonlinear = m.nonlinear != 0;
-#define C(c)                                                           \
-    inside.c *= sel(nonlinear, m.diffuse_reflectance.c, (real)(1.0f)); \
-    r.c = m.diffuse_reflectance.c * t_wo.c * t_wi.c / (eta.c * eta.c * (1.0f - inside.c));
-    SPECTRUM_EACH(C)
-#undef C
+    Spectrum passed = spectrum_mul(t_wo, coat_transmittance_spectrum(d, fabs(wi.z), eta));
+    Spectrum r = spectrum_mul(rough_plastic_base(m, d, eta), passed);
     mask front = (wo.z > 0.0f) & (wi.z > 0.0f);
     return spectrum_sel(front, spectrum_madd(r, wi.z * INV_PI, coat), spectrum_of(0.0f));
 }
@@ -75,3 +82,16 @@ BsdfSample rough_plastic_sample(RoughPlastic m, vec3 wo, vec3 u)
 }
 
 Spectrum rough_plastic_albedo(RoughPlastic m) { return m.diffuse_reflectance; }
+
+DiffuseLobe rough_plastic_diffuse_lobe(RoughPlastic m, vec3 wo)
+{
+    DiffuseLobe lobe;
+    Microfacets d = rough_plastic_facets(m);
+    Spectrum eta = relative_index(m.int_ior, m.ext_ior);
+    lobe.value = rough_plastic_base(m, d, eta);
+    Spectrum t = coat_transmittance_spectrum(d, fabs(wo.z), eta);
+    lobe.other = rough_plastic_coat_probability(m, spectrum_mean(t));
+    lobe.eta = sel(spectrum_varies(eta), (real)(-1.0f), eta.x);
+    lobe.alpha = sel(d.beckmann, -d.alpha_u, d.alpha_u);
+    return lobe;
+}

@@ -209,7 +209,19 @@ def mixed(mode: str) -> Scene:
     return room(*things, *boxes()[:1], sides=walls(right=m.RoughPlastic(alpha=0.3)), mode=mode)
 
 
-KINDS = (cornell, smooth, tilted, textured, masked, instanced, shining, mixed)
+def coated(mode: str) -> Scene:
+    """Plastics, smooth and rough, whose coats turn dark and bright toward the horizon."""
+    sides = walls(
+        back=m.RoughPlastic(alpha=0.3, diffuse_reflectance=(0.7, 0.5, 0.3)),
+        floor=m.RoughPlastic(alpha=0.1, distribution="beckmann", diffuse_reflectance=0.8),
+        ceiling=m.Plastic(diffuse_reflectance=0.8, int_ior=1.8),
+        left=m.RoughPlastic(alpha=0.6, int_ior=2.2, nonlinear=True, diffuse_reflectance=0.7),
+        right=m.RoughPlastic(alpha=0.2, int_ior=1.0, ext_ior=1.3, diffuse_reflectance=0.6),
+    )
+    return room(*boxes(), coarse(0.3, (0.3, 1.2, 0.0), m.Plastic()), sides=sides, mode=mode)
+
+
+KINDS = (cornell, smooth, tilted, textured, masked, instanced, shining, mixed, coated)
 ROOMS = {scene.__name__: scene for scene in KINDS}
 
 
