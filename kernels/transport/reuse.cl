@@ -22,28 +22,46 @@
 #define REUSE_WEIGHED 4  /* the densities of the path are known */
 #define REUSE_LEAST 0.1f /* of the throughput at y, as other paths may have more of a colour there */
 
-/* The first slot of the group of each slot. */
-inline integer reuse_group(uint at) { return (LANE_INDEX + (int)at) & ~(REUSE_GROUP - 1); }
-
-/* A word of any slots. */
-inline real reuse_word(Slab path, uint word, integer slots)
+/* A word of the k-th slot of each slot's group; a work-item has one slot, a group, or two groups. */
+inline real reuse_word(Slab path, uint word, uint at, uint k)
 {
-    return gather(slab_at(path, word, 0u), slab_places(path, slots));
+    global const float *slots = slab_at(path, word, at & ~(REUSE_GROUP - 1u));
+#if LANES == 2 * REUSE_GROUP
+    return sel(LANE_INDEX < REUSE_GROUP, (real)(slots[k]), (real)(slots[REUSE_GROUP + k]));
+#else
+    return (real)(slots[k]);
+#endif
 }
 
-inline vec3 reuse_point(Slab path, uint word, integer slots)
+/* The sum over the slots of each slot's group. */
+inline real reuse_sum(real x)
 {
-    return v3(reuse_word(path, word, slots), reuse_word(path, word + 1u, slots), reuse_word(path, word + 2u, slots));
+#if LANES == 2 * REUSE_GROUP
+    x += x.s1032547698badcfe;
+    x += x.s23016745ab89efcd;
+    return x + x.s45670123cdef89ab;
+#elif LANES == REUSE_GROUP
+    x += x.s10325476;
+    x += x.s23016745;
+    return x + x.s45670123;
+#else
+    return x;
+#endif
 }
 
-inline vec3 reuse_normal(Slab path, uint word, integer slots)
+inline vec3 reuse_point(Slab path, uint word, uint at, uint k)
 {
-    return octahedral_unpack(as_natural(reuse_word(path, word, slots)));
+    return v3(reuse_word(path, word, at, k), reuse_word(path, word + 1u, at, k), reuse_word(path, word + 2u, at, k));
 }
 
-inline natural reuse_vertices(Slab path, integer slots)
+inline vec3 reuse_normal(Slab path, uint word, uint at, uint k)
 {
-    return as_natural(reuse_word(path, PATH_REUSE_WORD, slots)) & REUSE_VERTICES;
+    return octahedral_unpack(as_natural(reuse_word(path, word, at, k)));
+}
+
+inline natural reuse_vertices(Slab path, uint at, uint k)
+{
+    return as_natural(reuse_word(path, PATH_REUSE_WORD, at, k)) & REUSE_VERTICES;
 }
 
 /* The throughput of a path at y, before the reflection there; beta: its throughput behind x. */
@@ -56,6 +74,7 @@ inline Spectrum reuse_throughput(Spectrum beta)
 }
 
 #define COAT_LARGEST 3.99f /* index of a coat */
+#define REUSE_OTHER 0.1f   /* largest probability of the coat's lobe at x: where it is larger, most noise is the coat's */
 
 /* A coat as a word: its roughness, its distribution, its index in units of 2^-13; 0: there is none. */
 inline natural coat_pack(real eta, real alpha)
@@ -90,6 +109,7 @@ inline ReuseLobe reuse_lobe(Scattering scatter)
 
 inline mask reuse_lobe_suits(ReuseLobe r) { return (r.lobe.eta >= 0.0f) & (r.lobe.eta < COAT_LARGEST); }
 inline mask reuse_lobe_is_base(ReuseLobe r) { return r.base; }
+inline mask reuse_lobe_begins(ReuseLobe r) { return r.lobe.other < REUSE_OTHER; }
 inline natural reuse_coat(ReuseLobe r) { return coat_pack(r.lobe.eta, r.lobe.alpha); }
 
 /* f |cos| of the diffuse lobe over its probability, but for the coat's transmittance toward wo. */
@@ -152,6 +172,7 @@ inline ReuseLobe reuse_lobe(Scattering scatter)
 }
 inline mask reuse_lobe_suits(ReuseLobe r) { return mask_of(1); }
 inline mask reuse_lobe_is_base(ReuseLobe r) { return mask_of(1); }
+inline mask reuse_lobe_begins(ReuseLobe r) { return mask_of(1); }
 inline natural reuse_coat(ReuseLobe r) { return 0u; }
 inline BsdfPair reuse_pair(ReuseLobe r, vec3 wo, vec3 wi, BsdfPair pair) { return pair; }
 inline BsdfSample reuse_sample(ReuseLobe r, vec3 wo, BsdfSample s) { return s; }
@@ -176,7 +197,7 @@ inline void reuse_first(Scene scene, Slab path, uint at, mask on, Vertex v, Scat
                         ReuseLobe r, BsdfSample bs)
 {
     mask keeps = on & (v.depth == 0) & reuse_suits(scene, path, at, v, r) & (dot3(v.s.n, onward) > 0.0f);
-    keeps = keeps & reuse_lobe_is_base(r);
+    keeps = keeps & reuse_lobe_begins(r) & reuse_lobe_is_base(r);
     store_path_reuse(path, at, keeps, (integer)(REUSE_FIRST));
     store_path_reuse_n(path, at, keeps, octahedral_pack(v.s.n));
     store_path_reuse_ns(path, at, keeps, octahedral_pack(scatter.shading.frame.n));
@@ -189,7 +210,7 @@ inline ReuseLobe reuse_second(Scene scene, Slab path, uint at, mask met, Vertex 
 {
     ReuseLobe r = reuse_lobe(scatter);
     mask suits = met & reuse_suits(scene, path, at, *v, r);
-    r.onward = suits & (v->depth == 0);
+    r.onward = suits & (v->depth == 0) & reuse_lobe_begins(r);
     mask keeps = suits & (v->depth == 1) & (load_path_reuse(path, at) == REUSE_FIRST);
     keeps = keeps & (v->s.light < 0) & (scatter.wo.z > 0.0f);
     r.all = keeps;
@@ -242,18 +263,18 @@ inline real coat_word_passes(real cos_i, natural word)
     return coat_passes(max_r(cos_i, (real)(0.0f)), to_real(bits >> 16) * (1.0f / 8192.0f), alpha);
 }
 
-/* Of the coats at x of slots and at y of others. */
-inline real reuse_passed(Slab path, uint at, integer others)
+/* Of the coats at x of each slot and at y of the k-th of its group. */
+inline real reuse_passed(Slab path, uint at, uint k)
 {
-    vec3 to = normalize3(sub3(reuse_point(path, PATH_REUSE_Y_WORD, others), load_path_reuse_x(path, at)));
+    vec3 to = normalize3(sub3(reuse_point(path, PATH_REUSE_Y_WORD, at, k), load_path_reuse_x(path, at)));
     real departs = dot3(octahedral_unpack(load_path_reuse_ns(path, at)), to);
-    real arrives = -dot3(reuse_normal(path, PATH_REUSE_YNS_WORD, others), to);
+    real arrives = -dot3(reuse_normal(path, PATH_REUSE_YNS_WORD, at, k), to);
     real passed = coat_word_passes(departs, load_path_reuse_coat(path, at));
-    return passed * coat_word_passes(arrives, as_natural(reuse_word(path, PATH_REUSE_Y_COAT_WORD, others)));
+    return passed * coat_word_passes(arrives, as_natural(reuse_word(path, PATH_REUSE_Y_COAT_WORD, at, k)));
 }
 
 /* Twin, without coats. */
-inline real reuse_passed(Slab path, uint at, integer others) { return 1.0f; }
+inline real reuse_passed(Slab path, uint at, uint k) { return 1.0f; }
 
 /* Step end: groups begin and end together. */
 #include "transport/reuse.cl"
@@ -285,19 +306,14 @@ inline Spectrum reuse_gather(Slab path, uint at, mask ended, Spectrum radiance)
 #undef C
     store_path_radiance(path, at, ended & second, leaves); /* of y, for any path of the group */
     Spectrum sum = spectrum_sel(ended & second, load_path_reuse_before(path, at), radiance);
-    integer group = reuse_group(at);
-    for (int k = 0; k < REUSE_GROUP; k++) {
-        mask brings = takes & (reuse_vertices(path, group + k) == REUSE_SECOND);
+    for (uint k = 0; k < REUSE_GROUP; k++) {
+        mask brings = takes & (reuse_vertices(path, at, k) == REUSE_SECOND);
         if (!any(brings)) continue;
-        real all = 0.0f;
-        for (int i = 0; i < REUSE_GROUP; i++) {
-            real density = reuse_word(path, PATH_REUSE_DENSITY0_WORD + (uint)k, group + i);
-            all += sel(reuse_vertices(path, group + i) != 0u, density, (real)(0.0f));
-        }
-        real share = slab_read(path, PATH_REUSE_DENSITY0_WORD + (uint)k, at) / max_r(all, (real)(1e-30f));
+        real density = slab_read(path, PATH_REUSE_DENSITY0_WORD + k, at);
+        real all = reuse_sum(sel(vertices != 0u, density, (real)(0.0f)));
+        real share = reuse_passed(path, at, k) * density / max_r(all, (real)(1e-30f));
         uint word = PATH_RADIANCE_WORD;
-        share *= reuse_passed(path, at, group + k);
-#define C(c) leaves.c = share * reuse_word(path, word++, group + k);
+#define C(c) leaves.c = share * reuse_word(path, word++, at, k);
         SPECTRUM_EACH(C)
 #undef C
         sum = spectrum_sel(brings, spectrum_add(sum, spectrum_mul(beta, leaves)), sum);
@@ -308,7 +324,7 @@ inline Spectrum reuse_gather(Slab path, uint at, mask ended, Spectrum radiance)
 /* The sampler that chooses wavelengths: a group has the same. own: that of the pixel. */
 inline Sampler reuse_sampler(Scene scene, Slab path, uint at, Sampler own, integer sample)
 {
-    natural key = as_natural(reuse_word(path, PATH_PIXEL_KEY_WORD, reuse_group(at)));
+    natural key = as_natural(reuse_word(path, PATH_PIXEL_KEY_WORD, at, 0u));
     return pixel_sampler(scene.settings, key, sample);
 }
 
