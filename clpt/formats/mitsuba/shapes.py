@@ -6,6 +6,7 @@ mesh loader").
 
 from __future__ import annotations
 
+import os
 import struct
 import zlib
 from collections.abc import Callable, Iterable
@@ -13,22 +14,23 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt import transforms
+from clpt import images, transforms
 from clpt.errors import SceneError
 from clpt.files import budget, input_files
-from clpt.formats import volumes
-from clpt.formats.meshes import mesh, spheres_curves
+from clpt.formats import reading, volumes
+from clpt.formats.meshes import mesh, obj, ply, spheres_curves, triangles
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import area
 from clpt.formats.mitsuba.media import body, side
 from clpt.formats.mitsuba.properties import Context, NoArea, PluginReader, Properties, unknown
 from clpt.formats.mitsuba.xml import Element
 from clpt.formats.reading import attempt
+from clpt.geometry import polygons
 from clpt.geometry.polygons import smooth_normals
 from clpt.scene import shapes
 from clpt.scene.materials import Dielectric, Diffuse, Material, Null
@@ -86,7 +88,7 @@ def read(path: Path, index: int, archives: dict[Path, bytes]) -> tuple[Mesh, boo
     archives: the contents of the files that were read before, by path; a file is read once.
     Raises SceneError for a file that is missing or broken, or has no such mesh.
     """
-    if path not in archives:
+    if not archives.get(path):
         archives[path] = input_files.read_bytes(path)
     data = archives[path]
     first, end, version = _mesh_range(path, data, index)
@@ -179,6 +181,8 @@ def _places(mesh: Mesh) -> NDArray[Any]:
     return np.unique(np.concatenate(parts, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
 
 
+_MODULES = mesh, obj, ply, triangles, polygons, reading, input_files, transforms, images.colour
+MESH_CODE = (__file__, *(str(module.__file__) for module in _MODULES))
 Parameters = dict[str, Any]
 SDF_PIECES = 4  # of the side of a cell
 UNEVEN = 1e-3  # relative stretch of round shapes that a transform may have
@@ -381,34 +385,78 @@ def _serialized(props: Properties) -> Parameters:
     return _mesh(props, ".serialized", flip_v=False)
 
 
+class _Wanted(NamedTuple):
+    """An element's statements on the mesh in a file.
+
+    number: of the mesh in a .serialized file; flat: without normals; crease: largest angle between
+    smooth triangles [deg], below 0 for any; smooth: whether normals are made where there are none.
+    """
+
+    suffix: str
+    number: int
+    flat: bool
+    crease: float
+    smooth: bool
+    flip_v: bool
+
+
 def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
     """Read a mesh into world space, where Mitsuba makes the normals that the file lacks."""
-    path = props.file()
+    path, context = props.file(), props.context
     flat = props.flag("face_normals", False)
-    crease = props.number("max_smooth_angle", -1.0) if props.context.old else -1.0
+    crease = props.number("max_smooth_angle", -1.0) if context.old else -1.0
     to_world = props.placement(thin=True)
     if path.suffix.lower() != suffix:
         raise props.element.error(f"{path.name!r} is not a {suffix} file")
+    number = props.integer("shape_index", 0) if suffix == ".serialized" else 0
+    wanted = _Wanted(suffix, number, flat, crease, context.document.makes_normals, flip_v)
     try:
-        if suffix == ".serialized":
-            index = props.integer("shape_index", 0)
-            whole, own_flat, warnings = read(path, index, props.context.archives)
-            flat |= own_flat
-        else:
-            loaded = mesh.read_mesh(path, materials=False)
-            whole, warnings = mesh.join(loaded.meshes), loaded.warnings
+        status, make = (
+            input_files.regular(path),
+            partial(_in_world, path, wanted, to_world, context),
+        )
+        by = *wanted, path.name, to_world.tobytes()
+        (arrays, warnings), new = context.document.meshes.get(status, by, make)
+        if not new:
+            _count(path, status, arrays, context)
     except SceneError as error:
         raise props.element.error(f"{path.name}: {error.message}") from None
     for warning in warnings:
-        props.context.warn(props.element, f"{path.name}: {warning}")
-    if crease >= 0.0 and not flat:
-        whole = creased(whole, crease)
-    flat |= whole.normals is None and not props.context.document.makes_normals
+        context.warn(props.element, f"{path.name}: {warning}")
+    return dict(arrays)
+
+
+def _count(path: Path, status: os.stat_result, arrays: Parameters, context: Context) -> None:
+    """Count a mesh that an earlier process has read, as if its file was read now."""
+    if path not in context.archives:
+        budget.reads(status)
+    if path.suffix.lower() == ".serialized":  # such a file is read once, for all of its meshes
+        context.archives[path] = context.archives.get(path, b"")
+    held = [a for a in (*arrays.values(), *arrays["attributes"].values()) if a is not None]
+    size = sum(a.nbytes for a in held if isinstance(a, np.ndarray))
+    budget.take(size, f"the mesh {path.name!r}", path)
+    budget.take_parts(1, "meshes", path)
+
+
+def _in_world(
+    path: Path, wanted: _Wanted, to_world: transforms.Matrix, context: Context
+) -> tuple[Parameters, list[str]]:
+    """Return the arrays of a mesh in world space, and warnings."""
+    flat = wanted.flat
+    if wanted.suffix == ".serialized":
+        whole, own_flat, warnings = read(path, wanted.number, context.archives)
+        flat |= own_flat
+    else:
+        loaded = mesh.read_mesh(path, materials=False)
+        whole, warnings = mesh.join(loaded.meshes), loaded.warnings
+    if wanted.crease >= 0.0 and not flat:
+        whole = creased(whole, wanted.crease)
+    flat |= whole.normals is None and not wanted.smooth
     vertices, moves = whole.vertices, not np.array_equal(to_world, transforms.IDENTITY)
     if moves:
         vertices = transforms.transform_points(to_world, vertices).astype(np.float32)
     uvs = whole.uvs
-    if uvs is not None and flip_v:
+    if uvs is not None and wanted.flip_v:
         uvs = np.column_stack([uvs[:, 0], 1.0 - uvs[:, 1]]).astype(np.float32)
     normals, faces = None if flat else whole.normals, whole.faces
     if not flat and normals is None:
@@ -418,7 +466,7 @@ def _mesh(props: Properties, suffix: str, *, flip_v: bool) -> Parameters:
         if transforms.flips_handedness(to_world):
             faces = faces[:, ::-1].copy()  # the file's normals decide the front, not the winding
     arrays = {"vertices": vertices, "faces": faces, "normals": normals, "uvs": uvs}
-    return {**arrays, "attributes": whole.attributes}
+    return {**arrays, "attributes": dict(whole.attributes)}, warnings
 
 
 def _bspline_curve(props: Properties) -> Parameters:

@@ -20,7 +20,7 @@ from clpt.geometry import analytic, shapes, triangles
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
-from clpt.render.lights.aims import is_sharp, sharp_pieces
+from clpt.render.lights.aims import Sharp, is_sharp
 from clpt.render.lights.find import Sources, environment_of
 from clpt.render.records.tables import LoweringCache
 from clpt.render.scene_index import SceneIndex
@@ -193,8 +193,7 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     if sum(share for _, _, share, _ in lit.small) < MOSTLY:
         return Path(light_paths=FEW), f"{reason}, though most light is of large ones"
     number = SOME
-    enclosed = (s for _, place, s, _ in lit.small if _is_enclosed(geometry, place))
-    if sum(enclosed) >= MOSTLY:
+    if _enclosed(lit) >= MOSTLY:
         number, reason = MANY, f"{reason}, in a bulb"
     if not _sees_clear(index, geometry):
         reason = f"{reason}; the camera sees little glass and few mirrors"
@@ -248,13 +247,24 @@ def _hides(shape: Shape) -> bool:
     return shape.interior is not None and shape.interior.scatters
 
 
-def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
-    """Whether a light at a place [m] is in a bulb: specular shapes fill most directions."""
-    if place is None:
-        return False
+def _enclosed(lit: Lit) -> float:
+    """Return the share in the power of all lights of those in bulbs: see `_is_enclosed`."""
+    placed = [(place, share) for _, place, share, _ in lit.small if place is not None]
+    sharp = Sharp(lit.geometry, (), lambda m: is_sharp(m) and not _is_diffuse(m))
+    by = [(place.tolist(), share) for place, share in placed]
+
+    def share_of(pieces: Iterable[NDArray[np.float64]]) -> float:
+        pieces = list(pieces)
+        return sum(share for place, share in placed if _is_enclosed(pieces, place))
+
+    return float(sharp.remembered(__file__, ("enclosed", by), share_of))
+
+
+def _is_enclosed(shapes_: Iterable[NDArray[np.float64]], place: NDArray[np.float64]) -> bool:
+    """Whether a light at a place [m] is in a bulb: the pieces of shapes fill most directions."""
     covered = np.zeros(DIRECTIONS, bool)
     directions = _cone(np.array([0.0, 0.0, 1.0]), -1.0, DIRECTIONS)
-    for pieces in sharp_pieces(geometry, (), lambda m: is_sharp(m) and not _is_diffuse(m)):
+    for pieces in shapes_:
         covered[_covered(pieces, place, directions)] = True
     return bool(covered.mean() > BULB)
 
@@ -293,13 +303,19 @@ def _sees_clear(index: SceneIndex, geometry: Geometry) -> bool:
     """Whether mirrors and clear shapes fill enough of the picture, as if no shape hid them."""
     view = index.camera.view_of(index.film.width, index.film.height)
     assert view is not None, "a camera that can be joined has a point"
-    directions = _cone(view.axis, math.cos(view.angle), RAYS)
-    for pieces in sharp_pieces(geometry, index.motions.shapes, lambda m: is_sharp(m, CLEAR)):
-        met = _covered(pieces, view.origin, directions)
-        directions = np.delete(directions, met, axis=1)
-        if directions.shape[1] <= (1.0 - SEEN) * RAYS:
-            return True
-    return False
+
+    def sees(shapes_: Iterable[NDArray[np.float64]]) -> bool:
+        directions = _cone(view.axis, math.cos(view.angle), RAYS)
+        for pieces in shapes_:
+            met = _covered(pieces, view.origin, directions)
+            directions = np.delete(directions, met, axis=1)
+            if directions.shape[1] <= (1.0 - SEEN) * RAYS:
+                return True
+        return False
+
+    sharp = Sharp(geometry, index.motions.shapes, lambda m: is_sharp(m, CLEAR))
+    by = "sees", view.origin.tolist(), view.axis.tolist(), view.angle
+    return bool(sharp.remembered(__file__, by, sees))
 
 
 def _has_shades(lit: Lit) -> bool:
