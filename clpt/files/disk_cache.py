@@ -213,7 +213,8 @@ def _digest(files: tuple[str | Path, ...]) -> bytes:
     return digest.digest()
 
 
-def _entry(code: Iterable[str | Path], content: Iterable[Any]) -> str:
+def entry_of(code: Iterable[str | Path], content: Iterable[Any]) -> str:
+    """Return the key of what files make of bytes and C-contiguous arrays."""
     digest = hashlib.sha256(_digest(tuple(code)))
     for part in content:
         digest.update(memoryview(part).nbytes.to_bytes(8, "little"))
@@ -234,7 +235,7 @@ def remembered(code: Iterable[str | Path], content: Iterable[Any], make: Callabl
     depends besides; make: returns it anew, and is worth an entry if it takes WORTH. The last bits
     may come from another processor that shares the folder.
     """
-    entry = _entry(code, content)
+    entry = entry_of(code, content)
     stored = load(entry)
     if stored is not None:
         return pickle.loads(stored[1])
@@ -252,7 +253,7 @@ class OfFiles:
     """
 
     def __init__(self, code: Iterable[str | Path] = (), name: str | None = None):
-        self._entry = None if name is None else _entry(code, [name.encode()])
+        self._entry = None if name is None else entry_of(code, [name.encode()])
         self._used: dict[Any, Any] = {}
         self._changed = False
 
