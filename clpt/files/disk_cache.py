@@ -222,7 +222,7 @@ def entry_of(code: Iterable[str | Path], content: Iterable[Any]) -> str:
     return digest.hexdigest()
 
 
-def _keep_value(entry: str, value: Any) -> None:
+def _keep_value(entry: str, value: object) -> None:
     packed = pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
     if len(packed) <= _LARGEST:
         store(entry, "value", packed)

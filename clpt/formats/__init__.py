@@ -151,8 +151,7 @@ def _load(
         if kind == "mesh":
             return framing.load_mesh(path, missing_textures)
         return framing.load_density(path)
-    module = f"{kind}.scenes" if kind == "pbrt" else kind  # Mitsuba's reader takes parts of pbrt's
-    loader = importlib.import_module(f"clpt.formats.{module}").load
+    loader = importlib.import_module(f"clpt.formats.{kind}").load
     if kind == "native":
         return loader(path, kinds, missing_textures)
     if kind == "pbrt":

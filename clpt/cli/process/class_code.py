@@ -12,7 +12,6 @@ import dataclasses
 import marshal
 import sys
 from types import CodeType
-from typing import Any
 
 from clpt.files import disk_cache
 
@@ -29,7 +28,7 @@ def keep() -> None:
     known: dict[str, CodeType] = marshal.loads(stored[1]) if stored else {}
     before = len(known)
 
-    def run(text: str, *scopes: Any) -> None:
+    def run(text: str, *scopes: dict[str, object]) -> None:
         code = known.get(text)
         if code is None:
             code = known[text] = compile(text, "<string>", "exec", dont_inherit=True)

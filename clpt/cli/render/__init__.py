@@ -17,7 +17,7 @@ from ..options.grading import grading_options, names_option
 from ..options.records import grouped, verbose_option, with_records
 from ..options.scene_options import denoise_option, scene_options, worker_options
 from ..options.values import ScenePath
-from ..process import class_code, ending, terminal
+from ..process import ending, terminal
 from .settings import Job, Settings, picture_options, tev_option
 
 EXAMPLES = (
@@ -71,7 +71,6 @@ def render(scenes: tuple[Path, ...], form: str | None, settings: Settings) -> in
 def _rendered(job: Job) -> int:
     """Render the picture of a scene, or its frames; return the exit status."""
     began = time.perf_counter()
-    class_code.keep()
     from ..display import display
 
     if job.animation.frames is not None:
@@ -79,6 +78,9 @@ def _rendered(job: Job) -> int:
 
         return render_frames(job, display(job.quiet, None))
     locate(job.scene)
+    from ..process import class_code  # here: a missing file is told at once
+
+    class_code.keep()
     targets.checked(job.targets)
     name = targets.name_of(job.scene)
     shown = display(job.quiet, job.until.limit, name)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.files import disk_cache
 from clpt.geometry import analytic, shapes, triangles
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
@@ -58,6 +59,7 @@ ALL_AROUND = 0.49 * np.pi  # [rad] from a light's axis: a light that reaches it 
 Ball = tuple[NDArray[np.float64], float]  # centre and radius
 # Its name, its place [m], its share in the power of all lights, its rows in `lights`.
 Small = tuple[str, NDArray[np.float64] | None, float, slice]
+Slices = tuple[slice, slice]
 
 
 @dataclass(frozen=True)
@@ -324,13 +326,27 @@ def _has_shades(lit: Lit) -> bool:
     These are small and bright, as irradiance falls with the square of the distance. Paths from the
     camera seldom meet them, and light paths all do. Instances and analytic shapes do not count.
     """
-    shaded = 0.0
-    for _, place, share, rows in sorted(lit.small, key=lambda light: -light[2])[:LAMPS]:
-        if place is not None:
-            near = SHADE * float(np.linalg.norm(lit.eye - place))
-            met = _covered(_nearby(lit.geometry, place, near), place, _directions(lit.bounds[rows]))
+    brightest = sorted(lit.small, key=lambda light: -light[2])[:LAMPS]
+    lamps = [
+        (place, share, float(np.linalg.norm(lit.eye - place)), _directions(lit.bounds[rows]))
+        for _, place, share, rows in brightest
+        if place is not None
+    ]
+    shades = [
+        (slice_, faces)
+        for shape, slice_, faces in lit.geometry.meshes()
+        if shape.emission is None and _is_diffuse(shape.material)
+    ]
+
+    def has_shades() -> bool:
+        shaded = 0.0
+        for place, share, far, directions in lamps:
+            met = _covered(_nearby(lit.geometry, shades, place, SHADE * far), place, directions)
             shaded += share * (len(np.unique(met)) >= SHADED * DIRECTIONS)
-    return shaded >= SHADED
+        return shaded >= SHADED
+
+    asked = repr(([(p.tolist(), s, far, d.tobytes()) for p, s, far, d in lamps], shades)).encode()
+    return bool(disk_cache.remembered([__file__], (lit.geometry.digest, asked), has_shades))
 
 
 def _directions(bounds: light_bounds.Bounds) -> NDArray[np.float64]:
@@ -343,13 +359,13 @@ def _directions(bounds: light_bounds.Bounds) -> NDArray[np.float64]:
     return _cone(axis / np.linalg.norm(axis), math.cos(widest), DIRECTIONS)
 
 
-def _nearby(geometry: Geometry, place: NDArray[np.float64], near: float) -> NDArray[np.float64]:
-    """Return pieces (n, 10) of diffuse shapes that emit no light, close to a place [m]."""
+def _nearby(
+    geometry: Geometry, meshes: list[Slices], place: NDArray[np.float64], near: float
+) -> NDArray[np.float64]:
+    """Return pieces (n, 10) of meshes, by their vertices and faces, close to a place [m]."""
     found = [np.zeros((0, 10))]
-    for shape, vertices, faces in geometry.meshes():
+    for vertices, faces in meshes:
         corners = geometry.vertices[vertices]
-        if shape.emission is not None or not _is_diffuse(shape.material):
-            continue
         if _apart(corners.min(axis=0), corners.max(axis=0), place) > near:
             continue
         triangles_ = geometry.vertices[geometry.faces[faces]].astype(np.float64)
