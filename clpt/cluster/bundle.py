@@ -18,8 +18,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from clpt.device import disk_cache
 from clpt.errors import ClusterError
+from clpt.files import disk_cache
 from clpt.formats import native
 from clpt.scene import Scene
 

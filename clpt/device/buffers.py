@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import functools
-import hashlib
-import io
 import weakref
-from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pyopencl as cl
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from clpt.device import disk_cache, large_pages
+from clpt.device import large_pages
 
 from ..errors import MemoryBudgetError
 from .context import Device
@@ -189,26 +186,3 @@ class Flag:
         """Set the word to 0."""
         if self.argument is not None:
             self._words[0] = 0
-
-
-def kept(
-    compute: Callable[..., tuple[NDArray[Any], ...]], *arguments: object, files: Iterable[Path]
-) -> tuple[NDArray[Any], ...]:
-    """Return compute(*arguments), from the cache folder after the first time.
-
-    arguments: identified by their repr; files: code and data that the results depend on. The last
-    bits may come from another processor that shares the folder.
-    """
-    digest = hashlib.sha256(repr((compute.__qualname__, arguments, np.__version__)).encode())
-    for file in sorted(files):
-        digest.update(file.read_bytes())
-    entry = digest.hexdigest()
-    stored = disk_cache.load(entry)
-    if stored is not None:
-        with np.load(io.BytesIO(stored[1]), allow_pickle=False) as archive:
-            return tuple(archive[name] for name in archive.files)
-    arrays = compute(*arguments)
-    packed = io.BytesIO()
-    np.savez(packed, *arrays)
-    disk_cache.store(entry, "arrays", packed.getvalue())
-    return arrays

@@ -16,7 +16,8 @@ from typing import TypeVar
 import pyopencl as cl
 from pyopencl.characterize import nv_compute_capability
 
-from clpt.device import compilers, disk_cache, native_programs
+from clpt.device import compilers, native_programs
+from clpt.files import disk_cache
 
 from ..errors import DeviceError, KernelBuildError
 from .compilers import Job
@@ -325,7 +326,9 @@ def _build_error(source: Source, log: str) -> KernelBuildError:
         file, line = first[1], int(first[2])
     elif counted := next(filter(None, map(_COUNTED.search, rows)), None):
         file, line = source.location(int(counted[1]))  # NVIDIA's compiler ignores `#line`
-    return KernelBuildError(source.name, file, line, log, disk_cache.keep_failed(source))
+    return KernelBuildError(
+        source.name, file, line, log, disk_cache.keep_failed(source.name, source.text)
+    )
 
 
 def forms(device: Device, text: str, flags: Sequence[str]) -> Iterator[tuple[str, list[str]]]:

@@ -21,9 +21,11 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 
+from clpt.files import disk_cache
+
 from ..arrays import is_whole
 from ..errors import DeviceError
-from . import disk_cache, native_programs, runtimes
+from . import native_programs, runtimes
 from .compilers import Compilers, spare_cores
 from .context import Device, DeviceInfo, devices
 from .source import Source, assemble

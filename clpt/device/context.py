@@ -11,11 +11,10 @@ from functools import cached_property
 import pyopencl as cl
 
 from clpt.device import (
-    disk_cache,
     forking,
     runtimes,
 )
-from clpt.files import budget
+from clpt.files import budget, disk_cache
 
 from ..errors import DeviceError
 from .compilers import Compilers

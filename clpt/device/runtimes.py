@@ -26,8 +26,7 @@ from pathlib import Path
 
 import pyopencl as cl
 
-from clpt.device import disk_cache
-from clpt.files import output_files
+from clpt.files import disk_cache, output_files
 
 from ..errors import DeviceError, MemoryBudgetError
 

@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clpt.arrays import Floats
-from clpt.files import budget
+from clpt.files import budget, disk_cache
 from clpt.spectra.data import ROOT
 
+FILE = ROOT / "uplift.npz"
 NODES = 40
 QUANTUM = 1.0 / 2048.0  # of the table's values; the file stores differences along each axis
 CENTRE, HALF_WIDTH = 595.0, 235.0  # [nm] of the unit coordinate
@@ -126,7 +127,7 @@ def table() -> NDArray[np.float32]:
 
 @cache
 def _table() -> NDArray[np.float32]:
-    with np.load(ROOT / "uplift.npz", allow_pickle=False) as file:
+    with np.load(FILE, allow_pickle=False) as file:
         steps = file["steps"]
     for axis in (1, 2, 3):
         steps = steps.cumsum(axis=axis + 1, dtype=np.int32)
@@ -140,6 +141,11 @@ def _smoothstep(x: Floats) -> Floats:
 @cache
 def _half_table() -> NDArray[np.float32]:
     """Return the table at a largest component of 1/2, the value that `unbounded` looks up."""
+    half: NDArray[np.float32] = disk_cache.remembered((__file__, FILE), (), _at_half)
+    return half
+
+
+def _at_half() -> NDArray[np.float32]:
     nodes, table = node_values(), _table().reshape(3, NODES, -1, 3)
     below = int(np.searchsorted(nodes, 0.5, "right")) - 1
     t = np.float32((0.5 - nodes[below]) / (nodes[below + 1] - nodes[below]))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from clpt.device import Device, choose, disk_cache
+from clpt.device import Device, choose
+from clpt.files import disk_cache
 
 
 @pytest.fixture(scope="session")

@@ -14,10 +14,11 @@ import pyopencl as cl
 import pytest
 
 from clpt import device as dev
-from clpt.device import compilers, disk_cache, native_programs
+from clpt.device import compilers, native_programs
 from clpt.device.compilers import Compilers, Job
 from clpt.device.program import Argument
 from clpt.errors import DeviceError, KernelBuildError
+from clpt.files import disk_cache
 
 PARTS = {
     "main": "uint seven(void);\n"

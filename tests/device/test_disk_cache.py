@@ -10,8 +10,9 @@ import sys
 import pytest
 
 from clpt import device
-from clpt.device import disk_cache, runtimes
+from clpt.device import runtimes
 from clpt.errors import DeviceError
+from clpt.files import disk_cache
 from clpt.files.output_files import PARTIAL
 
 posix = pytest.mark.skipif(os.name != "posix", reason="of users and permissions")

@@ -17,11 +17,10 @@ import pytest
 import clpt
 from clpt import device
 from clpt.cluster.bundle import Store
-from clpt.device import disk_cache, runtimes
+from clpt.device import runtimes
 from clpt.device.building import has_own_cache
-from clpt.device.source import Source
 from clpt.errors import ClusterError, SceneError
-from clpt.files import output_files
+from clpt.files import disk_cache, output_files
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="of users, links and pipes")
 
@@ -41,7 +40,7 @@ def program(folder: Path) -> Path:
 
 def failed(folder: Path) -> Path:
     """Keep the text of a program that did not build."""
-    path = disk_cache.keep_failed(Source("a.cl", CONTENT.decode(), ()))
+    path = disk_cache.keep_failed("a.cl", CONTENT.decode())
     assert path is None or Path(path).read_bytes() == CONTENT
     return Path(path) if path else folder / "failed" / "a.cl"
 

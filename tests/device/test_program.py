@@ -21,11 +21,11 @@ from clpt.device import (
     build_all,
     building,
     choosing,
-    disk_cache,
     link,
     native_programs,
 )
 from clpt.errors import KernelBuildError
+from clpt.files import disk_cache
 
 TEXT = """
 __kernel void fill(__global float *restrict out, const float4 v, float3 w, uint n, int sign,

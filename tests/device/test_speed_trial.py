@@ -6,7 +6,8 @@ import dataclasses
 
 import pytest
 
-from clpt.device import DeviceInfo, choosing, disk_cache
+from clpt.device import DeviceInfo, choosing
+from clpt.files import disk_cache
 
 SECONDS = {"Alpha": 0.003, "Beta": 0.001, "Gamma": 0.002}
 

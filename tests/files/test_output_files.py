@@ -116,7 +116,7 @@ ELSEWHERE = {
     ("cluster/processes.py", "mkstemp"),  # which nobody else may read, not even in part
     ("cluster/processes.py", "open"),
     ("device/compiler_process.py", "fdopen"),  # to a pipe
-    ("device/disk_cache.py", "open"),  # of locks, which are empty
+    ("files/disk_cache.py", "open"),  # of locks, which are empty
     ("formats/usd/document.py", "write_bytes"),  # into a folder of its own
     ("images/exr_files.py", "write"),  # of films, in their `replacing`
     ("render/materials/rough_coat_table.py", "savez_compressed"),  # its table, made by maintainers

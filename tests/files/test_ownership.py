@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from clpt.device import disk_cache, runtimes
-from clpt.files import output_files
+from clpt.device import runtimes
+from clpt.files import disk_cache, output_files
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="this system has no such owners")
 OTHER = 65534

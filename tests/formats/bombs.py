@@ -539,7 +539,7 @@ def main() -> None:
     import clpt.formats.gltf
     import clpt.formats.mitsuba
     import clpt.formats.native
-    import clpt.formats.pbrt
+    import clpt.formats.pbrt.scenes
     import clpt.render.flow.scene_to_tables  # noqa: F401
 
     memory, seconds = map(int, sys.argv[1:3])

@@ -30,7 +30,7 @@ import numpy as np
 from clpt import images, lenses, measured, spectra
 from clpt.formats import ies, load, volumes
 from clpt.formats.meshes import mesh, mtl_statements, spheres_curves
-from clpt.formats.mitsuba.shapes import read as read_serialized
+from clpt.formats.mitsuba.mesh_files import read as read_serialized
 from clpt.images import read_stored
 from clpt.images.spectral_exr import SpectralImage
 from clpt.images.spectral_exr import read as read_spectral

@@ -12,8 +12,8 @@ from clpt.files import output_files
 from clpt.render.film import film_file, layers
 from clpt.render.film.pictures import DenoisedPicture
 
-from ...device import disk_cache
 from ...errors import ClptError, SceneError
+from ...files import disk_cache
 from ...render.film.film_file import SavedFilm
 from ...render.resumable import ResumableRenderer
 from ...version import VERSION

@@ -45,7 +45,7 @@ def _keep_traceback(error: Exception) -> str:
     """Write the traceback of an error to clpt's log folder; return a phrase with its path."""
     import platformdirs
 
-    from ...device import disk_cache  # here: most commands end without a fault, some without OpenCL
+    from ...files import disk_cache  # here: most commands end without a fault
 
     try:
         logs = Path(platformdirs.user_log_dir("clpt", appauthor=False))

@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from clpt.choices import Missing
+from clpt.files.disk_cache import OfFiles
 from clpt.formats.mitsuba import dicts, nori, old_words, sensors
 from clpt.formats.mitsuba.bsdfs import bsdf
 from clpt.formats.mitsuba.emitters import emitter
 from clpt.formats.mitsuba.grids import Bounds
 from clpt.formats.mitsuba.properties import Context, Properties
 from clpt.formats.mitsuba.sensors import sensor
-from clpt.formats.mitsuba.shapes import shapes_of
+from clpt.formats.mitsuba.shapes import MESH_CODE, shapes_of
 from clpt.formats.mitsuba.spectra import texture
 from clpt.formats.mitsuba.xml import Document, Element, parse
 from clpt.formats.reading import attempt
@@ -50,7 +51,10 @@ def load(path: Path, missing: Missing = "error", /, **variables: object) -> Scen
         document.makes_normals = False
     if document.is_old:
         document.renamed = old_words.rename(document.root)
-    return _from_document(path, document, missing)
+    document.meshes = OfFiles(MESH_CODE, f"meshes of {path.resolve()}")
+    scene = _from_document(path, document, missing)
+    document.meshes.store()
+    return scene
 
 
 def load_dict(scene: Mapping[str, Any], folder: Path, missing: Missing, /) -> Scene:

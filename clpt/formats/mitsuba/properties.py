@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,21 @@ SEPARATOR = re.compile(r"[\s,]+")
 LARGEST_INTEGER = 2**31 - 1
 T = TypeVar("T")
 PluginReader = Callable[["Properties"], T]  # reads the parameters of a plugin
+
+
+class Wanted(NamedTuple):
+    """An element's statements on the mesh in a file.
+
+    number: of the mesh in a .serialized file; flat: without normals; crease: largest angle between
+    smooth triangles [deg], below 0 for any; smooth: whether normals are made where there are none.
+    """
+
+    suffix: str
+    number: int
+    flat: bool
+    crease: float
+    smooth: bool
+    flip_v: bool
 
 
 class Context:

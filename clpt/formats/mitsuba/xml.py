@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from clpt.errors import SceneError, nearest
 from clpt.files import budget, input_files
+from clpt.files.disk_cache import OfFiles
 from clpt.formats.reading import Located
 
 MAX_NESTING = 64
@@ -78,7 +79,8 @@ class Document:
 
     camera: number or id of the chosen sensor; variables: values by name;
     renamed: plugins of old files, each with its old and its new name;
-    makes_normals: whether a mesh without normals gets smooth ones, as in Mitsuba.
+    makes_normals: whether a mesh without normals gets smooth ones, as in Mitsuba;
+    meshes: that an earlier process has read.
     """
 
     root: Element
@@ -87,6 +89,7 @@ class Document:
     variables: Mapping[str, str] = field(default_factory=dict)
     renamed: list[tuple[Element, str, str]] = field(default_factory=list)
     makes_normals: bool = True
+    meshes: OfFiles = field(default_factory=OfFiles)
 
     @property
     def is_old(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ EVEN = 2.0 * COSINES / len(COSINES)  # shares of diffuse light at these cosines
 
 def _measured() -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]]:
     """Reduced scattering and absorption [1/mm] by name, see measured_media.csv."""
-    text = files("clpt.formats.pbrt").joinpath("measured_media.csv").read_text("utf-8")
+    text = (Path(__file__).parent / "measured_media.csv").read_text("utf-8")
     rows = [line.split(",") for line in text.splitlines() if not line.startswith("#")]
     values = {name: tuple(map(float, numbers)) for name, *numbers in rows}
     return {name: (numbers[:3], numbers[3:]) for name, numbers in values.items()}

@@ -102,7 +102,7 @@ def analyse(
         around=around,
         openings=openings_around(index, geometry, cache) if openings is None else openings,
         at_camera=index_around(scene, cache) if index.timed else (1.0, 0.0),
-        aims=_aims(index, geometry, sphere[1], sealed, cache),
+        aims=_aims(index, geometry, sphere[1], sealed, cache, former is not None),
         warnings=(*warnings, *surroundings.warnings_of_holes(index, cache)),
     )
 
@@ -113,9 +113,10 @@ def _aims(
     radius: float,
     sealed: frozenset[Medium],
     cache: LoweringCache,
+    edited: bool,
 ) -> NDArray[np.float32]:
     """Return the spheres that light paths, or rays that leave sealed media, aim at."""
-    aimed = aims(index, geometry, radius)
+    aimed = aims(index, geometry, radius, edited)
     return aimed if len(aimed) else escape_lamps(index, sealed, cache)
 
 

@@ -19,7 +19,7 @@ from clpt.geometry import analytic, instancing, motion, shapes, strands, triangl
 from clpt.geometry.instancing import Instances, Placed, Prototype
 from clpt.geometry.motion import Motions
 from clpt.records import SHAPE, SHAPE_BITS
-from clpt.render.records.tables import LoweringCache
+from clpt.render.records.tables import LoweringCache, content
 from clpt.render.scene_index import SceneIndex
 from clpt.scene.shapes import Shape
 
@@ -108,6 +108,13 @@ class Geometry:
         for (shape, vertex, face), (_, last_vertex, last_face) in zip(starts, ends, strict=True):
             if face < last_face <= world:
                 yield shape, slice(vertex, last_vertex), slice(face, last_face)
+
+    @cached_property
+    def digest(self) -> bytes:
+        """A digest of the places of all triangles, boxes and instances."""
+        placed = self.instances
+        arrays = self.vertices, self.faces, self.boxes, placed.rows, placed.prototypes, placed.boxes
+        return content(*arrays, np.array(placed.triangles))
 
     @cached_property
     def mesh_corners(self) -> NDArray[np.float32]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats, Integers
+from clpt.files import disk_cache
 from clpt.geometry import shapes
 from clpt.render.geometry.find import Geometry
 from clpt.render.scene_index import SceneIndex
@@ -33,23 +35,24 @@ ROUNDING = 4e-6  # of the scene's coordinates, added to a radius
 LOW, HIGH, SHAPE, MIDDLE = slice(11, 14), slice(14, 17), 17, slice(18, 21)
 
 
-def aims(index: SceneIndex, geometry: Geometry, scene_radius: float) -> NDArray[np.float32]:
+def aims(
+    index: SceneIndex, geometry: Geometry, scene_radius: float, edited: bool = False
+) -> NDArray[np.float32]:
     """Return centre, radius and share (k, 5) of the spheres by their size, k from 0 to MOST [m].
 
     They enclose all shapes with a specular material; close shapes share a sphere. The shares of the
     light paths add up to `aimed` of the integrator: half is spread evenly over the spheres, half by
     the areas of their disks. k is 0 where no path is aimed: a single large sphere would gain
-    nothing.
+    nothing. edited: other scenes like this one follow, so the disk does not keep the spheres.
     """
     none = np.zeros((0, 5), np.float32)
     wanted = index.balanced and index.integrator.aimed > 0.0
-    by_shape = sharp_pieces(geometry, index.motions.shapes) if wanted else ()
-    pieces = [part for part in by_shape if len(part)]
-    if not pieces:
+    sharp = Sharp(geometry, index.motions.shapes)
+    if not wanted:
         return none
-    if sum(map(len, pieces)) > MANY:
-        pieces = [_fewer(part, FEWER_CELLS) for part in pieces]
-    spheres = _spheres(pieces)
+    spheres = _spheres(sharp.pieces()) if edited else sharp.remembered(__file__, (), _spheres)
+    if not len(spheres):
+        return none
     centre, radius = np.split(spheres[np.argsort(spheres[:, 3], kind="stable")], [3], axis=1)
     if len(radius) == 1 and radius[0] > LARGE * scene_radius:
         return none
@@ -73,35 +76,64 @@ def is_sharp(material: mt.Material, below: float = SHARP) -> bool:
     return material.least_alpha < below
 
 
-def sharp_pieces(
-    geometry: Geometry,
-    moving: Collection[int] = (),
-    wanted: Callable[[mt.Material], bool] = is_sharp,
-) -> Iterator[Floats]:
-    """Yield the pieces of every specular shape, in the world: a row for each triangle or ball.
+class Sharp:
+    """The specular shapes of a scene.
 
     moving: numbers of shapes that move: the boxes around their ways are taken; wanted: whether a
     material counts as specular.
     """
-    owners, placed = geometry.owners, geometry.instances
-    ends = [*(face for _, _, _, face in owners), len(geometry.faces)][1:]
-    firsts = len(geometry.faces) - sum(placed.triangles) + np.cumsum((0, *placed.triangles))[:-1]
-    boxes = geometry.boxes.astype(np.float64)
-    for i, ((row, shape, _, face), end) in enumerate(zip(owners, ends, strict=True)):
-        if not wanted(shape.material):
-            continue
-        if row["kind"]:
-            many = shape.kind in shapes.ONE_OF
-            first = int(row["prim"]) if many else i - geometry.first_analytic
-            behind = owners[i + 1][0]["prim"] if i + 1 < len(owners) else len(boxes)
-            shape_boxes = boxes[first : int(behind) if many else first + 1]
-            still = int(row["number"]) not in moving
-            still &= shape.deformation is None
-            yield _fewer(_in_boxes(shape_boxes, still and "sphere" in shape.kind))
-        elif end > face:
-            pieces = _of_triangles(geometry, face, end)
-            prototype = int(np.searchsorted(firsts, face, side="right")) - 1
-            yield _fewer(pieces if prototype < 0 else _placed(geometry, pieces, prototype, moving))
+
+    def __init__(
+        self,
+        geometry: Geometry,
+        moving: Collection[int] = (),
+        wanted: Callable[[mt.Material], bool] = is_sharp,
+    ):
+        self.geometry, self.moving = geometry, moving
+        owners = geometry.owners
+        ends = [*(face for _, _, _, face in owners), len(geometry.faces)][1:]
+        self._shapes = [
+            (i, row, shape, face, end)
+            for i, ((row, shape, _, face), end) in enumerate(zip(owners, ends, strict=True))
+            if wanted(shape.material)
+        ]
+
+    def remembered(
+        self, code: str, by: tuple[Any, ...], make: Callable[[Iterable[Floats]], Any]
+    ) -> Any:
+        """Return make(self.pieces()), from the disk after the first time.
+
+        code: the file of `make`; by: what else it depends on.
+        """
+        which = [
+            (i, row.tobytes(), shape.kind, shape.deformation is None, face, end)
+            for i, row, shape, face, end in self._shapes
+        ]
+        asked = repr((which, sorted(self.moving), self.geometry.first_analytic, by)).encode()
+        given = self.geometry.digest, asked
+        return disk_cache.remembered((code, __file__), given, lambda: make(self.pieces()))
+
+    def pieces(self) -> Iterator[Floats]:
+        """Yield each shape's pieces in the world: a row for each triangle or ball."""
+        geometry, owners = self.geometry, self.geometry.owners
+        triangles = geometry.instances.triangles
+        firsts = len(geometry.faces) - sum(triangles) + np.cumsum((0, *triangles))[:-1]
+        boxes = geometry.boxes.astype(np.float64)
+        for i, row, shape, face, end in self._shapes:
+            if row["kind"]:
+                many = shape.kind in shapes.ONE_OF
+                first = int(row["prim"]) if many else i - geometry.first_analytic
+                behind = owners[i + 1][0]["prim"] if i + 1 < len(owners) else len(boxes)
+                shape_boxes = boxes[first : int(behind) if many else first + 1]
+                still = int(row["number"]) not in self.moving
+                still &= shape.deformation is None
+                yield _fewer(_in_boxes(shape_boxes, still and "sphere" in shape.kind))
+            elif end > face:
+                pieces = _of_triangles(geometry, face, end)
+                prototype = int(np.searchsorted(firsts, face, side="right")) - 1
+                if prototype >= 0:
+                    pieces = _placed(geometry, pieces, prototype, self.moving)
+                yield _fewer(pieces)
 
 
 def _pieces(middles: Floats, reach: Floats, areas: Floats | None = None) -> Floats:
@@ -300,12 +332,17 @@ class _Clusters:
         return costs[0], numbers
 
 
-def _spheres(by_shape: list[Floats]) -> NDArray[np.float64]:
+def _spheres(by_shape: Iterable[Floats]) -> NDArray[np.float64]:
     """Return at most MOST spheres (k, 4) around the pieces of shapes, whose disks are small.
 
     Compact shapes are not cut: their parts would have more disks of the same area together.
     """
-    columns = [_columns(pieces, number) for number, pieces in enumerate(by_shape)]
+    parts = [part for part in by_shape if len(part)]
+    if not parts:
+        return np.zeros((0, 4))
+    if sum(map(len, parts)) > MANY:
+        parts = [_fewer(part, FEWER_CELLS) for part in parts]
+    columns = [_columns(part, number) for number, part in enumerate(parts)]
     clusters = _Clusters(np.concatenate(columns, axis=1))
     leaves = np.zeros(1, np.int64)
     while len(leaves) < CLUSTERS:  # those with gaps come first, then the largest

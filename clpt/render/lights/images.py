@@ -17,9 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from clpt import images
 from clpt.arrays import Floats, Floats32
-from clpt.device import buffers
 from clpt.errors import SceneError
-from clpt.files import budget
+from clpt.files import budget, disk_cache
 from clpt.images import spectral_exr
 from clpt.images.spectral_exr import SpectralImage
 from clpt.render.lights import block_grids
@@ -418,7 +417,10 @@ def kept_sky(numbers: tuple[float, ...], ground: tuple[float, ...]) -> tuple[Flo
     """Return the arrays of `dome.unscaled`, from the cache folder if possible."""
     code = *Path(dome.__file__).parent.glob("*.py"), Path(air.__file__)
     tables = (data.ROOT / name for name in ("sky.csv", "air.csv"))
-    around, disc = buffers.kept(dome.unscaled, numbers, ground, files=(*code, *tables))
+    text = repr((numbers, ground)).encode()
+    around, disc = disk_cache.remembered(
+        (*sorted(code), *tables), [text], lambda: dome.unscaled(numbers, ground)
+    )
     return around, disc
 
 

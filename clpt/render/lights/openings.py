@@ -12,13 +12,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clpt.arrays import Floats
-from clpt.device import disk_cache
+from clpt.files import disk_cache
 from clpt.geometry import casting
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Geometry
@@ -130,18 +129,9 @@ def _openings(index: SceneIndex, geometry: Geometry, eye: Floats, view: View | N
 def _remembered(triangles: NDArray[np.float32], eye: Floats, view: View | None) -> Openings:
     """Return the result of `find`; read it from the disk if a process has stored it."""
     asked = repr((eye.tolist(), view and (view.axis.tolist(), view.angle))).encode()
-
-    def rectangles() -> Any:
-        new = find(triangles, eye, view)
-        return new.share, [
-            (each.center.tolist(), each.x.tolist(), each.y.tolist()) for each in new.rectangles
-        ]
-
-    texts, code = (asked, triangles.tobytes()), (__file__, casting.__file__)
-    share, rows = disk_cache.remembered(code, texts, rectangles)
-    return (
-        Openings(tuple(Rectangle(*map(np.array, row)) for row in rows), share) if rows else CLOSED
-    )
+    code, content = (__file__, casting.__file__), (asked, triangles)
+    found: Openings = disk_cache.remembered(code, content, lambda: find(triangles, eye, view))
+    return found
 
 
 def find(triangles: NDArray[np.floating], eye: Floats, view: View | None = None) -> Openings:

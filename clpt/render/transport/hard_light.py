@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clpt.files import disk_cache
 from clpt.geometry import analytic, shapes, triangles
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
-from clpt.render.lights.aims import is_sharp, sharp_pieces
+from clpt.render.lights.aims import Sharp, is_sharp
 from clpt.render.lights.find import Sources, environment_of
 from clpt.render.records.tables import LoweringCache
 from clpt.render.scene_index import SceneIndex
@@ -58,6 +59,7 @@ ALL_AROUND = 0.49 * np.pi  # [rad] from a light's axis: a light that reaches it 
 Ball = tuple[NDArray[np.float64], float]  # centre and radius
 # Its name, its place [m], its share in the power of all lights, its rows in `lights`.
 Small = tuple[str, NDArray[np.float64] | None, float, slice]
+Slices = tuple[slice, slice]
 
 
 @dataclass(frozen=True)
@@ -193,8 +195,7 @@ def _choice(lit: Lit) -> tuple[Integrator, str]:
     if sum(share for _, _, share, _ in lit.small) < MOSTLY:
         return Path(light_paths=FEW), f"{reason}, though most light is of large ones"
     number = SOME
-    enclosed = (s for _, place, s, _ in lit.small if _is_enclosed(geometry, place))
-    if sum(enclosed) >= MOSTLY:
+    if _enclosed(lit) >= MOSTLY:
         number, reason = MANY, f"{reason}, in a bulb"
     if not _sees_clear(index, geometry):
         reason = f"{reason}; the camera sees little glass and few mirrors"
@@ -248,13 +249,24 @@ def _hides(shape: Shape) -> bool:
     return shape.interior is not None and shape.interior.scatters
 
 
-def _is_enclosed(geometry: Geometry, place: NDArray[np.float64] | None) -> bool:
-    """Whether a light at a place [m] is in a bulb: specular shapes fill most directions."""
-    if place is None:
-        return False
+def _enclosed(lit: Lit) -> float:
+    """Return the share in the power of all lights of those in bulbs: see `_is_enclosed`."""
+    placed = [(place, share) for _, place, share, _ in lit.small if place is not None]
+    sharp = Sharp(lit.geometry, (), lambda m: is_sharp(m) and not _is_diffuse(m))
+    by = [(place.tolist(), share) for place, share in placed]
+
+    def share_of(pieces: Iterable[NDArray[np.float64]]) -> float:
+        pieces = list(pieces)
+        return sum(share for place, share in placed if _is_enclosed(pieces, place))
+
+    return float(sharp.remembered(__file__, ("enclosed", by), share_of))
+
+
+def _is_enclosed(shapes_: Iterable[NDArray[np.float64]], place: NDArray[np.float64]) -> bool:
+    """Whether a light at a place [m] is in a bulb: the pieces of shapes fill most directions."""
     covered = np.zeros(DIRECTIONS, bool)
     directions = _cone(np.array([0.0, 0.0, 1.0]), -1.0, DIRECTIONS)
-    for pieces in sharp_pieces(geometry, (), lambda m: is_sharp(m) and not _is_diffuse(m)):
+    for pieces in shapes_:
         covered[_covered(pieces, place, directions)] = True
     return bool(covered.mean() > BULB)
 
@@ -293,13 +305,19 @@ def _sees_clear(index: SceneIndex, geometry: Geometry) -> bool:
     """Whether mirrors and clear shapes fill enough of the picture, as if no shape hid them."""
     view = index.camera.view_of(index.film.width, index.film.height)
     assert view is not None, "a camera that can be joined has a point"
-    directions = _cone(view.axis, math.cos(view.angle), RAYS)
-    for pieces in sharp_pieces(geometry, index.motions.shapes, lambda m: is_sharp(m, CLEAR)):
-        met = _covered(pieces, view.origin, directions)
-        directions = np.delete(directions, met, axis=1)
-        if directions.shape[1] <= (1.0 - SEEN) * RAYS:
-            return True
-    return False
+
+    def sees(shapes_: Iterable[NDArray[np.float64]]) -> bool:
+        directions = _cone(view.axis, math.cos(view.angle), RAYS)
+        for pieces in shapes_:
+            met = _covered(pieces, view.origin, directions)
+            directions = np.delete(directions, met, axis=1)
+            if directions.shape[1] <= (1.0 - SEEN) * RAYS:
+                return True
+        return False
+
+    sharp = Sharp(geometry, index.motions.shapes, lambda m: is_sharp(m, CLEAR))
+    by = "sees", view.origin.tolist(), view.axis.tolist(), view.angle
+    return bool(sharp.remembered(__file__, by, sees))
 
 
 def _has_shades(lit: Lit) -> bool:
@@ -308,13 +326,27 @@ def _has_shades(lit: Lit) -> bool:
     These are small and bright, as irradiance falls with the square of the distance. Paths from the
     camera seldom meet them, and light paths all do. Instances and analytic shapes do not count.
     """
-    shaded = 0.0
-    for _, place, share, rows in sorted(lit.small, key=lambda light: -light[2])[:LAMPS]:
-        if place is not None:
-            near = SHADE * float(np.linalg.norm(lit.eye - place))
-            met = _covered(_nearby(lit.geometry, place, near), place, _directions(lit.bounds[rows]))
+    brightest = sorted(lit.small, key=lambda light: -light[2])[:LAMPS]
+    lamps = [
+        (place, share, float(np.linalg.norm(lit.eye - place)), _directions(lit.bounds[rows]))
+        for _, place, share, rows in brightest
+        if place is not None
+    ]
+    shades = [
+        (slice_, faces)
+        for shape, slice_, faces in lit.geometry.meshes()
+        if shape.emission is None and _is_diffuse(shape.material)
+    ]
+
+    def has_shades() -> bool:
+        shaded = 0.0
+        for place, share, far, directions in lamps:
+            met = _covered(_nearby(lit.geometry, shades, place, SHADE * far), place, directions)
             shaded += share * (len(np.unique(met)) >= SHADED * DIRECTIONS)
-    return shaded >= SHADED
+        return shaded >= SHADED
+
+    asked = repr(([(p.tolist(), s, far, d.tobytes()) for p, s, far, d in lamps], shades)).encode()
+    return bool(disk_cache.remembered([__file__], (lit.geometry.digest, asked), has_shades))
 
 
 def _directions(bounds: light_bounds.Bounds) -> NDArray[np.float64]:
@@ -327,13 +359,13 @@ def _directions(bounds: light_bounds.Bounds) -> NDArray[np.float64]:
     return _cone(axis / np.linalg.norm(axis), math.cos(widest), DIRECTIONS)
 
 
-def _nearby(geometry: Geometry, place: NDArray[np.float64], near: float) -> NDArray[np.float64]:
-    """Return pieces (n, 10) of diffuse shapes that emit no light, close to a place [m]."""
+def _nearby(
+    geometry: Geometry, meshes: list[Slices], place: NDArray[np.float64], near: float
+) -> NDArray[np.float64]:
+    """Return pieces (n, 10) of meshes, by their vertices and faces, close to a place [m]."""
     found = [np.zeros((0, 10))]
-    for shape, vertices, faces in geometry.meshes():
+    for vertices, faces in meshes:
         corners = geometry.vertices[vertices]
-        if shape.emission is not None or not _is_diffuse(shape.material):
-            continue
         if _apart(corners.min(axis=0), corners.max(axis=0), place) > near:
             continue
         triangles_ = geometry.vertices[geometry.faces[faces]].astype(np.float64)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from clpt.arrays import Floats
 from clpt.denoise import needs
-from clpt.device import disk_cache
+from clpt.files import disk_cache
 from clpt.geometry import casting
 from clpt.render.geometry.find import Geometry
 from clpt.render.scene_index import SceneIndex, leaves_of
@@ -44,11 +44,13 @@ def pays(index: SceneIndex, geometry: Geometry) -> bool:
         diffuse[faces] = _is_diffuse(shape)
     if not diffuse.any():
         return False
-    triangles = geometry.vertices[geometry.faces]
     asked = repr((view.origin.tolist(), view.axis.tolist(), view.angle)).encode()
-    texts = asked, triangles.tobytes(), diffuse.tobytes()
-    code = __file__, casting.__file__
-    share = disk_cache.remembered(code, texts, lambda: _share(triangles, diffuse, view))
+    code, content = (__file__, casting.__file__), (asked, geometry.digest, diffuse)
+
+    def shared() -> float:
+        return _share(geometry.vertices[geometry.faces], diffuse, view)
+
+    share = disk_cache.remembered(code, content, shared)
     return bool(share >= SHARE)
 
 

@@ -12,7 +12,7 @@ import pytest
 import clpt
 from clpt.errors import SceneError
 from clpt.files import budget
-from clpt.formats.mitsuba import shapes
+from clpt.formats.mitsuba import mesh_files
 
 VERTICES = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0.5), (0, 1, 0)])
 FACES = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
@@ -102,7 +102,7 @@ def test_a_small_file_cannot_ask_for_much_memory(tmp_path: Path) -> None:
     path = file(tmp_path / "zeros.serialized", [mesh], 4)
     limits = budget.Budget(memory=1 << 16)
     with pytest.raises(SceneError, match="a mesh in it would take"), budget.opened(limits):
-        shapes.read(path, 0, {})
+        mesh_files.read(path, 0, {})
 
 
 def test_a_file_of_many_meshes_is_read_once(tmp_path: Path) -> None:

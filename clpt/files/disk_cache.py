@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import json
 import logging
 import os
+import pickle
 import re
 import stat
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -25,10 +24,7 @@ from typing import Any
 
 import platformdirs
 
-from clpt.device import forking
 from clpt.files import output_files
-
-from .source import Source
 
 if sys.platform != "win32":
     import fcntl
@@ -46,10 +42,12 @@ _OF_OTHERS = (
     "pytools", "pyopencl", "pocl", "neo_compiler_cache", "mesa_shader_cache",
     "mesa_shader_cache_db", "rusticl", "comgr", "nvidia",
 )  # fmt: skip
+WORTH = 5e-3  # [s] of what is remembered
 WAIT = 300.0  # [s] for another process's build
 _STEP = LIMIT // 16  # bytes that a process writes between two checks of the folder's size
+_LARGEST = LIMIT // 8  # bytes of a value that is kept
+_FRESH = 2.0  # [s] a younger file may be written again without a trace in its times
 
-_lock = forking.renewed(threading.Lock())
 _written = _STEP  # bytes since the last check: the first file triggers a check
 
 
@@ -191,33 +189,99 @@ def load(entry: str) -> tuple[str, bytes] | None:
     """
     path = folder() / "programs" / entry
     try:
-        check, _, content = read(path).partition(b"\n")
+        whole = read(path)
     except FileNotFoundError:
         return None
     except OSError:
-        check, content = b"", b""
+        whole = b""
     with suppress(OSError):
         os.utime(path)  # marks the last use, which many systems do not note
-    if hashlib.sha256(content).hexdigest().encode() != check:
+    if hashlib.sha256(memoryview(whole)[65:]).hexdigest().encode() != whole[:64]:
         _warn(f"a file in {path.parent} is damaged or of another user: its program is built again")
         return None
-    header, _, binary = content.partition(b"\n")
-    return header.decode(), binary
+    end = whole.index(b"\n", 65)
+    return whole[65:end].decode(), whole[end + 1 :]
 
 
-def remembered(code: Iterable[str], texts: Iterable[bytes], make: Callable[[], Any]) -> Any:
-    """Return a value of JSON; read it if a process has stored it.
+@functools.cache
+def _digest(files: tuple[str | Path, ...]) -> bytes:
+    """Return a hash of files, and of the versions that a pickle depends on."""
+    numpy = sys.modules.get("numpy")
+    digest = hashlib.sha256(repr((sys.version, numpy and numpy.__version__)).encode())
+    for file in files:
+        digest.update(Path(file).read_bytes())
+    return digest.digest()
 
-    code: the files whose program makes it; texts: what else it depends on; make: returns it anew.
+
+def entry_of(code: Iterable[str | Path], content: Iterable[Any]) -> str:
+    """Return the key of what files make of bytes and C-contiguous arrays."""
+    digest = hashlib.sha256(_digest(tuple(code)))
+    for part in content:
+        digest.update(memoryview(part).nbytes.to_bytes(8, "little"))
+        digest.update(part)
+    return digest.hexdigest()
+
+
+def _keep_value(entry: str, value: object) -> None:
+    packed = pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
+    if len(packed) <= _LARGEST:
+        store(entry, "value", packed)
+
+
+def remembered(code: Iterable[str | Path], content: Iterable[Any], make: Callable[[], Any]) -> Any:
+    """Return a value that can be pickled; read it if a process has stored it.
+
+    code: the files whose program makes it; content: bytes and C-contiguous arrays on which it
+    depends besides; make: returns it anew, and is worth an entry if it takes WORTH. The last bits
+    may come from another processor that shares the folder.
     """
-    sources = (Path(file).read_bytes() for file in code)
-    entry = hashlib.sha256(b"\0".join([*sources, *texts])).hexdigest()
+    entry = entry_of(code, content)
     stored = load(entry)
     if stored is not None:
-        return json.loads(stored[0])
+        return pickle.loads(stored[1])
+    start = time.perf_counter()
     value = make()
-    store(entry, json.dumps(value), b"")
+    if time.perf_counter() - start >= WORTH:
+        _keep_value(entry, value)
     return value
+
+
+class OfFiles:
+    """Values made of many files, kept in a single entry for the next process.
+
+    code: the files whose program makes them; name: of the entry, None to keep nothing.
+    """
+
+    def __init__(self, code: Iterable[str | Path] = (), name: str | None = None):
+        self._entry = None if name is None else entry_of(code, [name.encode()])
+        self._used: dict[Any, Any] = {}
+        self._changed = False
+
+    @functools.cached_property
+    def _stored(self) -> dict[Any, Any]:
+        stored = None if self._entry is None else load(self._entry)
+        return {} if stored is None else pickle.loads(stored[1])
+
+    def get(self, status: os.stat_result, by: tuple[Any, ...], make: Callable[[], Any]) -> Any:
+        """Return a value made of a file, and whether it was made now.
+
+        status: of the file; by: what else the value depends on.
+        """
+        times = status.st_mtime_ns, status.st_ctime_ns
+        key = status.st_dev, status.st_ino, status.st_size, *times, *by
+        known = self._used if key in self._used else self._stored
+        if key in known:
+            self._used[key] = known[key]
+            return known[key], False
+        value = make()
+        if time.time() - max(times) / 1e9 > _FRESH:
+            self._used[key], self._changed = value, True
+        return value, True
+
+    def store(self) -> None:
+        """Keep the values that were asked for, if one of them is new."""
+        if self._changed and self._entry is not None:
+            _keep_value(self._entry, self._used)
 
 
 @contextmanager
@@ -286,13 +350,13 @@ def _warn(text: str) -> None:
     log.warning("%s", text)
 
 
-def keep_failed(source: Source) -> str | None:
+def keep_failed(name: str, text: str) -> str | None:
     """Write the text of a program that failed to build; return its path, None on failure."""
-    digest = hashlib.sha256(source.text.encode()).hexdigest()[:12]
-    stem = re.sub(r"\W", "_", source.name.removesuffix(".cl"))
+    digest = hashlib.sha256(text.encode()).hexdigest()[:12]
+    stem = re.sub(r"\W", "_", name.removesuffix(".cl"))
     path = folder() / "failed" / f"{stem}-{digest}.cl"
     try:
-        _keep(path, source.text.encode())
+        _keep(path, text.encode())
     except OSError:
         return None
     return str(path)
@@ -356,9 +420,7 @@ def _keep(path: Path, content: bytes) -> None:
     """Write a file of the cache, and prune the cache from time to time."""
     global _written
     write(path, content)
-    with _lock:
-        _written += len(content)
-        due = _written >= _STEP
-        _written = 0 if due else _written
-    if due:
+    _written += len(content)
+    if _written >= _STEP:
+        _written = 0
         prune(path.parent.parent)
