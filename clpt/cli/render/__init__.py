@@ -78,9 +78,6 @@ def _rendered(job: Job) -> int:
 
         return render_frames(job, display(job.quiet, None))
     locate(job.scene)
-    from ..process import class_code  # here: a missing file is told at once
-
-    class_code.keep()
     targets.checked(job.targets)
     name = targets.name_of(job.scene)
     shown = display(job.quiet, job.until.limit, name)

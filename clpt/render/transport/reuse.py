@@ -79,10 +79,9 @@ def _share(triangles: NDArray[np.float32], diffuse: NDArray[np.bool_], view: Vie
 
 def _is_diffuse(shape: Shape) -> bool:
     """Whether paths share vertices on a shape."""
-    parts = [*mt.parts(shape.material)]
-    bent = any(isinstance(part, mt.NormalMapped) for part in parts)
-    kinds = {cls.kind for cls in leaves_of(shape.material)}
-    return kinds == {"diffuse"} and shape.emission is None and not bent
+    bent = any(isinstance(part, mt.NormalMapped) for part in mt.parts(shape.material))
+    lobes = all(cls.has_diffuse_lobe for cls in leaves_of(shape.material))
+    return lobes and shape.emission is None and not bent
 
 
 def _in_cone(random: np.random.Generator, axis: Floats, least: float) -> Floats:
