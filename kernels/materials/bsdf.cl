@@ -54,8 +54,6 @@ inline DiffuseLobe diffuse_lobe_nothing(void)
     return lobe;
 }
 
-#include "generated/bsdf_answer.cl"
-
 /* Of two lobes with albedos a and b: the factor 1 / max(1, a + b), per wavelength. */
 inline Spectrum two_lobes_scale(Spectrum a, Spectrum b)
 {

@@ -10,6 +10,7 @@
 #include "generated/bsdf.cl"
 #include "generated/hero_steps.cl"
 #include "materials/bsdf.cl#pair"
+#include "generated/bsdf_answer.cl"
 
 /* The answer to a vertex, of LANES paths. */
 inline BsdfAnswer material_answer(Bsdf m, vec3 wo, vec3 wi, vec3 u, int adjoint)

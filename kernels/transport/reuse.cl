@@ -26,27 +26,8 @@
 inline real reuse_word(Slab path, uint word, uint at, uint k)
 {
     global const float *slots = slab_at(path, word, at & ~(REUSE_GROUP - 1u));
-#if LANES == 2 * REUSE_GROUP
+    if (LANES <= REUSE_GROUP) return slots[k];
     return sel(LANE_INDEX < REUSE_GROUP, (real)(slots[k]), (real)(slots[REUSE_GROUP + k]));
-#else
-    return (real)(slots[k]);
-#endif
-}
-
-/* The sum over the slots of each slot's group. */
-inline real reuse_sum(real x)
-{
-#if LANES == 2 * REUSE_GROUP
-    x += x.s1032547698badcfe;
-    x += x.s23016745ab89efcd;
-    return x + x.s45670123cdef89ab;
-#elif LANES == REUSE_GROUP
-    x += x.s10325476;
-    x += x.s23016745;
-    return x + x.s45670123;
-#else
-    return x;
-#endif
 }
 
 inline vec3 reuse_point(Slab path, uint word, uint at, uint k)
@@ -73,8 +54,12 @@ inline Spectrum reuse_throughput(Spectrum beta)
     return beta;
 }
 
+/* Step lobe: of materials below a coat a path shares the diffuse lobe alone. */
+#include "transport/reuse.cl"
+#include "materials/coat.cl"
+
 #define COAT_LARGEST 3.99f /* index of a coat */
-#define REUSE_OTHER 0.1f   /* largest probability of the coat's lobe at x: where it is larger, most noise is the coat's */
+#define REUSE_OTHER 0.1f   /* probability of the coat's lobe from which on x shares nothing: most noise is the coat's */
 
 /* A coat as a word: its roughness, its distribution, its index in units of 2^-13; 0: there is none. */
 inline natural coat_pack(real eta, real alpha)
@@ -84,10 +69,6 @@ inline natural coat_pack(real eta, real alpha)
     integer index = to_integer(min_r(eta, (real)(COAT_LARGEST)) * 8192.0f + 0.5f);
     return as_natural(sel_i(eta > 0.0f, (index << 16) | rough, (integer)(0)));
 }
-
-/* Step lobe: of materials below a coat a path shares the diffuse lobe alone. */
-#include "transport/reuse.cl"
-#include "materials/coat.cl"
 
 typedef struct {
     DiffuseLobe lobe;
@@ -309,9 +290,13 @@ inline Spectrum reuse_gather(Slab path, uint at, mask ended, Spectrum radiance)
     for (uint k = 0; k < REUSE_GROUP; k++) {
         mask brings = takes & (reuse_vertices(path, at, k) == REUSE_SECOND);
         if (!any(brings)) continue;
-        real density = slab_read(path, PATH_REUSE_DENSITY0_WORD + k, at);
-        real all = reuse_sum(sel(vertices != 0u, density, (real)(0.0f)));
-        real share = reuse_passed(path, at, k) * density / max_r(all, (real)(1e-30f));
+        real all = 0.0f;
+        for (uint i = 0; i < REUSE_GROUP; i++) {
+            real density = reuse_word(path, PATH_REUSE_DENSITY0_WORD + k, at, i);
+            all += sel(reuse_vertices(path, at, i) != 0u, density, (real)(0.0f));
+        }
+        real share = slab_read(path, PATH_REUSE_DENSITY0_WORD + k, at) / max_r(all, (real)(1e-30f));
+        share *= reuse_passed(path, at, k);
         uint word = PATH_RADIANCE_WORD;
 #define C(c) leaves.c = share * reuse_word(path, word++, at, k);
         SPECTRUM_EACH(C)

@@ -240,7 +240,7 @@ def part_text(features: Features, cls: type[Scatterer]) -> str:
 def _calls_text(features: Features, vertex: Vertex) -> str:
     """Return the material of a shared vertex: functions that call those of the kinds' parts."""
     classes = {kind: features.materials.leaves[kind] for kind in vertex.kinds}
-    rows = []
+    rows = ['#include "generated/bsdf_answer.cl"']
     for part in _functions(features):
         cases = []
         for kind, cls in classes.items():
