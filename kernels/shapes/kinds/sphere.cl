@@ -2,6 +2,8 @@
  * inside. u is the azimuth about its z axis over 2 pi, v the angle from it over pi. */
 #include "core/rounding.cl"
 
+#define SPHERE_ROUNDING 1e-5f /* of a distance to the centre, many times what floats round */
+
 real sphere_size(Sphere q) { return EXACT_SIZE * (q.radius + size3(q.center)); }
 
 /* The square of the distance `f` from the centre, minus the square of the radius. */
@@ -77,12 +79,22 @@ real sphere_pdf(Sphere q, vec3 p, vec3 wi, real t, vec3 n)
     return sel(outside, INV_2PI / one_minus_cos, inside);
 }
 
+/* Whether a ray from `f`, counted from the centre, may meet the sphere, whatever floats round. */
+inline mask sphere_is_near(Sphere q, vec3 f, vec3 d, real tmin, real tmax)
+{
+    real b = -dot3(f, d), reach = q.radius + SPHERE_ROUNDING * (q.radius + size3(q.center) + size3(f));
+    vec3 l = madd3(d, b, f);
+    return (dot3(l, l) <= reach * reach) & (b + reach >= tmin) & (b - reach <= tmax);
+}
+
 /* The discriminant from the ray's distance to the centre (Haines et al. 2019, Ray Tracing Gems, 7); from the height
  * over the surface where that is no more than the radius. An origin that is closer to the surface than its coordinates
  * can tell lies on it. */
 ShapeHit sphere_intersect(Sphere q, vec3 o, vec3 d, real tmin, real tmax)
 {
+    ShapeHit h = {(real)(FAR), v3(0.0f, 0.0f, 0.0f), (vec2){(real)(0.0f), (real)(0.0f)}};
     Twofold3 f = twofold_sub3(o, q.center);
+    if (!any(sphere_is_near(q, f.high, d, tmin, tmax))) return h;
     Twofold beyond = sphere_beyond(q, f);
     real b = -twofold_real(twofold_dot3(f, d)), c = twofold_real(beyond), square = q.radius * q.radius;
     vec3 l = madd3(d, b, f.high);
@@ -96,7 +108,6 @@ ShapeHit sphere_intersect(Sphere q, vec3 o, vec3 d, real tmin, real tmax)
     real t = sel(first, lo, hi);
     mask met = (disc >= 0.0f) & (t > tmin) & (t < tmax);
     vec3 outward = normalize3(madd3(d, sel(first, -s, s), l));
-    ShapeHit h;
     h.t = sel(met, t, (real)(FAR));
     h.n = scale3(outward, q.side);
     h.uv = sphere_uv(q, outward);
