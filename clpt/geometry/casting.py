@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,17 @@ def sphere(random: np.random.Generator, count: int) -> Floats:
     """Return directions at random (count, 3)."""
     directions = random.normal(size=(count, 3))
     return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+def cone(axis: Floats, least: float, count: int) -> Floats:
+    """Return directions (count, 3) of a spiral, evenly in a cone; least: its lowest cosine."""
+    middle = np.arange(count) + 0.5
+    z, turn = 1.0 - (1.0 - least) * middle / count, np.pi * (1.0 + math.sqrt(5.0)) * middle
+    level = np.sqrt(1.0 - z * z)
+    right = np.cross(np.eye(3)[np.abs(axis).argmin()], axis)
+    right /= np.linalg.norm(right)
+    up = np.cross(axis, right)
+    return np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=1) @ [right, up, axis]
 
 
 class Caster:

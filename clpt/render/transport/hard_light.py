@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clpt.files import disk_cache
-from clpt.geometry import analytic, shapes, triangles
+from clpt.geometry import analytic, casting, shapes, triangles
 from clpt.render.geometry import surroundings
 from clpt.render.geometry.find import Emitter, Geometry
 from clpt.render.lights import bounds as light_bounds
@@ -265,22 +265,10 @@ def _enclosed(lit: Lit) -> float:
 def _is_enclosed(shapes_: Iterable[NDArray[np.float64]], place: NDArray[np.float64]) -> bool:
     """Whether a light at a place [m] is in a bulb: the pieces of shapes fill most directions."""
     covered = np.zeros(DIRECTIONS, bool)
-    directions = _cone(np.array([0.0, 0.0, 1.0]), -1.0, DIRECTIONS)
+    directions = casting.cone(np.array([0.0, 0.0, 1.0]), -1.0, DIRECTIONS).T
     for pieces in shapes_:
         covered[_covered(pieces, place, directions)] = True
     return bool(covered.mean() > BULB)
-
-
-def _cone(axis: NDArray[np.float64], least: float, number: int) -> NDArray[np.float64]:
-    """Directions (3, number) spread evenly, on a spiral, in a cone: least is its lowest cosine."""
-    middle = np.arange(number) + 0.5
-    z, turn = 1.0 - (1.0 - least) * middle / number, np.pi * (1.0 + math.sqrt(5.0)) * middle
-    level = np.sqrt(1.0 - z * z)
-    least_along = np.eye(3)[np.abs(axis).argmin()]
-    right = np.cross(least_along, axis)
-    right /= np.linalg.norm(right)
-    up = np.cross(axis, right)
-    return np.stack([right, up, axis], axis=1) @ [level * np.cos(turn), level * np.sin(turn), z]
 
 
 def _covered(
@@ -307,7 +295,7 @@ def _sees_clear(index: SceneIndex, geometry: Geometry) -> bool:
     assert view is not None, "a camera that can be joined has a point"
 
     def sees(shapes_: Iterable[NDArray[np.float64]]) -> bool:
-        directions = _cone(view.axis, math.cos(view.angle), RAYS)
+        directions = casting.cone(view.axis, math.cos(view.angle), RAYS).T
         for pieces in shapes_:
             met = _covered(pieces, view.origin, directions)
             directions = np.delete(directions, met, axis=1)
@@ -355,8 +343,8 @@ def _directions(bounds: light_bounds.Bounds) -> NDArray[np.float64]:
     apart = np.arccos(np.clip(bounds.axis @ bounds.axis[0], -1.0, 1.0)).max()
     widest = apart + (bounds.theta_o + bounds.theta_e).max()
     if bounds.both.any() or widest >= np.pi:
-        return _cone(np.array([0.0, 0.0, 1.0]), -1.0, DIRECTIONS)
-    return _cone(axis / np.linalg.norm(axis), math.cos(widest), DIRECTIONS)
+        return casting.cone(np.array([0.0, 0.0, 1.0]), -1.0, DIRECTIONS).T
+    return casting.cone(axis / np.linalg.norm(axis), math.cos(widest), DIRECTIONS).T
 
 
 def _nearby(

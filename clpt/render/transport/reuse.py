@@ -10,7 +10,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from clpt.arrays import Floats
 from clpt.denoise import needs
 from clpt.files import disk_cache
 from clpt.geometry import casting
@@ -23,7 +22,7 @@ from clpt.scene.shapes import Shape
 SAMPLES = 1 << 19  # of a film that is worth the rays: some hundredths of a second
 RAYS = 512
 OFFSET = 1e-4  # from a surface, of the distance of a hit
-SHARE = 0.45  # of the rays whose paths share; measured, see bench/notes/light_paths.md
+SHARE = 0.35  # of the rays whose paths share; measured, see bench/notes/light_paths.md
 
 
 def pays(index: SceneIndex, geometry: Geometry) -> bool:
@@ -61,7 +60,7 @@ def _share(triangles: NDArray[np.float32], diffuse: NDArray[np.bool_], view: Vie
     """
     random, caster = np.random.default_rng(0), casting.Caster(triangles)
     origins = np.tile(view.origin, (RAYS, 1))
-    directions = _in_cone(random, view.axis, math.cos(view.angle))
+    directions = casting.cone(view.axis, math.cos(view.angle), RAYS)
     for vertex in (1, 2):
         met, far = caster.nearest(origins, directions)
         stays = (met >= 0) & diffuse[met]
@@ -82,10 +81,3 @@ def _is_diffuse(shape: Shape) -> bool:
     bent = any(isinstance(part, mt.NormalMapped) for part in mt.parts(shape.material))
     lobes = all(cls.has_diffuse_lobe for cls in leaves_of(shape.material))
     return lobes and shape.emission is None and not bent
-
-
-def _in_cone(random: np.random.Generator, axis: Floats, least: float) -> Floats:
-    """Return directions (RAYS, 3) about an axis, whose cosine is `least` or more."""
-    directions = casting.sphere(random, 64 * RAYS)
-    inside = directions[directions @ axis >= least]
-    return inside[:RAYS] if len(inside) >= RAYS else np.resize(inside, (RAYS, 3))
