@@ -37,6 +37,7 @@ from scipy import stats
 import clpt
 from clpt.errors import ClptError
 from clpt.render.flow.find import analyse
+from clpt.render.flow.scene_to_tables import lower
 from clpt.render.records.tables import LoweringCache
 from clpt.render.transport import light_caches
 from clpt.scene import Film, Scene, lights
@@ -133,6 +134,13 @@ def guided(scene: Scene) -> Scene | None:
     return _by(lambda given: Path(guiding=True, **given))(scene)
 
 
+def reusing(scene: Scene) -> Scene | None:
+    """With path reuse, where pixels share vertices: on CPUs."""
+    shared = _by(lambda given: Path(light_paths=0, reuse=True, **given))(scene)
+    assert shared is not None
+    return shared if lower(shared).features.film.reuse else None
+
+
 def merged(scene: Scene) -> Scene | None:
     """With photons, of a radius as small as the scene allows: what they blur is a bias."""
     _, around = analyse(plain(scene), LoweringCache()).sphere
@@ -167,6 +175,7 @@ WAYS: dict[str, Callable[[Scene], Scene | None]] = {
     "light paths": _by(lambda given: Path(light_paths=1, **given)),
     "vcm": merged,
     "guiding": guided,
+    "path reuse": reusing,
     "particle tracer": traced,
     "the other sampler": other_sampler,
     "many lamps": many_lamps,

@@ -268,17 +268,23 @@ def test_means_of_other_lanes_are_those_without(lanes: int) -> None:
     both(tilted("rgb"), 64, f"{lanes} lanes", lanes=lanes, max_depth=4)
 
 
-def test_noise_falls_where_light_comes_indirectly() -> None:
-    """The lamp shines on the ceiling alone, above a screen. Measured: 0.43 to 0.46."""
+@pytest.mark.parametrize(
+    "material, most",
+    [(WHITE, 0.55), (m.RoughPlastic(alpha=0.3, diffuse_reflectance=0.8), 0.8)],
+    ids=["diffuse", "rough_plastic"],
+)
+def test_noise_falls_where_light_comes_indirectly(material: m.Material, most: float) -> None:
+    """The lamp shines on the ceiling alone, above a screen. Measured: 0.47, 0.68."""
     up = tf.translate([0.0, 1.55, 0.0]) @ tf.rotate([1, 0, 0], -90)
     lit = Disk(to_world=up @ tf.scale(0.2), material=BLACK, emission=Area(radiance=20.0))
     screen = Rectangle(to_world=up @ tf.translate([0, 0, -0.02]) @ tf.scale(0.4), material=BLACK)
-    scene = dataclasses.replace(cornell("rgb"), shapes=[*walls().values(), lit, screen])
+    sides = walls(**dict.fromkeys(("back", "floor", "ceiling", "left", "right"), material))
+    scene = dataclasses.replace(cornell("rgb"), shapes=[*sides.values(), lit, screen])
     errors = []
     for own in (alone(scene, max_depth=4), sharing(scene, max_depth=4)):
         made = exposures(own, SEEDS, 16, device=wide())[:, 4:20, 4:20]
         errors.append(np.median(made.std(axis=0, ddof=1) / made.mean(axis=0)))
-    assert errors[1] < 0.55 * errors[0], errors
+    assert errors[1] < most * errors[0], errors
 
 
 def picture(scene: Scene, *runs: int, lanes: int = 8, **options: Any) -> np.ndarray:
