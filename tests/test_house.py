@@ -29,7 +29,7 @@ BOUNDS = {
     "stays of a scene from render() to the tables": 32,
     "rooms of these stays": 18,
     "lines of Python": 103_803,
-    "lines of OpenCL": 24_561,
+    "lines of OpenCL": 24_572,
     "words of README.md": 1_200,
     "docstrings that begin with What, Of, How, Those, The same": 0,
     "lines of accumulate of Cornell's box": 196,

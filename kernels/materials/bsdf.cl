@@ -81,20 +81,20 @@ inline BsdfSample bsdf_nothing(void)
     return s;
 }
 
-/* Step answer: what a vertex asks of its material. */
-typedef struct {
-    BsdfPair pair;
-    BsdfSample sample;
-} BsdfAnswer;
-#define answer_diffuse_lobe(a, m, wo)
-
-/* Step answer_lobe: in place of `answer`, where paths share vertices. */
+/* Step answer: what a vertex asks of its material, where paths share vertices below coats. */
 typedef struct {
     BsdfPair pair;
     BsdfSample sample;
     DiffuseLobe lobe;
 } BsdfAnswer;
 #define answer_diffuse_lobe(a, m, wo) (a).lobe = bsdf_diffuse_lobe(m, wo)
+
+/* Twin, where they do not. */
+typedef struct {
+    BsdfPair pair;
+    BsdfSample sample;
+} BsdfAnswer;
+#define answer_diffuse_lobe(a, m, wo)
 
 /* Step pair: what a vertex asks of its material for a pair of directions. */
 inline BsdfPair bsdf_pair(Bsdf m, vec3 wo, vec3 wi, Spectrum ratio)

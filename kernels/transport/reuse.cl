@@ -127,7 +127,7 @@ inline BsdfSample reuse_sample(ReuseLobe r, vec3 wo, BsdfSample s)
     Spectrum f = reuse_base(r, cosine);
     real toward = sel(r.all, (real)(1.0f), r.passed) / p, over = 1.0f / max_r(left, (real)(1e-20f));
     real most = 1.0f / max_r(r.lobe.other, (real)(1e-20f)); /* weights of facets are 1 at most, before rounding */
-#define C(c)                                                                                                   \
+#define C(c)                                                                                                    \
     real CAT(of_other_, c) = clamp_r((s.weight.c * s.pdf - f.c * share * r.passed) * over, (real)(0.0f), most); \
     s.weight.c = sel(other, CAT(of_other_, c), sel(base, f.c * toward, s.weight.c));
     SPECTRUM_EACH(C)

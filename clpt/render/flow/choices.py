@@ -57,7 +57,7 @@ CHOICES: dict[str, Callable[[Features, str], tuple[str, ...]]] = {
         *either(f.film.coats, "transport/reuse.cl#passed"),
         *either(f.film.reuse, "transport/reuse.cl#end"),
     ),
-    "generated/bsdf_answer.cl": lambda f, _: (f"materials/bsdf.cl#answer{'_lobe' * f.film.coats}",),
+    "generated/bsdf_answer.cl": lambda f, _: either(f.film.coats, "materials/bsdf.cl#answer"),
     "generated/reuse_due.cl": lambda f, _: either(f.film.reuse, "transport/reuse.cl#due"),
     "generated/cone.cl": lambda f, _: either(f.textures.mips, "textures/cone.cl"),
     "generated/vertex_media.cl": lambda f, _: (
