@@ -250,6 +250,13 @@ def test_means_are_those_without(name: str, mode: str) -> None:
     both(ROOMS[name](mode), 128, name, max_depth=4)
 
 
+@pytest.mark.parametrize("cls", [cls for cls in m.LEAVES if cls.has_diffuse_lobe])
+def test_means_of_each_kind_are_those_without(cls: type[m.Material]) -> None:
+    """Walls and boxes of the kind, as its defaults are."""
+    sides = walls(**dict.fromkeys(("back", "floor", "ceiling", "left", "right"), cls()))
+    both(room(*boxes(), sides=sides), 128, cls.__name__, max_depth=4)
+
+
 @pytest.mark.parametrize("chosen", [Box(radius=1.2), Gaussian()], ids=lambda f: f.kind)
 @pytest.mark.parametrize("mode", ["rgb", pytest.param("spectral", marks=pytest.mark.slow)])
 def test_means_under_wide_filters_are_those_without(mode: str, chosen: Any) -> None:
