@@ -131,7 +131,7 @@ def _remembered(triangles: NDArray[np.float32], eye: Floats, view: View | None) 
     asked = repr((eye.tolist(), view and (view.axis.tolist(), view.angle))).encode()
     code, content = (__file__, casting.__file__), (asked, triangles)
     found: Openings = disk_cache.remembered(code, content, lambda: find(triangles, eye, view))
-    return found
+    return found if found.rectangles else CLOSED
 
 
 def find(triangles: NDArray[np.floating], eye: Floats, view: View | None = None) -> Openings:
