@@ -42,7 +42,7 @@ _OF_OTHERS = (
     "pytools", "pyopencl", "pocl", "neo_compiler_cache", "mesa_shader_cache",
     "mesa_shader_cache_db", "rusticl", "comgr", "nvidia",
 )  # fmt: skip
-WORTH = 5e-3  # [s] of what is remembered
+WORTH = 5e-3  # [s] a value that is made in less time is not kept
 WAIT = 300.0  # [s] for another process's build
 _STEP = LIMIT // 16  # bytes that a process writes between two checks of the folder's size
 _LARGEST = LIMIT // 8  # bytes of a value that is kept
@@ -214,7 +214,7 @@ def _digest(files: tuple[str | Path, ...]) -> bytes:
 
 
 def entry_of(code: Iterable[str | Path], content: Iterable[Any]) -> str:
-    """Return the key of what files make of bytes and C-contiguous arrays."""
+    """Return the key of a value. code: the program's files; content: bytes, contiguous arrays."""
     digest = hashlib.sha256(_digest(tuple(code)))
     for part in content:
         digest.update(memoryview(part).nbytes.to_bytes(8, "little"))

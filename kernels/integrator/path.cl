@@ -50,7 +50,7 @@ inline void path_vertex(Scene scene, Slab path, Slab shadow, uint at, mask activ
     mask on = path_roulette(scene, path, at, next, null, v, scatter, guided, eta, &beta);
 
     vertex_leave(path, at, on, null, v, onward, beta);
-    reuse_first(scene, path, at, on, v, scatter, onward, lobe, bs);
+    reuse_first(path, at, on, v, scatter, onward, lobe, bs);
     store_path_cone(path, at, on, cone_scattered(v.cone, bs.pdf, (bs.lobe & LOBE_DELTA) != 0));
     path_scatters(scene, path, at, on, null, &v, scatter, mis_ratio, bs, onward);
     store_path_eta(path, at, on, eta);

@@ -59,7 +59,7 @@ inline Spectrum reuse_throughput(Spectrum beta)
 #include "materials/coat.cl"
 
 #define COAT_LARGEST 3.99f /* index of a coat */
-#define REUSE_OTHER 0.1f   /* probability of the coat's lobe from which on x shares nothing: most noise is the coat's */
+#define REUSE_OTHER 0.1f   /* if the coat's lobe has this probability or more, x shares nothing */
 
 /* A coat as a word: its roughness, its distribution, its index in units of 2^-13; 0: there is none. */
 inline natural coat_pack(real eta, real alpha)
@@ -174,11 +174,10 @@ inline mask reuse_begins(Scene scene, Vertex v) { return mask_of(BSDF_REUSED) & 
 
 /* Keeps the normals at x, where paths go `on`. `intersect` keeps x itself, where the next ray begins. A path that goes
  * below the surface, as a shading normal lets it, shares nothing: it would not see what others meet above. */
-inline void reuse_first(Scene scene, Slab path, uint at, mask on, Vertex v, Scattering scatter, vec3 onward,
-                        ReuseLobe r, BsdfSample bs)
+inline void reuse_first(Slab path, uint at, mask on, Vertex v, Scattering scatter, vec3 onward, ReuseLobe r,
+                        BsdfSample bs)
 {
-    mask keeps = on & (v.depth == 0) & reuse_suits(scene, path, at, v, r) & (dot3(v.s.n, onward) > 0.0f);
-    keeps = keeps & reuse_lobe_begins(r) & reuse_lobe_is_base(r);
+    mask keeps = on & r.onward & (dot3(v.s.n, onward) > 0.0f) & reuse_lobe_is_base(r);
     store_path_reuse(path, at, keeps, (integer)(REUSE_FIRST));
     store_path_reuse_n(path, at, keeps, octahedral_pack(v.s.n));
     store_path_reuse_ns(path, at, keeps, octahedral_pack(scatter.shading.frame.n));
@@ -210,8 +209,8 @@ inline ReuseLobe reuse_second(Scene scene, Slab path, uint at, mask met, Vertex 
 
 /* Twin, where nothing is shared. */
 inline mask reuse_begins(Scene scene, Vertex v) { return mask_of(0); }
-inline void reuse_first(Scene scene, Slab path, uint at, mask on, Vertex v, Scattering scatter, vec3 onward,
-                        ReuseLobe r, BsdfSample bs) {}
+inline void reuse_first(Slab path, uint at, mask on, Vertex v, Scattering scatter, vec3 onward, ReuseLobe r,
+                        BsdfSample bs) {}
 inline ReuseLobe reuse_second(Scene scene, Slab path, uint at, mask met, Vertex *v, Scattering scatter)
 {
     return reuse_lobe(scatter);

@@ -47,9 +47,9 @@ def aims(
     """
     none = np.zeros((0, 5), np.float32)
     wanted = index.balanced and index.integrator.aimed > 0.0
-    sharp = Sharp(geometry, index.motions.shapes)
     if not wanted:
         return none
+    sharp = Sharp(geometry, index.motions.shapes)
     spheres = _spheres(sharp.pieces()) if edited else sharp.remembered(__file__, (), _spheres)
     if not len(spheres):
         return none

@@ -250,7 +250,7 @@ def _hides(shape: Shape) -> bool:
 
 
 def _enclosed(lit: Lit) -> float:
-    """Return the share in the power of all lights of those in bulbs: see `_is_enclosed`."""
+    """Return the share of the light's power that comes from bulbs: see `_is_enclosed`."""
     placed = [(place, share) for _, place, share, _ in lit.small if place is not None]
     sharp = Sharp(lit.geometry, (), lambda m: is_sharp(m) and not _is_diffuse(m))
     by = [(place.tolist(), share) for place, share in placed]
