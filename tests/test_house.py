@@ -28,7 +28,7 @@ BOUNDS = {
     "rooms in circles of imports": 0,
     "stays of a scene from render() to the tables": 32,
     "rooms of these stays": 18,
-    "lines of Python": 103_803,
+    "lines of Python": 103_817,
     "lines of OpenCL": 24_572,
     "words of README.md": 1_200,
     "docstrings that begin with What, Of, How, Those, The same": 0,

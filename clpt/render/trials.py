@@ -51,6 +51,8 @@ class Tries:
     def add(self, way: Lowered) -> None:
         """Try an integrator. Raises as `Wavefront.create` does."""
         trial, self._scene = tried(self._device, self._tuning, way, self._samples, self._scene)
+        if way.integrator.guiding and self.ways and self.ways[self.best].integrator.reuse:
+            trial = replace(trial, ray=trial.ray * UNSEEN)
         self.ways.append(way)
         self._trials.append(trial)
 
@@ -108,7 +110,7 @@ def decided(
 
 def is_worth(way: Integrator, rays: float) -> bool:
     """Return whether a film of so many rays is worth the compilation of another integrator."""
-    return rays >= (GUIDE_RAYS if way.guiding else PLAIN_RAYS)
+    return rays >= (GUIDE_RAYS if way.guiding else SHARED_RAYS if way.reuse else PLAIN_RAYS)
 
 
 def name_of(way: Integrator) -> str:
@@ -174,10 +176,12 @@ ODD = 0.01  # the same for the noise of ordinary pixels
 SURE = 3.0  # standard deviations
 LIGHT_RAY, GUIDED_RAY = 1.15, 1.3  # time of a ray, relative to `path`: bench/notes/guiding.md
 PHOTON_RAY = 1.5  # the same of `vcm`
-REUSE_RAY = 2.0  # the same with path reuse, as a trial does not see all that a guide gains
+REUSE_RAY = 1.3  # the same with path reuse: bench/notes/light_paths.md
+UNSEEN = 0.66  # of a guide's cost beside path reuse, since a trial does not see all that it gains
 # For these sizes of films, and larger sizes, a trial costs less than it can save.
 GUIDE_RAYS = 1 << 27  # rays, some 20 s of a core: longer than the compilation of a guide
 PLAIN_RAYS = 1 << 30  # the same for the compilation of kernels without light paths
+SHARED_RAYS = 1 << 26  # the same with path reuse
 SHARE = 1 << 7  # samples of a film for each sample of an integrator in a trial
 
 
@@ -203,12 +207,13 @@ def pixels_for(samples: int) -> int:
 def small_settings(of: NDArray[np.void], pixels: int = PIXELS) -> NDArray[np.void]:
     """Return the settings of a small film of the whole picture; of: settings of the picture.
 
-    A small film has fewer photons, so the disks that gather them are larger.
+    A small film has fewer photons, so the disks that gather them are larger. Its sides are
+    multiples of BLOCK, so that groups of pixels that share paths have none beyond its edges.
     """
     small = of.copy()
     width, height = int(of["film_width"]), int(of["film_height"])
     scale = math.sqrt(pixels / (width * height))
-    width, height = (max(round(size * scale), BLOCK) for size in (width, height))
+    width, height = (BLOCK * max(round(size * scale / BLOCK), 1) for size in (width, height))
     margin = int(of["margin"])
     small["width"], small["height"] = small["film_width"], small["film_height"] = width, height
     small["crop_x"] = small["crop_y"] = 0

@@ -132,28 +132,36 @@ def decided(lit: Lit, former: Integrator | None = None) -> tuple[SceneIndex, str
         chosen, reason = Path(light_paths=0, reuse=True), "paths are reused"
     chosen = replace(chosen, **shared(wanted, chosen))
     index = replace(index, integrator=chosen)
-    return replace(index, candidates=_candidates(index, chosen) if former is None else ()), reason
+    return replace(index, candidates=_candidates(lit, index) if former is None else ()), reason
 
 
 def _reusing(lit: Lit, chosen: Integrator, reason: str) -> tuple[Integrator, str]:
     """The integrator, and the reason, where path reuse may replace few light paths, or none."""
-    index, wanted = lit.index, lit.index.integrator
-    other = Path(light_paths=0, reuse=True)
-    alone = replace(index, integrator=replace(other, **shared(wanted, other)))
-    if chosen.light_paths not in (0, FEW) or not reuse.pays(alone, lit.geometry):
+    other = _way_to_reuse(lit, chosen) if reuse.is_certain(lit.index) else None
+    if other is None:
         return chosen, reason
     return other, f"{reason}; paths go from diffuse to diffuse surfaces, so pixels reuse them"
 
 
-def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]:
+def _way_to_reuse(lit: Lit, chosen: Integrator) -> Integrator | None:
+    """Path reuse, if many paths share; None for scenes that need light paths."""
+    way = Path(light_paths=0, reuse=True)
+    way = replace(way, **shared(lit.index.integrator, way))
+    if chosen.light_paths not in (0, FEW):
+        return None
+    return way if reuse.many_share(replace(lit.index, integrator=way), lit.geometry) else None
+
+
+def _candidates(lit: Lit, index: SceneIndex) -> tuple[Integrator, ...]:
     """The candidates of a trial, the chosen integrator first; empty without a trial.
 
     A trial pays if many samples are to come. If a limit of noise ends the picture, their number is
     unknown. Some scenes cannot have a guide. Photons blur the picture, and the variance does not
     show that: a trial may replace `vcm` by a cheaper integrator, but never chooses it. `path` is no
-    candidate where it cannot find a light behind clear surfaces.
+    candidate where it cannot find a light behind clear surfaces. Path reuse is a candidate where it
+    does not surely pay.
     """
-    samples = index.samples
+    samples, chosen = index.samples, index.integrator
     if samples < TRIAL_SAMPLES or index.adaptive or index.lit_ghosts or chosen.guiding:
         return ()
     path = Path(light_paths=0, **shared(chosen, Path()))
@@ -163,7 +171,9 @@ def _candidates(index: SceneIndex, chosen: Integrator) -> tuple[Integrator, ...]
     can_guide = several and index.lights_reach
     guide = replace(path, guiding=True, guide_paths=light_caches.guide_paths_for(samples))
     guided = [guide] if can_guide else []
-    return (chosen, *plain, *guided) if plain or guided else ()
+    reusing = None if reuse.is_certain(index) else _way_to_reuse(lit, chosen)
+    others = (*plain, *((reusing,) if reusing else ()), *guided)
+    return (chosen, *others) if others else ()
 
 
 def _may_be_met(index: SceneIndex) -> bool:

@@ -25,15 +25,21 @@ OFFSET = 1e-4  # from a surface, of the distance of a hit
 SHARE = 0.35  # of the rays whose paths share; measured, see bench/notes/light_paths.md
 
 
-def pays(index: SceneIndex, geometry: Geometry) -> bool:
-    """Return whether so many paths have diffuse first and second vertices that to share pays.
+def is_certain(index: SceneIndex) -> bool:
+    """Return whether path reuse pays wherever many paths share.
 
-    It does not under a sky: there most noise is that of the light that comes straight from it. For
-    denoisers the noise of pixels must be independent.
+    Under a sky it pays in some scenes: in others most noise is that of light straight from there.
     """
-    open_ = any(light.reach == "infinite" for light in index.lights)
+    return not any(light.reach == "infinite" for light in index.lights)
+
+
+def many_share(index: SceneIndex, geometry: Geometry) -> bool:
+    """Return whether many paths have diffuse first and second vertices, which are shared.
+
+    Never for denoisers: there the noise of pixels must be independent.
+    """
     told = not {*needs.LAYERS}.isdisjoint(index.film.layers)
-    if index.samples < SAMPLES or not index.reused or index.prototypes or open_ or told:
+    if index.samples < SAMPLES or not index.reused or index.prototypes or told:
         return False
     view = index.camera.view_of(index.film.width, index.film.height)
     if view is None:

@@ -18,13 +18,14 @@ from clpt.render.transport.hard_light import TRIAL_SAMPLES
 from clpt.render.wavefront.strategy import UNTUNED
 from clpt.scene import Scene
 from clpt.scene.integrators import Auto, Integrator, Path
-from clpt.scene.lights import Point
+from clpt.scene.lights import Constant, Point
 from clpt.scene.materials import Null
 from clpt.scene.media import Homogeneous
 from clpt.scene.shapes import Rectangle
 from tests.pictures.support import assert_agree, blocks, with_film
 from tests.pictures.transport.test_guiding import slit
 from tests.pictures.transport.test_hybrid import caustic, lamp, narrow
+from tests.pictures.transport.test_reuse import room
 
 AUTO = Path(light_paths="auto", max_depth=5)
 WAYS: list[tuple[Any, bool]] = [(0.25, False), (0, False), (0, True)]
@@ -339,3 +340,40 @@ def test_what_a_trial_decides_has_no_bias(scene: Scene) -> None:
                 images.append(renderer.image().astype(np.float64))
         made.append(blocks(images))
     assert_agree(*made, "by a trial")
+
+
+def under_a_sky() -> Scene:
+    """A room that is open toward the camera, without lamps."""
+    scene = room()
+    shapes = [shape for shape in scene.shapes if shape.emission is None]
+    return dataclasses.replace(scene, shapes=shapes, lights=[Constant(radiance=1.0)])
+
+
+def with_variances(monkeypatch: pytest.MonkeyPatch, **noise: float) -> None:
+    """Let trials find these variances at equal rays, and 1 for all other ways."""
+
+    def tried(_: object, __: object, lowered: Lowered, *___: Any) -> tuple[trials.Trial, None]:
+        spread = noise.get(trials.name_of(lowered.integrator), 1.0) ** 0.5
+        drawn = np.random.default_rng(1).normal(1.0, spread, (8, 32, 64, 3))
+        return trials.Trial(drawn, 1 << 20, trials._ray(lowered)), None
+
+    monkeypatch.setattr(trials, "tried", tried)
+
+
+def test_path_reuse_is_tried_under_a_sky(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where all lights are in the scene it is taken without a trial."""
+    scene, inside = long(under_a_sky()), lower(long(room()))
+    assert trials.name_of(lower(scene).integrator) == "path" and inside.integrator.reuse
+    assert [trials.name_of(way) for way in inside.candidates] == ["path reuse", "guiding"]
+    for variance, pays in ((0.5, False), (0.2, True)):
+        with_variances(monkeypatch, path=0.3, **{"path reuse": variance})
+        chosen = decided(scene)
+        assert "path reuse" in chosen.reason and chosen.features.film.reuse == pays
+
+
+def test_a_guide_gains_more_beside_path_reuse_than_a_trial_sees(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with_variances(monkeypatch)
+    assert decided(long(room())).integrator.guiding
+    assert not decided(long(under_a_sky())).integrator.guiding
