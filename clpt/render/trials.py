@@ -176,7 +176,7 @@ ODD = 0.01  # the same for the noise of ordinary pixels
 SURE = 3.0  # standard deviations
 LIGHT_RAY, GUIDED_RAY = 1.15, 1.3  # time of a ray, relative to `path`: bench/notes/guiding.md
 PHOTON_RAY = 1.5  # the same of `vcm`
-REUSE_RAY = 1.3  # the same with path reuse: bench/notes/light_paths.md
+REUSE_RAY = 1.2  # the same with path reuse: bench/notes/light_paths.md
 UNSEEN = 0.66  # of a guide's cost beside path reuse, since a trial does not see all that it gains
 # For these sizes of films, and larger sizes, a trial costs less than it can save.
 GUIDE_RAYS = 1 << 27  # rays, some 20 s of a core: longer than the compilation of a guide
