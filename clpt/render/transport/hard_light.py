@@ -144,11 +144,10 @@ def _reusing(lit: Lit, chosen: Integrator, reason: str) -> tuple[Integrator, str
 
 
 def _way_to_reuse(lit: Lit, chosen: Integrator) -> Integrator | None:
-    """Path reuse, if many paths share; None for scenes that need light paths."""
-    way = Path(light_paths=0, reuse=True)
-    way = replace(way, **shared(lit.index.integrator, way))
-    if chosen.light_paths not in (0, FEW):
+    """Path reuse, if many paths share; None where it is chosen or light paths are needed."""
+    if chosen.reuse or chosen.light_paths not in (0, FEW):
         return None
+    way = Path(light_paths=0, reuse=True, **shared(lit.index.integrator, Path()))
     return way if reuse.many_share(replace(lit.index, integrator=way), lit.geometry) else None
 
 
@@ -168,11 +167,10 @@ def _candidates(lit: Lit, index: SceneIndex) -> tuple[Integrator, ...]:
     finds = not chosen.has_photons or (chosen.light_paths != MANY and _may_be_met(index))
     plain = [path] if finds and chosen.light_paths else []
     several = chosen.max_depth < 0 or chosen.max_depth > 2
-    can_guide = several and index.lights_reach
     guide = replace(path, guiding=True, guide_paths=light_caches.guide_paths_for(samples))
-    guided = [guide] if can_guide else []
+    guided = [guide] if several and index.lights_reach else []
     reusing = None if reuse.is_certain(index) else _way_to_reuse(lit, chosen)
-    others = (*plain, *((reusing,) if reusing else ()), *guided)
+    others = (*plain, *filter(None, [reusing]), *guided)
     return (chosen, *others) if others else ()
 
 

@@ -364,7 +364,9 @@ def test_path_reuse_is_tried_under_a_sky(monkeypatch: pytest.MonkeyPatch) -> Non
     """Where all lights are in the scene it is taken without a trial."""
     scene, inside = long(under_a_sky()), lower(long(room()))
     assert trials.name_of(lower(scene).integrator) == "path" and inside.integrator.reuse
-    assert [trials.name_of(way) for way in inside.candidates] == ["path reuse", "guiding"]
+    asked = lower(long(under_a_sky(), Path(reuse=True)))
+    for taken in (inside, asked):
+        assert [trials.name_of(way) for way in taken.candidates] == ["path reuse", "guiding"]
     for variance, pays in ((0.5, False), (0.2, True)):
         with_variances(monkeypatch, path=0.3, **{"path reuse": variance})
         chosen = decided(scene)
